@@ -1,0 +1,22 @@
+//! The one error type of the core. Each message is one line that names what is wrong and what would be right.
+
+/// Why the core refused to go on.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A display whose physics is impossible or out of range.
+    #[error("display: {0}")]
+    Display(String),
+    /// A frame, plane or stack of the wrong shape or with unusable values.
+    #[error("frame: {0}")]
+    Frame(String),
+    /// A plan that cannot be made or used as asked: a distance, a size, a parameter.
+    #[error("{0}")]
+    Plan(String),
+    /// An ONNX file that is not a hologram network.
+    #[error("network: {0}")]
+    Network(String),
+}
+
+/// The core's result.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,5 @@
+//! RGB-D frames to phase-only 3D holograms.
+
+pub mod error;
+
+pub use error::{Error, Result};
