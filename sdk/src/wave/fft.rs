@@ -259,22 +259,31 @@ impl Fft2 {
         });
     }
 
-    /// [`Self::rows_inverse`], `between`, and [`Self::rows_forward`] of whole rows in one sweep: for a
-    /// field that is changed in space between two filters of a periodic plane.
-    pub fn rows_there_and_back<F>(
+    /// [`Self::rows_inverse`], `change` and [`Self::rows_forward`] in one sweep: for a periodic plane whose
+    /// field is changed in space between two filters. Rows that `touched` says no to stay in the
+    /// frequency domain, which saves both their transforms.
+    pub fn rows_there_and_back<T, F>(
         &self,
         columns: &[Complex32],
         rows: &mut [Complex32],
         work: &mut Work,
-        between: F,
+        touched: T,
+        change: F,
     ) where
+        T: Fn(usize) -> bool + Sync,
         F: Fn(usize, &mut [Complex32]) + Sync,
     {
         let [forward, inverse] = &self.row;
+        let scale = self.padded_width as f32;
         self.rows_from(columns, rows, work, |y, row, work| {
-            inverse.process_with_scratch(row, work);
-            between(y, row);
-            forward.process_with_scratch(row, work);
+            if touched(y) {
+                inverse.process_with_scratch(row, work);
+                change(y, row);
+                forward.process_with_scratch(row, work);
+            } else {
+                // There and back, unnormalized, is a factor of the length.
+                row.iter_mut().for_each(|value| *value *= scale);
+            }
         });
     }
 
