@@ -158,7 +158,12 @@ mod tests {
     #[test]
     fn the_mean_phase_is_taken_from_each_colour() {
         let mut field: Vec<_> = (0..3 * 20_000)
-            .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i / 20_000) as f32 + 0.1 * (i % 3) as f32))
+            .map(|i| {
+                Complex32::from_polar(
+                    1.0 + (i % 7) as f32,
+                    (i / 20_000) as f32 + 0.1 * (i % 3) as f32,
+                )
+            })
             .collect();
         remove_mean_phase(&mut field);
         for plane in field.chunks_exact(20_000) {

@@ -157,7 +157,9 @@ impl Pipeline {
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
         let (network, propagate) = self.field(frame, field, scratch)?;
-        let modulation = self.modulator.modulate(field, levels, &mut scratch.modulator);
+        let modulation = self
+            .modulator
+            .modulate(field, levels, &mut scratch.modulator);
         Ok(FrameReport {
             scale: modulation.scale,
             times: StageTimes {
@@ -175,7 +177,13 @@ fn check_display(network: &Network, display: &Display) -> Result<()> {
     let trained = network.display();
     let pairs = [
         ("pitch", "µm", 1e6, trained.pitch_m, display.pitch_m()),
-        ("volume depth", "mm", 1e3, trained.volume_depth_m, display.volume_depth_m()),
+        (
+            "volume depth",
+            "mm",
+            1e3,
+            trained.volume_depth_m,
+            display.volume_depth_m(),
+        ),
     ];
     let colours = trained
         .wavelengths_m
