@@ -46,7 +46,7 @@ def degrade_depth(colour, depth, rng):
 
 
 def _shift(depth, dx, dy):
-    """Moves a depth map (1, 1, H, W) by a fraction of pixels, borders repeated; nearest, so that edges do not blur."""
+    """Moves a depth map (1, 1, H, W) by whole pixels, so that edges do not blur; borders are repeated."""
     dx, dy = round(float(dx)), round(float(dy))
     if dx == 0 and dy == 0:
         return depth
