@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from . import checkpoint, data, evaluate, export, grow, loop, networks, plot
+from . import checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
 from .checkpoint import Checkpoint
 from .stage1 import Stage1
 
@@ -30,11 +30,17 @@ def parser():
 
     p = add("stage1", run_stage1, "Train a hologram network on scenes and their holograms.")
     training_flags(p)
+    resume_flag(p)
     p.add_argument("--layers", type=int, default=15, help="convolution layers (default 15)")
     p.add_argument("--filters", type=int, default=24, help="filters a layer (default 24)")
     p.add_argument("--input", default="rgbd", help="rgbd or ldiN, N layers of a layered depth image (default rgbd)")
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
+
+    p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
+    p.add_argument("network", help="a checkpoint or a float32 .onnx")
+    p.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
+    training_flags(p, output="the .onnx file; training goes on in FILE.qat", rate=1e-4)
 
     p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
     p.add_argument("checkpoint")
@@ -60,23 +66,26 @@ def machine_flags(p):
     p.add_argument("--threads", type=int, default=1, help="CPU threads; one network a process, one thread each, uses cores best (default 1)")
 
 
-def training_flags(p):
+def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3):
     p.add_argument("--data", required=True, help="folder of the data set")
-    p.add_argument("-o", "--output", required=True, help="folder for checkpoint.pt and curve.jsonl")
+    p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
     budget.add_argument("--steps", type=int, help="budget in steps")
-    p.add_argument("--resume", action="store_true", help="go on from the checkpoint in the output folder, with its flags where none are given")
     p.add_argument("--batch", type=int, default=1, help="samples a step and process (default 1)")
     p.add_argument("--crop", type=int, default=192, help="pixels a side of a sample (default 192)")
     p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
     p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
-    p.add_argument("--rate", type=float, default=2e-3, help="learning rate (default 2e-3)")
+    p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
     p.add_argument("--scenes", type=int, help="only the first so many training scenes")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--f32", action="store_true", help="float32 throughout; bf16 is 3 to 4 times faster where the CPU has it")
     p.add_argument("--loaders", type=int, help="threads that draw samples ahead (default 0 on a CPU, 8 on a GPU)")
     machine_flags(p)
+
+
+def resume_flag(p):
+    p.add_argument("--resume", action="store_true", help="go on from the checkpoint in the output folder, with its flags where none are given")
 
 
 def run_data(args):
@@ -98,11 +107,13 @@ def run_stage1(args):
                 raise ValueError(f"{args.init}: {network.architecture}, the flags ask for {wanted}")
     workers = loop.Workers.start(args.device)
     train, validation = load(args, network.architecture.ldi_layers)
-    task = Stage1(
-        network, train, validation, workers,
-        batch=args.batch, crop=args.crop, planes=args.planes, degraded=args.degraded, bf16=not args.f32, seed=args.seed,
-    )
+    task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
     go(task, args, workers, resume)
+
+
+def sampling(args):
+    """What a step takes, as the tasks name it."""
+    return {name: getattr(args, name) for name in ("batch", "crop", "planes", "degraded", "seed")}
 
 
 def load(args, ldi_layers):
@@ -121,14 +132,32 @@ def resumed(args):
     return Checkpoint.load(Path(args.output) / "checkpoint.pt")
 
 
-def go(task, args, workers, resume):
+def go(task, args, workers, resume, folder=None):
     """Trains, and says where the result lies."""
+    folder = folder or args.output
     options = {k: v for k, v in vars(args).items() if k not in ("run", "command", "resume", "output")}
     loaders = args.loaders if args.loaders is not None else (8 if workers.device.type == "cuda" else 0)
     budget = loop.Budget(args.steps, args.minutes)
-    last = loop.fit(task, budget, args.rate, args.output, workers, resume, options, loaders=loaders)
+    last = loop.fit(task, budget, args.rate, folder, workers, resume, options, loaders=loaders)
     if workers.rank == 0:
-        print(f"{last.step} steps in {last.elapsed_s / 60:.1f} minutes: {Path(args.output) / 'checkpoint.pt'}", file=sys.stderr)
+        print(f"{last.step} steps in {last.elapsed_s / 60:.1f} minutes: {Path(folder) / 'checkpoint.pt'}", file=sys.stderr)
+
+
+def run_quantize(args):
+    network, display = checkpoint.load_network(args.network)
+    train, validation = load(args, network.architecture.ldi_layers)
+    ranges = quantize.calibrate(network, quantize.examples(train))
+    exact, rounded = quantize.figures(network, ranges, validation)
+    quantize.report("after training", exact, rounded)
+    quantized = quantize.Quantized(network, ranges)
+    if args.always_train or exact - rounded > quantize.ALLOWED_LOSS_DB:
+        if args.minutes is None and args.steps is None:
+            raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps")
+        workers = loop.Workers.start(args.device)
+        task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
+        go(task, args, workers, None, folder=f"{args.output}.qat")
+        quantize.report("trained through the rounding", exact, quantize.figures(network.cpu(), ranges, validation)[1])
+    export.write(export_int8.int8_model(quantized.cpu(), display), args.output)
 
 
 def run_export(args):

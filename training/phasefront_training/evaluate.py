@@ -19,7 +19,7 @@ from .degrade import degrade_depth
 from .files import replacing
 from .metrics import psnr, ssim
 from .networks import Architecture, head_field
-from .optics import modulus, propagate
+from .optics import propagate
 
 STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
@@ -75,13 +75,13 @@ def predictor(path, device="cpu"):
 def compare(field, truth, display, stack=True):
     """{figure: value} of a field against the true one, both (3, H, W)."""
     truth = truth.to(field.device)
-    given, true = modulus(field, 0), modulus(truth, 0)
+    given, true = field.abs(), truth.abs()
     figures = {"amplitude_psnr": psnr(given, true), "amplitude_ssim": ssim(given, true)}
     if stack:
         pairs = []
         for part in STACK:
             z = part * display.volume_depth_m
-            pairs.append([modulus(propagate(f, z, display), 0) for f in (field, truth)])
+            pairs.append([propagate(f, z, display).abs() for f in (field, truth)])
         figures["focal_psnr"] = float(np.mean([psnr(a, b) for a, b in pairs]))
         figures["focal_ssim"] = float(np.mean([ssim(a, b) for a, b in pairs]))
     return figures

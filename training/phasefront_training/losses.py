@@ -17,7 +17,6 @@ import math
 import numpy as np
 import torch
 
-from .optics import modulus
 
 BINS = 200  # of the depth histogram
 FULLEST = 15  # planes at the fullest bins
@@ -76,9 +75,9 @@ def focal_stack_terms(prediction, target, depth, display, planes, rng):
     distances = stack_distances(depth, display, planes, rng)
     away_mm = (display.z_m(depth)[:, None] - distances.to(depth)[..., None, None]).abs() * 1e3
     attention = torch.exp(-ATTENTION_PER_MM * away_mm)[:, :, None]
-    predicted = attention * modulus(focal_stack(prediction, distances, display))
+    predicted = attention * focal_stack(prediction, distances, display).abs()
     with torch.no_grad():
-        true = attention * modulus(focal_stack(target, distances, display))
+        true = attention * focal_stack(target, distances, display).abs()
     error = predicted - true
     variation = error.diff(dim=-1).abs().mean() + error.diff(dim=-2).abs().mean()
     return error.abs().mean(), variation
@@ -86,5 +85,5 @@ def focal_stack_terms(prediction, target, depth, display, planes, rng):
 
 def field_terms(prediction, target):
     """(field, amplitude) terms."""
-    field = modulus(prediction - target).mean()
-    return field, (modulus(prediction) - modulus(target)).abs().mean()
+    field = (prediction - target).abs().mean()
+    return field, (prediction.abs() - target.abs()).abs().mean()

@@ -89,7 +89,3 @@ def propagate(field, distance_m, display):
     kernel = transfer(display, distance_m, *shape, field.device)
     return torch.fft.ifft2(spectrum * kernel)[..., :height, :width]
 
-
-def modulus(field, epsilon=1e-8):
-    """|field| with a gradient that stays finite at 0."""
-    return (field.real**2 + field.imag**2 + epsilon).sqrt()
