@@ -8,7 +8,9 @@ import torch
 
 from . import checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
 from .checkpoint import Checkpoint
+from .encode import DeepDoublePhase
 from .stage1 import Stage1
+from .stage2 import PREFILTER_FILTERS, PREFILTER_LAYERS, Identity, Stage2, encoding_figures
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
 VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
@@ -37,6 +39,13 @@ def parser():
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
 
+    p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
+    training_flags(p, crop=384, rate=2e-4)
+    resume_flag(p)
+    p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
+    p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
+    p.add_argument("--identity-steps", type=int, default=1000, help="steps that teach the pre-filter the identity first (default 1000)")
+
     p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
     p.add_argument("network", help="a checkpoint or a float32 .onnx")
     p.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
@@ -44,16 +53,17 @@ def parser():
 
     p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
     p.add_argument("checkpoint")
+    p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="which, of a stage 2 checkpoint (default %(default)s)")
     p.add_argument("-o", "--output", required=True, help="the .onnx file")
 
     p = add("evaluate", run_evaluate, "PSNR and SSIM of networks on scenes not trained on, beside the RGB as the field.")
     p.add_argument("networks", nargs="*", metavar="NETWORK", help="checkpoints or .onnx files, all for the same input")
-    p.add_argument("--data", required=True, help="folder of the data set")
-    p.add_argument("--split", choices=data.SPLITS, default="test")
-    p.add_argument("--scenes", type=int, help="only the first so many")
     p.add_argument("--clean-only", action="store_true", help="leave degraded depth out")
-    p.add_argument("--json", metavar="FILE", help="write the figures there too")
-    machine_flags(p)
+    evaluation_flags(p)
+
+    p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
+    p.add_argument("checkpoint")
+    evaluation_flags(p)
 
     p = add("plot", run_plot, "Plot the curves of trainings.")
     p.add_argument("folders", nargs="+", help="output folders of trainings")
@@ -66,14 +76,22 @@ def machine_flags(p):
     p.add_argument("--threads", type=int, default=1, help="CPU threads; one network a process, one thread each, uses cores best (default 1)")
 
 
-def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3):
+def evaluation_flags(p):
+    p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("--split", choices=data.SPLITS, default="test")
+    p.add_argument("--scenes", type=int, help="only the first so many")
+    p.add_argument("--json", metavar="FILE", help="write the figures there too")
+    machine_flags(p)
+
+
+def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
     p.add_argument("--data", required=True, help="folder of the data set")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
     budget.add_argument("--steps", type=int, help="budget in steps")
     p.add_argument("--batch", type=int, default=1, help="samples a step and process (default 1)")
-    p.add_argument("--crop", type=int, default=192, help="pixels a side of a sample (default 192)")
+    p.add_argument("--crop", type=int, default=crop, help="pixels a side of a sample (default %(default)s)")
     p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
     p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
     p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
@@ -109,6 +127,27 @@ def run_stage1(args):
     train, validation = load(args, network.architecture.ldi_layers)
     task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
     go(task, args, workers, resume)
+
+
+def run_stage2(args):
+    resume = resumed(args)
+    if resume is not None:
+        hologram, prefilter = resume.network("hologram"), resume.network("prefilter")
+        offset_m = resume.extra["offset_m"]
+    else:
+        if not args.init:
+            raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
+        hologram, _ = checkpoint.load_network(args.init)
+        prefilter = networks.Chain(networks.Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+        offset_m = args.offset_mm * 1e-3
+    workers = loop.Workers.start(args.device)
+    train, validation = load(args, hologram.architecture.ldi_layers)
+    model = DeepDoublePhase(hologram, prefilter, offset_m, train.display, bf16=not args.f32)
+    options = sampling(args)
+    if resume is None and args.identity_steps:
+        identity = Identity(model, train, validation, workers, **{k: v for k, v in options.items() if k != "planes"})
+        loop.fit(identity, loop.Budget(steps=args.identity_steps), 10 * args.rate, Path(args.output) / "identity", workers)
+    go(Stage2(model, train, validation, workers, **options), args, workers, resume)
 
 
 def sampling(args):
@@ -162,7 +201,10 @@ def run_quantize(args):
 
 def run_export(args):
     last = Checkpoint.load(args.checkpoint)
-    export.write(export.float_model(last.network(), last.display), args.output)
+    if args.network not in last.networks:
+        raise ValueError(f"{args.checkpoint}: no {args.network}, only {', '.join(last.networks)}")
+    model = export.float_model(last.network(args.network), last.display, last.extra.get("offset_m", 0.0))
+    export.write(model, args.output)
 
 
 def run_evaluate(args):
@@ -186,6 +228,22 @@ def scenes_of(args, scenes):
     """What figures were measured on."""
     manifest = data.Manifest.read(args.data).table
     return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display") if k in manifest}
+
+
+def run_evaluate_encoding(args):
+    last = Checkpoint.load(args.checkpoint)
+    if "prefilter" not in last.networks:
+        raise ValueError(f"{args.checkpoint}: no checkpoint of stage 2")
+    hologram, prefilter = last.network("hologram"), last.network("prefilter")
+    scenes = data.Scenes(data.Manifest.read(args.data), args.split, hologram.architecture.ldi_layers, args.scenes)
+    model = DeepDoublePhase(hologram, prefilter, last.extra["offset_m"], scenes.display).to(args.device)
+    results = encoding_figures(model, scenes)
+    columns = list(next(iter(results.values())))
+    print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
+    for name, figures in results.items():
+        print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
+    if args.json:
+        evaluate.save({"data": scenes_of(args, scenes), "offset_mm": last.extra["offset_m"] * 1e3, "results": results}, args.json)
 
 
 def run_plot(args):

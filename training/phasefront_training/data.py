@@ -8,10 +8,12 @@ In memory a scene takes colour as uint8, depth and field as float16. The hologra
 black surroundings, so samples are crops, flips and transposes, never rolls.
 """
 
+import io
 import json
 import os
 import subprocess
 import sys
+import threading
 import zipfile
 import zlib
 from concurrent.futures import ThreadPoolExecutor
@@ -25,6 +27,7 @@ from .degrade import degrade_depth
 from .optics import Display
 
 FORMAT = "phasefront-dataset-1"
+_HEADER = threading.Lock()
 SPLITS = ("train", "validation", "test")
 
 
@@ -87,8 +90,7 @@ def read_pair(path, ldi_layers):
     Raises DataError where the file is damaged or holds fewer than `ldi_layers` layers.
     """
     try:
-        with np.load(path) as arrays:
-            rgba, depth, hologram = arrays["rgb"], arrays["depth"], arrays["hologram"]
+        rgba, depth, hologram = _read_arrays(path, ("rgb", "depth", "hologram"))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise DataError(f"{path}: damaged ({error})") from None
     layers, height, width = depth.shape if depth.ndim == 3 else (0, 0, 0)
@@ -143,6 +145,15 @@ class Scenes:
         """Colour (3·L, H, W) in [0, 1], normalized depth (L, H, W) and the true field (3, H, W) of scene i."""
         target = self.target[i].float()
         return self.colour[i].float() / 255, self.depth[i].float(), torch.complex(target[:3], target[3:])
+
+
+def _read_arrays(path, names):
+    """Arrays of an .npz. Unpacking runs beside other threads; headers one at a time, for `ast`, which numpy parses
+    them by, fails in CPython 3.11 when two threads use it at once."""
+    with zipfile.ZipFile(path) as archive:
+        packed = [archive.read(f"{name}.npy") for name in names]
+    with _HEADER:
+        return [np.lib.format.read_array(io.BytesIO(each)) for each in packed]
 
 
 def _try_read(path, ldi_layers):
