@@ -1,8 +1,12 @@
 //! The command line: one file a command, each with its flags, defined once, and what it does with
 //! the laboratory. Flags that several commands share are in [`flags`].
 
+mod compare;
 mod dataset;
 mod flags;
+mod hologram;
+mod refocus;
+mod scene;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
@@ -23,6 +27,10 @@ pub(crate) struct Phasefront {
 
 #[derive(Subcommand)]
 enum Command {
+    Hologram(hologram::Hologram),
+    Refocus(refocus::Refocus),
+    Compare(compare::Compare),
+    Scene(scene::Scene),
     Dataset(dataset::Dataset),
 }
 
@@ -37,6 +45,10 @@ impl Phasefront {
             .map_err(|e| phasefront_lab::Error::Input(format!("--threads: {e}")))?;
         let json = self.json;
         pool.install(|| match self.command {
+            Command::Hologram(command) => command.run(json),
+            Command::Refocus(command) => command.run(json),
+            Command::Compare(command) => command.run(json),
+            Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
         })
     }

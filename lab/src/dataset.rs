@@ -155,8 +155,9 @@ pub fn make(
         text.push(b'\n');
         files::write_atomically(&place, |file| std::io::Write::write_all(file, &text))?;
     }
+    // In order, so that what a stopped run leaves is a beginning.
     let mine: Range<usize> = 0..manifest.scenes.saturating_sub(shard).div_ceil(shards);
-    mine.into_par_iter().try_for_each(|i| {
+    mine.par_bridge().try_for_each(|i| {
         let index = i * shards + shard;
         let path = Manifest::pair_path(dir, index);
         if !path.exists() {

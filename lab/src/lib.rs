@@ -5,6 +5,9 @@ pub mod error;
 pub mod files;
 pub mod ldi;
 pub mod metrics;
+pub mod models;
+pub mod reconstruct;
+pub mod rgbd;
 pub mod scene;
 pub mod sm_lbm;
 

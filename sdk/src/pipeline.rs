@@ -5,7 +5,7 @@ use crate::display::Display;
 use crate::encode::{Encoding, Scale};
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
-use crate::modulator::{Modulator, ModulatorScratch, remove_mean_phase};
+use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
 use crate::network::{Head, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::slm::Response;
 use num_complex::Complex32;
@@ -141,6 +141,20 @@ impl Pipeline {
         Ok((predicted - start, predicted.elapsed()))
     }
 
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, as [`Modulator::modulate`].
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate(
+        &self,
+        field: &mut [Complex32],
+        levels: &mut [u8],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .modulate(field, levels, &mut scratch.modulator)
+    }
+
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as
     /// the encoder's filter made it.
     ///
@@ -157,9 +171,7 @@ impl Pipeline {
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
         let (network, propagate) = self.field(frame, field, scratch)?;
-        let modulation = self
-            .modulator
-            .modulate(field, levels, &mut scratch.modulator);
+        let modulation = self.modulate(field, levels, scratch);
         Ok(FrameReport {
             scale: modulation.scale,
             times: StageTimes {
