@@ -113,20 +113,27 @@ def run_data(args):
 
 def run_stage1(args):
     resume = resumed(args)
+    workers = loop.Workers.start(args.device)
     if resume is not None:
         network = resume.network()
+        train, validation = load(args, network.architecture.ldi_layers)
     else:
         wanted = networks.Architecture(args.layers, args.filters, args.input, args.head)
-        network = networks.Chain(wanted)
-        if args.init:
-            network, _ = checkpoint.load_network(args.init)
-            network = grow.grow(network, args.layers) if network.architecture.layers != args.layers else network
-            if network.architecture != wanted:
-                raise ValueError(f"{args.init}: {network.architecture}, the flags ask for {wanted}")
-    workers = loop.Workers.start(args.device)
-    train, validation = load(args, network.architecture.ldi_layers)
+        train, validation = load(args, wanted.ldi_layers)
+        network = begun(args, wanted, train)
     task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
     go(task, args, workers, resume)
+
+
+def begun(args, wanted, train):
+    """A fresh network, or the one of --init, grown where it has fewer layers."""
+    if not args.init:
+        return networks.Chain(wanted)
+    network, _ = checkpoint.load_network(args.init)
+    found = network.architecture
+    if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
+        raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
+    return grow.grow(network, args.layers, quantize.examples(train))
 
 
 def run_stage2(args):

@@ -149,7 +149,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
     """
     output = Path(output)
     module = task.module()
-    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99))
+    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99), fused=True)
     step, before = 0, 0.0
     if resume is not None:
         optimiser.load_state_dict(resume.optimiser)
