@@ -24,7 +24,7 @@ from .files import replacing
 
 WARM_UP = 50
 LOGS = 200  # lines of the curve in a whole budget
-VALIDATIONS = 40  # of them with a validation
+VALIDATIONS = 25  # of them with a validation
 CHECKPOINT_S = 60.0
 
 

@@ -159,7 +159,7 @@ class QuantizationAware(Stage1):
 def figures(chain, ranges, scenes):
     """Amplitude PSNR (float32, int8) on scenes."""
     quantized = Quantized(copy.deepcopy(chain), ranges)
-    return tuple(evaluate(torch_predictor(n), scenes, stack=False)["amplitude_psnr"] for n in (chain, quantized))
+    return tuple(evaluate(torch_predictor(n), scenes, full=False)["amplitude_psnr"] for n in (chain, quantized))
 
 
 def report(name, exact, rounded):

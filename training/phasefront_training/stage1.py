@@ -65,7 +65,7 @@ class Stage1(Task):
 
     def validate(self):
         predict = torch_predictor(self.network, self.bf16)
-        line = {"validation_psnr": evaluate(predict, self.validation, stack=False)["amplitude_psnr"]}
+        line = {"validation_psnr": evaluate(predict, self.validation, full=False)["amplitude_psnr"]}
         if self.degraded:
-            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, stack=False)["amplitude_psnr"]
+            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, full=False)["amplitude_psnr"]
         return line

@@ -84,11 +84,11 @@ class Stage2(_OnHolograms):
         return STACK_WEIGHT * (terms["focal"] + terms["variation"]) + PHASE_WEIGHT * terms["phase"], terms
 
     def validate(self):
-        figures = encoding_figures(self.model, self.validation, stack=False)["deep double phase"]
+        figures = encoding_figures(self.model, self.validation, full=False)["deep double phase"]
         return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
 
 
-def encoding_figures(model, scenes, degraded=False, stack=True):
+def encoding_figures(model, scenes, degraded=False, full=True):
     """{method: mean figures} of what an encoded hologram shows: DDPM, and AA-DPM and plain double phase after the same
     hologram network; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
     rows = {}
@@ -110,7 +110,7 @@ def encoding_figures(model, scenes, degraded=False, stack=True):
                 phase = double_phase(centred, scale)
                 shown = reconstruct(phase, scale, model.offset_m, model.display)
                 # The taken-out mean phase does not change amplitudes, so they compare as they are.
-                row = compare(shown[0], truth, model.display, stack)
+                row = compare(shown[0], truth, model.display, full)
                 row |= {"wraps": wraps(phase), "brightness": float(shown.abs().mean() / truth.abs().mean())}
                 rows.setdefault(name, []).append(row)
     return {name: {k: round(float(np.mean([r[k] for r in each])), 4) for k in each[0]} for name, each in rows.items()}
