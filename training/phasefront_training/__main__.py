@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from . import checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -64,6 +64,11 @@ def parser():
     p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
     p.add_argument("checkpoint")
     evaluation_flags(p)
+
+    p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
+    p.add_argument("checkpoint")
+    p.add_argument("figures", nargs="+", help="files that evaluate --json and evaluate-encoding --json wrote")
+    p.add_argument("-o", "--output", required=True, help="the card, NAME.md beside NAME.onnx")
 
     p = add("plot", run_plot, "Plot the curves of trainings.")
     p.add_argument("folders", nargs="+", help="output folders of trainings")
@@ -234,7 +239,7 @@ def run_evaluate(args):
 def scenes_of(args, scenes):
     """What figures were measured on."""
     manifest = data.Manifest.read(args.data).table
-    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display") if k in manifest}
+    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display")}
 
 
 def run_evaluate_encoding(args):
@@ -251,6 +256,10 @@ def run_evaluate_encoding(args):
         print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
     if args.json:
         evaluate.save({"data": scenes_of(args, scenes), "offset_mm": last.extra["offset_m"] * 1e3, "results": results}, args.json)
+
+
+def run_card(args):
+    card.write(args.output, Checkpoint.load(args.checkpoint), args.figures)
 
 
 def run_plot(args):

@@ -153,7 +153,7 @@ class QuantizationAware(Stage1):
         self.networks = {"hologram": network.chain}
 
     def extra(self):
-        return {"ranges": self.network.ranges}
+        return super().extra() | {"ranges": self.network.ranges}
 
 
 def figures(chain, ranges, scenes):

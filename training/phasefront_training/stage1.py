@@ -40,6 +40,7 @@ class Stage1(Task):
         self.degraded = degraded
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
+        self.facts = scenes.facts
         self.sampler = Sampler(scenes, batch, crop, margin(network.architecture.layers), degraded, seed, workers.rank)
 
     def module(self):
@@ -62,6 +63,9 @@ class Stage1(Task):
         terms = {name: value / share for name, value in terms.items()}
         weights = {"focal": FOCAL_WEIGHT, "variation": VARIATION_WEIGHT}
         return sum(weights.get(name, 1.0) * value for name, value in terms.items()), terms
+
+    def extra(self):
+        return {"data": self.facts}
 
     def validate(self):
         predict = torch_predictor(self.network, self.bf16)

@@ -33,13 +33,14 @@ class _OnHolograms(Task):
         self.networks = {"hologram": model.hologram, "prefilter": model.prefilter}
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
+        self.facts = scenes.facts
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank)
 
     def sample(self, step):
         return self.sampler.draw(step)
 
     def extra(self):
-        return {"offset_m": self.model.offset_m}
+        return {"data": self.facts, "offset_m": self.model.offset_m}
 
 
 class Identity(_OnHolograms):
