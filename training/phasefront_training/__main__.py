@@ -10,7 +10,7 @@ from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop,
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
-from .stage2 import PREFILTER_FILTERS, PREFILTER_LAYERS, Identity, Stage2, encoding_figures
+from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
 VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
@@ -44,7 +44,7 @@ def parser():
     resume_flag(p)
     p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
     p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
-    p.add_argument("--identity-steps", type=int, default=1000, help="steps that teach the pre-filter the identity first (default 1000)")
+    p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter the identity first, as in the paper (default 0: it begins as the blur of AA-DPM)")
 
     p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
     p.add_argument("network", help="a checkpoint or a float32 .onnx")
@@ -150,7 +150,7 @@ def run_stage2(args):
         if not args.init:
             raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
         hologram, _ = checkpoint.load_network(args.init)
-        prefilter = networks.Chain(networks.Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+        prefilter = prefilter_network()
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
     train, validation = load(args, hologram.architecture.ldi_layers)

@@ -1,6 +1,8 @@
 """Stage 2, the deep double phase method: hologram network and pre-filter learn together what survives encoding.
 
-First the pre-filter alone learns to be the identity, on true holograms at the modulator's plane. Then both are trained
+The pre-filter begins as AA-DPM's blur, which its last layer holds exactly, for it reads the field itself as well; so
+training starts from that method's quality. (The paper's start, the pre-filter alone learning to be the identity on true
+holograms at the modulator's plane, is there too, by a number of steps.) Then both are trained
 through encoding, aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07
 times the phase regulariser; the truth of the field itself is left out on purpose.
 """
@@ -10,18 +12,30 @@ import torch
 
 from .data import Sampler, network_input
 from .encode import (
-    DeepDoublePhase, anti_alias, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from .evaluate import compare, scene_depth
 from .loop import Task
 from .losses import fill_invalid, focal_stack_terms
-from .networks import head_field
+from .networks import Architecture, Chain, head_field
 from .optics import propagate
 from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
 
 PREFILTER_LAYERS, PREFILTER_FILTERS = 8, 8
 STACK_WEIGHT = 20.0
 PHASE_WEIGHT = 0.07
+
+
+def prefilter_network():
+    """A pre-filter that is AA-DPM's blur so far."""
+    network = Chain(Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+    last = network.convs[-1].weight
+    with torch.no_grad():
+        last.zero_()
+        for c in range(6):
+            last[c, PREFILTER_FILTERS + c] = blur_kernel()
+            last[c, PREFILTER_FILTERS + c, 1, 1] -= 1  # the head adds the field itself
+    return network
 
 
 class _OnHolograms(Task):
