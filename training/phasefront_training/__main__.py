@@ -6,11 +6,11 @@ from pathlib import Path
 
 import torch
 
-from . import checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
-from .stage2 import PREFILTER_FILTERS, PREFILTER_LAYERS, Identity, Stage2, encoding_figures
+from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
 VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
@@ -44,7 +44,7 @@ def parser():
     resume_flag(p)
     p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
     p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
-    p.add_argument("--identity-steps", type=int, default=1000, help="steps that teach the pre-filter the identity first (default 1000)")
+    p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter the identity first, as in the paper (default 0: it begins as the blur of AA-DPM)")
 
     p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
     p.add_argument("network", help="a checkpoint or a float32 .onnx")
@@ -64,6 +64,11 @@ def parser():
     p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
     p.add_argument("checkpoint")
     evaluation_flags(p)
+
+    p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
+    p.add_argument("checkpoint")
+    p.add_argument("figures", nargs="+", help="files that evaluate --json and evaluate-encoding --json wrote")
+    p.add_argument("-o", "--output", required=True, help="the card, NAME.md beside NAME.onnx")
 
     p = add("plot", run_plot, "Plot the curves of trainings.")
     p.add_argument("folders", nargs="+", help="output folders of trainings")
@@ -113,20 +118,27 @@ def run_data(args):
 
 def run_stage1(args):
     resume = resumed(args)
+    workers = loop.Workers.start(args.device)
     if resume is not None:
         network = resume.network()
+        train, validation = load(args, network.architecture.ldi_layers)
     else:
         wanted = networks.Architecture(args.layers, args.filters, args.input, args.head)
-        network = networks.Chain(wanted)
-        if args.init:
-            network, _ = checkpoint.load_network(args.init)
-            network = grow.grow(network, args.layers) if network.architecture.layers != args.layers else network
-            if network.architecture != wanted:
-                raise ValueError(f"{args.init}: {network.architecture}, the flags ask for {wanted}")
-    workers = loop.Workers.start(args.device)
-    train, validation = load(args, network.architecture.ldi_layers)
+        train, validation = load(args, wanted.ldi_layers)
+        network = begun(args, wanted, train)
     task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
     go(task, args, workers, resume)
+
+
+def begun(args, wanted, train):
+    """A fresh network, or the one of --init, grown where it has fewer layers."""
+    if not args.init:
+        return networks.Chain(wanted)
+    network, _ = checkpoint.load_network(args.init)
+    found = network.architecture
+    if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
+        raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
+    return grow.grow(network, args.layers, quantize.examples(train))
 
 
 def run_stage2(args):
@@ -138,7 +150,7 @@ def run_stage2(args):
         if not args.init:
             raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
         hologram, _ = checkpoint.load_network(args.init)
-        prefilter = networks.Chain(networks.Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+        prefilter = prefilter_network()
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
     train, validation = load(args, hologram.architecture.ldi_layers)
@@ -227,7 +239,7 @@ def run_evaluate(args):
 def scenes_of(args, scenes):
     """What figures were measured on."""
     manifest = data.Manifest.read(args.data).table
-    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display") if k in manifest}
+    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display")}
 
 
 def run_evaluate_encoding(args):
@@ -244,6 +256,10 @@ def run_evaluate_encoding(args):
         print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
     if args.json:
         evaluate.save({"data": scenes_of(args, scenes), "offset_mm": last.extra["offset_m"] * 1e3, "results": results}, args.json)
+
+
+def run_card(args):
+    card.write(args.output, Checkpoint.load(args.checkpoint), args.figures)
 
 
 def run_plot(args):

@@ -64,7 +64,7 @@ class Manifest:
             raise DataError(f"{path}: not JSON ({error})") from None
         if table.get("format") != FORMAT:
             raise DataError(f"{path}: the format is '{table.get('format')}', expected '{FORMAT}'")
-        missing = [key for key in ("size", "ldi_layers", "display", "splits") if key not in table]
+        missing = [key for key in ("size", "planes", "ldi_layers", "seed", "display", "splits") if key not in table]
         if missing:
             raise DataError(f"{path}: no {', '.join(missing)}")
         return cls(Path(folder), table)
@@ -114,6 +114,7 @@ class Scenes:
         self.display = manifest.display
         self.ldi_layers = ldi_layers
         self.damaged = []
+        self.origin = {key: manifest.table[key] for key in ("seed", "planes")}
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
         if len(present) < len(numbers):
@@ -140,6 +141,11 @@ class Scenes:
     @property
     def shape(self):
         return tuple(self.depth.shape[-2:])
+
+    @property
+    def facts(self):
+        """What a checkpoint keeps about the data it was trained on."""
+        return {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
 
     def scene(self, i):
         """Colour (3·L, H, W) in [0, 1], normalized depth (L, H, W) and the true field (3, H, W) of scene i."""

@@ -13,6 +13,7 @@ from .networks import head_field
 from .optics import padded_shape, propagate, transfer
 
 LARGEST = 1 - 1e-6  # of the normalized amplitude, so that the slope of acos stays finite
+BLUR_SIGMA = 0.7  # pixels, of AA-DPM
 DARK = 1e-3  # of the scale: below this amplitude the phase's gradient fades instead of growing without bound
 
 
@@ -104,11 +105,15 @@ def wraps(phase):
     return float(((phase > math.pi) | (phase <= -math.pi)).float().mean())
 
 
-def anti_alias(field, sigma=0.7):
-    """AA-DPM's filter: real and imaginary parts blurred by a 3x3 Gaussian; edges are black."""
-    weights = torch.exp(-torch.tensor([1.0, 0.0, 1.0], device=field.device) / (2 * sigma**2))
+def blur_kernel():
+    """The 3x3 Gaussian of AA-DPM, σ = 0.7 pixels."""
+    weights = torch.exp(-torch.tensor([1.0, 0.0, 1.0]) / (2 * BLUR_SIGMA**2))
     weights = weights / weights.sum()
-    parts = channels(field)
-    kernel = (weights[:, None] * weights).expand(6, 1, 3, 3)
-    blurred = F.conv2d(parts, kernel, padding=1, groups=6)
+    return weights[:, None] * weights
+
+
+def anti_alias(field):
+    """AA-DPM's filter: real and imaginary parts blurred; surroundings are black."""
+    kernel = blur_kernel().to(field.device).expand(6, 1, 3, 3)
+    blurred = F.conv2d(channels(field), kernel, padding=1, groups=6)
     return torch.complex(blurred[:, :3].contiguous(), blurred[:, 3:].contiguous())

@@ -72,12 +72,12 @@ def predictor(path, device="cpu"):
     return torch_predictor(network.to(device).eval()), network.architecture
 
 
-def compare(field, truth, display, stack=True):
-    """{figure: value} of a field against the true one, both (3, H, W)."""
+def compare(field, truth, display, full=True):
+    """{figure: value} of a field against the true one, both (3, H, W); `full` adds all that takes long."""
     truth = truth.to(field.device)
-    given, true = field.abs(), truth.abs()
-    figures = {"amplitude_psnr": psnr(given, true), "amplitude_ssim": ssim(given, true)}
-    if stack:
+    figures = {"amplitude_psnr": psnr(field.abs(), truth.abs())}
+    if full:
+        figures["amplitude_ssim"] = ssim(field.abs(), truth.abs())
         pairs = []
         for part in STACK:
             z = part * display.volume_depth_m
@@ -96,12 +96,12 @@ def scene_depth(scenes, i, degraded):
     return colour, depth, truth
 
 
-def evaluate(predict, scenes, degraded=False, stack=True, progress=False):
+def evaluate(predict, scenes, degraded=False, full=True, progress=False):
     """{figure: mean, 'worst': …} of a predictor over scenes."""
     rows = []
     for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
         colour, depth, truth = scene_depth(scenes, i, degraded)
-        rows.append(compare(predict(colour, depth), truth, scenes.display, stack))
+        rows.append(compare(predict(colour, depth), truth, scenes.display, full))
     means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
     worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
     return means | {
@@ -117,7 +117,7 @@ def table(results):
     for method, conditions in results.items():
         for condition, f in conditions.items():
             amplitude = f"{f['amplitude_psnr']:.2f} / {f['amplitude_ssim']:.3f}"
-            focal = f"{f['focal_psnr']:.2f} / {f['focal_ssim']:.3f}" if "focal_psnr" in f else "–"
+            focal = f"{f['focal_psnr']:.2f} / {f['focal_ssim']:.3f}"
             lines.append(f"| {method} | {condition} | {amplitude} | {focal} | {f['worst_amplitude_psnr']:.2f} (scene {f['worst_scene']}) |")
     return "\n".join(lines)
 

@@ -24,7 +24,7 @@ from .files import replacing
 
 WARM_UP = 50
 LOGS = 200  # lines of the curve in a whole budget
-VALIDATIONS = 40  # of them with a validation
+VALIDATIONS = 25  # of them with a validation
 CHECKPOINT_S = 60.0
 
 
@@ -149,7 +149,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
     """
     output = Path(output)
     module = task.module()
-    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99))
+    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99), fused=True)
     step, before = 0, 0.0
     if resume is not None:
         optimiser.load_state_dict(resume.optimiser)

@@ -153,13 +153,13 @@ class QuantizationAware(Stage1):
         self.networks = {"hologram": network.chain}
 
     def extra(self):
-        return {"ranges": self.network.ranges}
+        return super().extra() | {"ranges": self.network.ranges}
 
 
 def figures(chain, ranges, scenes):
     """Amplitude PSNR (float32, int8) on scenes."""
     quantized = Quantized(copy.deepcopy(chain), ranges)
-    return tuple(evaluate(torch_predictor(n), scenes, stack=False)["amplitude_psnr"] for n in (chain, quantized))
+    return tuple(evaluate(torch_predictor(n), scenes, full=False)["amplitude_psnr"] for n in (chain, quantized))
 
 
 def report(name, exact, rounded):

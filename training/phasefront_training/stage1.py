@@ -40,6 +40,7 @@ class Stage1(Task):
         self.degraded = degraded
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
+        self.facts = scenes.facts
         self.sampler = Sampler(scenes, batch, crop, margin(network.architecture.layers), degraded, seed, workers.rank)
 
     def module(self):
@@ -63,9 +64,12 @@ class Stage1(Task):
         weights = {"focal": FOCAL_WEIGHT, "variation": VARIATION_WEIGHT}
         return sum(weights.get(name, 1.0) * value for name, value in terms.items()), terms
 
+    def extra(self):
+        return {"data": self.facts}
+
     def validate(self):
         predict = torch_predictor(self.network, self.bf16)
-        line = {"validation_psnr": evaluate(predict, self.validation, stack=False)["amplitude_psnr"]}
+        line = {"validation_psnr": evaluate(predict, self.validation, full=False)["amplitude_psnr"]}
         if self.degraded:
-            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, stack=False)["amplitude_psnr"]
+            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, full=False)["amplitude_psnr"]
         return line

@@ -1,6 +1,8 @@
 """Stage 2, the deep double phase method: hologram network and pre-filter learn together what survives encoding.
 
-First the pre-filter alone learns to be the identity, on true holograms at the modulator's plane. Then both are trained
+The pre-filter begins as AA-DPM's blur, which its last layer holds exactly, for it reads the field itself as well; so
+training starts from that method's quality. (The paper's start, the pre-filter alone learning to be the identity on true
+holograms at the modulator's plane, is there too, by a number of steps.) Then both are trained
 through encoding, aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07
 times the phase regulariser; the truth of the field itself is left out on purpose.
 """
@@ -10,18 +12,30 @@ import torch
 
 from .data import Sampler, network_input
 from .encode import (
-    DeepDoublePhase, anti_alias, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from .evaluate import compare, scene_depth
 from .loop import Task
 from .losses import fill_invalid, focal_stack_terms
-from .networks import head_field
+from .networks import Architecture, Chain, head_field
 from .optics import propagate
 from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
 
 PREFILTER_LAYERS, PREFILTER_FILTERS = 8, 8
 STACK_WEIGHT = 20.0
 PHASE_WEIGHT = 0.07
+
+
+def prefilter_network():
+    """A pre-filter that is AA-DPM's blur so far."""
+    network = Chain(Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+    last = network.convs[-1].weight
+    with torch.no_grad():
+        last.zero_()
+        for c in range(6):
+            last[c, PREFILTER_FILTERS + c] = blur_kernel()
+            last[c, PREFILTER_FILTERS + c, 1, 1] -= 1  # the head adds the field itself
+    return network
 
 
 class _OnHolograms(Task):
@@ -33,13 +47,14 @@ class _OnHolograms(Task):
         self.networks = {"hologram": model.hologram, "prefilter": model.prefilter}
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
+        self.facts = scenes.facts
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank)
 
     def sample(self, step):
         return self.sampler.draw(step)
 
     def extra(self):
-        return {"offset_m": self.model.offset_m}
+        return {"data": self.facts, "offset_m": self.model.offset_m}
 
 
 class Identity(_OnHolograms):
@@ -84,11 +99,11 @@ class Stage2(_OnHolograms):
         return STACK_WEIGHT * (terms["focal"] + terms["variation"]) + PHASE_WEIGHT * terms["phase"], terms
 
     def validate(self):
-        figures = encoding_figures(self.model, self.validation, stack=False)["deep double phase"]
+        figures = encoding_figures(self.model, self.validation, full=False)["deep double phase"]
         return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
 
 
-def encoding_figures(model, scenes, degraded=False, stack=True):
+def encoding_figures(model, scenes, degraded=False, full=True):
     """{method: mean figures} of what an encoded hologram shows: DDPM, and AA-DPM and plain double phase after the same
     hologram network; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
     rows = {}
@@ -110,7 +125,7 @@ def encoding_figures(model, scenes, degraded=False, stack=True):
                 phase = double_phase(centred, scale)
                 shown = reconstruct(phase, scale, model.offset_m, model.display)
                 # The taken-out mean phase does not change amplitudes, so they compare as they are.
-                row = compare(shown[0], truth, model.display, stack)
+                row = compare(shown[0], truth, model.display, full)
                 row |= {"wraps": wraps(phase), "brightness": float(shown.abs().mean() / truth.abs().mean())}
                 rows.setdefault(name, []).append(row)
     return {name: {k: round(float(np.mean([r[k] for r in each])), 4) for k in each[0]} for name, each in rows.items()}

@@ -11,6 +11,7 @@ from phasefront_training.encode import (
 from phasefront_training.export import read_description
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
+from phasefront_training.stage2 import prefilter_network
 
 DISPLAY = Display()
 
@@ -83,6 +84,15 @@ def test_aperture_is_the_circle_inside_the_square():
 def test_blur_keeps_a_constant():
     field = torch.ones(1, 3, 9, 9, dtype=torch.complex64) * (0.5 + 0.5j)
     assert torch.allclose(anti_alias(field)[..., 1:-1, 1:-1], field[..., 1:-1, 1:-1])
+
+
+def test_a_new_prefilter_is_the_blur_and_learns():
+    prefilter = prefilter_network()
+    x = torch.randn(1, 6, 20, 20)
+    blurred = anti_alias(torch.complex(x[:, :3], x[:, 3:]))
+    assert torch.allclose(prefilter.field(x), blurred, atol=1e-5)
+    prefilter(x).square().mean().backward()
+    assert prefilter.convs[-1].weight.grad[:, :8].abs().max() > 0
 
 
 def test_both_networks_learn_through_the_encoding():

@@ -13,7 +13,7 @@ def test_sizes_are_the_papers():
     assert multiplies_per_pixel(prefilter) == 9 * (6 * 8 + 6 * 64 + 14 * 6)
 
 
-@pytest.mark.parametrize(("layers", "to"), [(4, 8), (5, 9), (8, 30), (15, 31)])
+@pytest.mark.parametrize(("layers", "to"), [(4, 8), (5, 9), (8, 15), (8, 30), (15, 31)])
 def test_growing_is_the_identity_and_learns(layers, to):
     small = Chain(Architecture(layers))
     for conv in small.convs:
@@ -25,9 +25,22 @@ def test_growing_is_the_identity_and_learns(layers, to):
     assert all(conv.weight.grad.abs().max() > 0 for conv in big.convs[2::2])
 
 
-def test_growth_to_an_impossible_count_says_what_is_possible():
-    with pytest.raises(ValueError, match="to 10, 12"):
-        grow(Chain(Architecture(8)), 15)
+def test_growing_from_odd_to_even_is_near_the_old_network():
+    small = Chain(Architecture(5))
+    with torch.no_grad():
+        small.convs[-1].weight *= 10
+    examples = [torch.rand(4, 40, 40) - 0.5 for _ in range(3)]
+    big = grow(small, 10, examples)
+    x = torch.rand(1, 4, 32, 32) - 0.5
+    error = (big(x) - small(x)).square().mean() / small(x).var()
+    assert error < 0.03
+    with pytest.raises(ValueError, match="examples"):
+        grow(small, 10)
+
+
+def test_networks_do_not_shrink():
+    with pytest.raises(ValueError, match="8 layers does not grow to 4"):
+        grow(Chain(Architecture(8)), 4)
 
 
 def test_heads_mean_what_the_contract_says():

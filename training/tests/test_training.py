@@ -102,6 +102,10 @@ def test_commands_train_resume_export_and_evaluate(data_folder, tmp_path, capsys
     results = json.loads(figures.read_text())["results"]
     assert results[str(onnx)]["clean"]["amplitude_psnr"] == pytest.approx(results[str(out / "checkpoint.pt")]["clean"]["amplitude_psnr"], abs=1e-3)
     assert "RGB as the field" in capsys.readouterr().out
+    text = tmp_path / "small.md"
+    assert main(["card", str(out / "checkpoint.pt"), str(figures), "-o", str(text)]) == 0
+    told = text.read_text()
+    assert "4 layers of 8 filters" in told and "| n.onnx | degraded |" in told and "--layers 4" in told and "50%" in told
     assert main(["plot", str(out), "-o", str(tmp_path / "curves.png")]) == 0 and (tmp_path / "curves.png").stat().st_size > 5000
 
 
