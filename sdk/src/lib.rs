@@ -25,3 +25,8 @@ pub use frame::RgbdFrame;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};
 pub use pipeline::Pipeline;
+
+/// The README's code compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

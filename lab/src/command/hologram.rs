@@ -33,7 +33,7 @@ pub(crate) struct Hologram {
     #[arg(long, value_name = "N", default_value_t = 256)]
     planes: usize,
     /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::Double)]
+    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
     encoder: EncoderName,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
