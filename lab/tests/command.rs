@@ -149,7 +149,7 @@ fn json_is_one_object_on_stdout() {
     let made: serde_json::Value =
         serde_json::from_str(&folder.succeeds(&with(&["-o", "h.png", "--json"]))).unwrap();
     assert_eq!(made["width"], 48);
-    for stage in ["network", "propagate", "encode", "levels"] {
+    for stage in ["network", "propagate", "encode"] {
         assert!(made["stage_ms"][stage].is_number(), "{made}");
     }
     let compared: serde_json::Value =

@@ -2,13 +2,14 @@
 //! before it so that the checkerboard does not alias.
 //!
 //! Encoders take the field as given: its phase, its offset, its scale. Phases lie in \[0, 2π).
-//! Phases to modulator levels is [`crate::slm`]'s work.
+//! What level shows a phase is [`crate::slm`]'s knowledge.
 
 pub mod anti_alias;
 pub mod band_limit;
 pub mod double_phase;
 
 use crate::error::{Error, Result};
+use crate::slm::Response;
 use crate::wave::fft::Scratch;
 use anti_alias::AntiAlias;
 use band_limit::BandLimit;
@@ -122,9 +123,35 @@ impl Encoder {
         phase: &mut [f32],
         scratch: &mut EncoderScratch,
     ) -> f32 {
+        assert_eq!(phase.len(), 3 * self.height * self.width);
+        let scale = self.filter(field, scale, scratch);
+        double_phase::encode(field, self.width, self.height * self.width, scale, phase);
+        scale
+    }
+
+    /// [`Self::encode`] straight to the levels of a modulator that answers as `response` does.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn encode_levels(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        response: &Response,
+        levels: &mut [u8],
+        scratch: &mut EncoderScratch,
+    ) -> f32 {
+        let plane = self.height * self.width;
+        assert_eq!(levels.len(), 3 * plane);
+        let scale = self.filter(field, scale, scratch);
+        double_phase::encode_levels(field, self.width, plane, scale, response, levels);
+        scale
+    }
+
+    /// What is done to the field before double phase; gives the scale.
+    fn filter(&self, field: &mut [Complex32], scale: Scale, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), 3 * plane);
-        assert_eq!(phase.len(), 3 * plane);
         for plane in field.chunks_exact_mut(plane) {
             match (&self.prefilter, &mut scratch.0) {
                 (Prefilter::AntiAlias(plan), Some(PrefilterScratch::Plane(buffer))) => {
@@ -136,11 +163,9 @@ impl Encoder {
                 _ => {}
             }
         }
-        let scale = match scale {
+        match scale {
             Scale::Max => double_phase::max_amplitude(field),
             Scale::Fixed(scale) => scale,
-        };
-        double_phase::encode(field, self.width, plane, scale, phase);
-        scale
+        }
     }
 }

@@ -26,7 +26,6 @@ pub struct Modulator {
 pub struct ModulatorScratch {
     propagation: Option<Scratch>,
     encoder: EncoderScratch,
-    phase: Vec<f32>,
 }
 
 /// What became of a field on the modulator.
@@ -34,10 +33,8 @@ pub struct ModulatorScratch {
 pub struct Modulation {
     /// The amplitude that full light stands for.
     pub scale: f32,
-    /// Time of the encoding.
+    /// Time from the field to levels.
     pub encode: Duration,
-    /// Time from phases to levels.
-    pub levels: Duration,
 }
 
 impl Modulator {
@@ -86,7 +83,6 @@ impl Modulator {
         ModulatorScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
-            phase: vec![0.0; 3 * self.size],
         }
     }
 
@@ -116,14 +112,16 @@ impl Modulator {
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
-        let ModulatorScratch { encoder, phase, .. } = scratch;
-        let scale = self.encoder.encode(field, self.scale, phase, encoder);
-        let encoded = Instant::now();
-        self.response.levels(phase, levels);
+        let scale = self.encoder.encode_levels(
+            field,
+            self.scale,
+            &self.response,
+            levels,
+            &mut scratch.encoder,
+        );
         Modulation {
             scale,
-            encode: encoded - start,
-            levels: encoded.elapsed(),
+            encode: start.elapsed(),
         }
     }
 }

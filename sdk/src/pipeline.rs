@@ -37,16 +37,14 @@ pub struct StageTimes {
     pub network: Duration,
     /// From the midpoint to the modulator.
     pub propagate: Duration,
-    /// From the field to phases.
+    /// From the field to levels.
     pub encode: Duration,
-    /// From phases to levels.
-    pub levels: Duration,
 }
 
 impl StageTimes {
     /// All stages together.
     pub fn total(&self) -> Duration {
-        self.network + self.propagate + self.encode + self.levels
+        self.network + self.propagate + self.encode
     }
 }
 
@@ -178,7 +176,6 @@ impl Pipeline {
                 network,
                 propagate,
                 encode: modulation.encode,
-                levels: modulation.levels,
             },
         })
     }

@@ -2,7 +2,6 @@
 //! a calibration measured.
 
 use crate::error::{Error, Result};
-use rayon::prelude::*;
 use std::f32::consts::TAU;
 
 /// What a modulator answers to a phase. Immutable; shared between threads.
@@ -89,28 +88,25 @@ impl Response {
     /// If the lengths differ.
     pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
-        const PART: usize = 1 << 14;
-        levels
-            .par_chunks_mut(PART)
-            .zip(phases.par_chunks(PART))
-            .for_each(|(levels, phases)| match self {
-                Response::Linear { bits } => {
-                    for (level, phase) in levels.iter_mut().zip(phases) {
-                        *level = step(*phase, 1 << bits) as u8;
-                    }
+        match self {
+            Response::Linear { bits } => {
+                for (level, phase) in levels.iter_mut().zip(phases) {
+                    *level = step(*phase, 1 << bits) as u8;
                 }
-                Response::Lut { level: table, .. } => {
-                    for (level, phase) in levels.iter_mut().zip(phases) {
-                        *level = table[step(*phase, 256)];
-                    }
+            }
+            Response::Lut { level: table, .. } => {
+                for (level, phase) in levels.iter_mut().zip(phases) {
+                    *level = table[step(*phase, 256)];
                 }
-            });
+            }
+        }
     }
 }
 
 /// round(φ/2π·n) mod n, for n a power of two up to 256.
 fn step(phase: f32, n: i32) -> usize {
-    ((phase / TAU * n as f32 + 0.5).floor() as i32 & (n - 1)) as usize
+    // Phases are not negative, so the conversion's truncation is the floor.
+    ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize
 }
 
 #[cfg(test)]

@@ -187,7 +187,6 @@ impl Hologram {
                 ("network", predict),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
-                ("levels", modulation.levels),
             ],
             engine: Some(format!("{} ({})", engine.name, engine.why)),
         })
@@ -231,7 +230,6 @@ impl Hologram {
                 ("layers", waved - start),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
-                ("levels", modulation.levels),
             ],
             engine: None,
         })
