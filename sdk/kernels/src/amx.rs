@@ -10,9 +10,10 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
+use crate::avx2::{quantise_row, rescale_row};
 use crate::avx512_vnni::{self, Constants, check_rows, requantise, requantise_sum};
 use crate::int8::{GROUP, Kernels, Packed, Taps};
-use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
+use crate::wavefront::{BLOCK, Geometry, Window};
 use std::arch::asm;
 use std::arch::x86_64::*;
 use std::sync::OnceLock;
@@ -28,7 +29,13 @@ const PANEL: usize = 48;
 
 /// The kernels, where the processor and the system have what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
-    available().then_some(Kernels { pack, hidden_row, last_row })
+    available().then_some(Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        quantise_row,
+        rescale_row,
+    })
 }
 
 /// Whether the processor has AMX int8 and the system lets this process use it.
@@ -85,7 +92,11 @@ impl Steps {
     fn new(groups: usize) -> Steps {
         let lines = 3 * groups;
         let left = lines % TILE;
-        Steps { direct: lines / TILE, left, panels: (3 * left).div_ceil(TILE) }
+        Steps {
+            direct: lines / TILE,
+            left,
+            panels: (3 * left).div_ceil(TILE),
+        }
     }
 
     fn count(&self) -> usize {
@@ -94,9 +105,11 @@ impl Steps {
 
     /// The (line, column tap) of each line of each step, in order; `None` where a panel's tile is not full.
     fn lines(&self) -> Vec<Option<(usize, usize)>> {
-        let direct = (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
+        let direct =
+            (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
         let first = self.direct * TILE;
-        let panel = (0..3).flat_map(|kx| (first..first + self.left).map(move |line| Some((line, kx))));
+        let panel =
+            (0..3).flat_map(|kx| (first..first + self.left).map(move |line| Some((line, kx))));
         let mut lines: Vec<_> = direct.chain(panel).collect();
         lines.resize(self.count() * TILE, None);
         lines
@@ -117,7 +130,9 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
                         Some((line, kx)) => {
                             // Slot 0 holds row `ky` with turn + ky ≡ 0 (mod 3).
                             let ky = (line / groups + 3 - turn) % 3;
-                            i32::from_le_bytes(taps.group(filter, line % groups, ky, *kx).map(|w| w as u8))
+                            i32::from_le_bytes(
+                                taps.group(filter, line % groups, ky, *kx).map(|w| w as u8),
+                            )
                         }
                         None => 0,
                     }));
@@ -172,7 +187,10 @@ fn each_block(
     let stride = geometry.stride();
     let rows = window.rows();
     check_rows(&rows, layer.groups, geometry);
-    assert!(window.slots.len() == 3 * layer.groups * stride && to.next_multiple_of(2 * TILE) <= geometry.padded);
+    assert!(
+        window.slots.len() == 3 * layer.groups * stride
+            && to.next_multiple_of(2 * TILE) <= geometry.padded
+    );
     let turn_words = steps.count() * STEP_WORDS;
     let weights = &layer.weights[(first / FILTERS * 3 + window.first) * turn_words..][..turn_words];
     let mut biases = Biases([[0; TILE]; FILTERS]);
@@ -181,9 +199,12 @@ fn each_block(
     }
     let filters = (layer.padded_outputs() - first).min(FILTERS);
     let wide = filters >= 16;
-    let narrow = filters % 16 != 0;
+    let narrow = !filters.is_multiple_of(16);
     let mut panel = Panel([[[0; TILE * GROUP]; PANEL]; 2]);
-    let mut sums = [Sums([[[0; TILE]; FILTERS]; 2]), Sums([[[0; TILE]; FILTERS]; 2])];
+    let mut sums = [
+        Sums([[[0; TILE]; FILTERS]; 2]),
+        Sums([[[0; TILE]; FILTERS]; 2]),
+    ];
     let mut waiting: Option<usize> = None;
     let mut current = 0;
     // SAFETY: `kernels` has found the processor and the system willing. Every line read starts one pixel before the
@@ -192,7 +213,10 @@ fn each_block(
     unsafe {
         asm!("ldtilecfg [{}]", in(reg) &raw const CONFIG, options(nostack, readonly));
         for x in (from..to).step_by(2 * TILE) {
-            let pixels = window.slots.as_ptr().add(geometry.start() + x * GROUP - GROUP);
+            let pixels = window
+                .slots
+                .as_ptr()
+                .add(geometry.start() + x * GROUP - GROUP);
             let left = pixels.add(steps.direct * TILE * stride);
             for half in 0..2 {
                 for kx in 0..3 {
@@ -237,7 +261,10 @@ fn each_block(
 /// Tiles are configured.
 #[inline(always)]
 unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
-    let (first, second) = (biases.0.as_ptr(), biases.0[if wide { TILE } else { 0 }..].as_ptr());
+    let (first, second) = (
+        biases.0.as_ptr(),
+        biases.0[if wide { TILE } else { 0 }..].as_ptr(),
+    );
     // SAFETY: 16 and 8 lines of 64 bytes lie there.
     unsafe {
         if wide {
@@ -256,7 +283,13 @@ unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
 /// # Safety
 /// Tiles are configured; 24 lines of 64 bytes lie at `weights`, 16 lines `stride` bytes apart at each of `lines`.
 #[inline(always)]
-unsafe fn step(weights: *const i32, lines: [*const u8; 2], stride: usize, wide: bool, narrow: bool) {
+unsafe fn step(
+    weights: *const i32,
+    lines: [*const u8; 2],
+    stride: usize,
+    wide: bool,
+    narrow: bool,
+) {
     // SAFETY: as the function's own.
     unsafe {
         asm!("tileloadd tmm6, [{a} + {s}]", "tileloadd tmm7, [{b} + {s}]",
@@ -324,28 +357,37 @@ fn hidden_filters(
     let skip = skip.map(|skip| &skip[groups.clone()]);
     let out = &mut out[groups];
     let zero = _mm512_set1_epi8(constants.zero_point as i8);
-    each_block(layer, window, first, (0, geometry.width), geometry, |x, sums| {
-        for g in 0..size / GROUP {
-            for (half, sums) in sums.0.iter().enumerate() {
-                let at = g * geometry.stride() + geometry.start() + (x + half * TILE) * GROUP;
-                let multiplier = &constants.multiplier[g * GROUP..][..GROUP];
-                let out = &mut out[at..at + TILE * GROUP];
-                // SAFETY: the features are this function's; the slices are 64 bytes long.
-                unsafe {
-                    let four = std::array::from_fn(|k| _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast()));
-                    let value = match (constants.skip, skip) {
-                        (Some(factors), Some(skip)) => {
-                            let skip = &skip[at..at + TILE * GROUP];
-                            let skip = _mm512_loadu_si512(skip.as_ptr().cast());
-                            requantise_sum(four, multiplier, factors, skip)
-                        }
-                        _ => requantise(four, multiplier),
-                    };
-                    _mm512_storeu_si512(out.as_mut_ptr().cast(), _mm512_adds_epu8(value, zero));
+    each_block(
+        layer,
+        window,
+        first,
+        (0, geometry.width),
+        geometry,
+        |x, sums| {
+            for g in 0..size / GROUP {
+                for (half, sums) in sums.0.iter().enumerate() {
+                    let at = g * geometry.stride() + geometry.start() + (x + half * TILE) * GROUP;
+                    let multiplier = &constants.multiplier[g * GROUP..][..GROUP];
+                    let out = &mut out[at..at + TILE * GROUP];
+                    // SAFETY: the features are this function's; the slices are 64 bytes long.
+                    unsafe {
+                        let four = std::array::from_fn(|k| {
+                            _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast())
+                        });
+                        let value = match (constants.skip, skip) {
+                            (Some(factors), Some(skip)) => {
+                                let skip = &skip[at..at + TILE * GROUP];
+                                let skip = _mm512_loadu_si512(skip.as_ptr().cast());
+                                requantise_sum(four, multiplier, factors, skip)
+                            }
+                            _ => requantise(four, multiplier),
+                        };
+                        _mm512_storeu_si512(out.as_mut_ptr().cast(), _mm512_adds_epu8(value, zero));
+                    }
                 }
             }
-        }
-    });
+        },
+    );
 }
 
 fn last_row(
@@ -355,28 +397,38 @@ fn last_row(
     from: usize,
     geometry: Geometry,
 ) {
-    last_row_by_blocks(out, from, |x, values| {
-        // SAFETY: `kernels` has found the features.
-        unsafe { last_block(layer, window, x, values, geometry) }
-    });
+    // SAFETY: `kernels` has found the features.
+    unsafe { last_filters(layer, window, out, from, geometry) }
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
-fn last_block(
+fn last_filters(
     layer: &Packed,
     window: Window<'_, u8>,
-    x: usize,
-    values: &mut [[f32; BLOCK]; OUTPUTS],
+    mut out: [&mut [f32]; OUTPUTS],
+    from: usize,
     geometry: Geometry,
 ) {
-    each_block(layer, window, 0, (x, x + BLOCK), geometry, |block, sums| {
-        for (half, sums) in sums.0.iter().enumerate() {
-            for (o, values) in values.iter_mut().enumerate() {
-                let values = &mut values[block - x + half * TILE..][..TILE];
-                for (value, sum) in values.iter_mut().zip(&sums[o]) {
-                    *value = *sum as f32 * layer.multiplier[o];
+    let to = from + out[0].len();
+    let multiplier = &layer.multiplier[..OUTPUTS];
+    each_block(
+        layer,
+        window,
+        0,
+        (from / BLOCK * BLOCK, to),
+        geometry,
+        |block, sums| {
+            for (half, sums) in sums.0.iter().enumerate() {
+                let x = block + half * TILE;
+                let (start, end) = (x.max(from), (x + TILE).min(to));
+                if start >= end {
+                    continue;
+                }
+                for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
+                    let values = sums.map(|sum| sum as f32 * multiplier);
+                    out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
                 }
             }
-        }
-    });
+        },
+    );
 }

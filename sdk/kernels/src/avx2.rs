@@ -6,19 +6,29 @@
 
 use crate::OUTPUTS;
 use crate::f32;
-use crate::int8::{self, GROUP, Packed, SkipSum, Taps};
-use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
 use std::arch::x86_64::*;
 
 /// The int8 kernels, where the processor has what they need.
 pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
-    available().then_some(int8::Kernels { pack, hidden_row, last_row })
+    available().then_some(int8::Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        quantise_row,
+        rescale_row,
+    })
 }
 
 /// The f32 kernels, where the processor has what they need.
 pub(crate) fn f32_kernels() -> Option<f32::Kernels> {
     let size = |left: usize| left.min(GROUP);
-    available().then_some(f32::Kernels { size, hidden_row: f32_hidden_row, last_row: f32_last_row })
+    available().then_some(f32::Kernels {
+        size,
+        hidden_row: f32_hidden_row,
+        last_row: f32_last_row,
+    })
 }
 
 fn available() -> bool {
@@ -69,6 +79,7 @@ fn int8_filters(
         let multiplier = &layer.multiplier[g * GROUP..][..GROUP];
         for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
             let sums = int8_sums(layer, g, rows, x, geometry);
+            #[allow(clippy::needless_range_loop)]
             for b in 0..INT8_BLOCKS {
                 let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
                 let four = std::array::from_fn(|k| sums[k][b]);
@@ -81,7 +92,10 @@ fn int8_filters(
                         }
                         _ => requantise(four, multiplier),
                     };
-                    _mm256_storeu_si256(out.as_mut_ptr().add(at).cast(), _mm256_adds_epu8(value, zero));
+                    _mm256_storeu_si256(
+                        out.as_mut_ptr().add(at).cast(),
+                        _mm256_adds_epu8(value, zero),
+                    );
                 }
             }
         }
@@ -100,7 +114,10 @@ fn int8_sums(
 ) -> [[__m256i; INT8_BLOCKS]; GROUP] {
     let words = 9 * layer.groups * GROUP * 2;
     let weights = &layer.weights[g * words..][..words];
-    assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= layer.groups * geometry.stride())
+    );
     assert!(x + 8 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
     let even = _mm256_set1_epi16(255);
     let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
@@ -123,7 +140,8 @@ fn int8_sums(
                             let pair = _mm256_set1_epi32(*weight);
                             weight = weight.add(1);
                             for (sum, halves) in sums.iter_mut().zip(halves) {
-                                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
+                                *sum =
+                                    _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
                             }
                         }
                     }
@@ -140,7 +158,10 @@ fn int8_sums(
 #[target_feature(enable = "avx2")]
 fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
     pack_groups(std::array::from_fn(|k| {
-        _mm256_cvtps_epi32(_mm256_mul_ps(_mm256_cvtepi32_ps(sums[k]), _mm256_set1_ps(multiplier[k])))
+        _mm256_cvtps_epi32(_mm256_mul_ps(
+            _mm256_cvtepi32_ps(sums[k]),
+            _mm256_set1_ps(multiplier[k]),
+        ))
     }))
 }
 
@@ -159,7 +180,10 @@ fn requantise_sum(
         let a = match factors.relu {
             Some(factor) => {
                 let v = _mm256_min_ps(v, _mm256_set1_ps(255.0));
-                _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtps_epi32(v)), _mm256_set1_ps(factor))
+                _mm256_mul_ps(
+                    _mm256_cvtepi32_ps(_mm256_cvtps_epi32(v)),
+                    _mm256_set1_ps(factor),
+                )
             }
             None => v,
         };
@@ -177,7 +201,12 @@ fn requantise_sum(
 fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
     // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d; the shuffle turns this 4×4 block.
     let bytes = _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
-    let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400));
+    let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(
+        0x0f0b_0703,
+        0x0e0a_0602,
+        0x0d09_0501,
+        0x0c08_0400,
+    ));
     _mm256_shuffle_epi8(bytes, turn)
 }
 
@@ -208,7 +237,12 @@ fn int8_last_block(
             let sums = int8_sums(layer, g, rows, x + start, geometry);
             for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
                 let multiplier = _mm256_set1_ps(layer.multiplier[o]);
-                for (values, sum) in values[o][start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
+                for (values, sum) in values[o][start..]
+                    .as_chunks_mut::<8>()
+                    .0
+                    .iter_mut()
+                    .zip(sums)
+                {
                     let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
                     // SAFETY: 8 values.
                     unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
@@ -242,7 +276,9 @@ fn f32_filters(
     out: &mut [f32],
     geometry: Geometry,
 ) {
-    assert!(out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len()));
+    assert!(
+        out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len())
+    );
     for x in (0..geometry.width).step_by(8 * F32_BLOCKS) {
         let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
         for (o, sums) in sums.iter().enumerate() {
@@ -272,7 +308,10 @@ fn f32_sums<const O: usize>(
     geometry: Geometry,
 ) -> [[__m256; F32_BLOCKS]; O] {
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
-    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= layer.inputs * geometry.stride())
+    );
     assert!(x + 8 * F32_BLOCKS < geometry.padded + MARGIN);
     let mut sums = [[_mm256_setzero_ps(); F32_BLOCKS]; O];
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
@@ -326,19 +365,56 @@ fn f32_last_block(
     const SPAN: usize = 8 * F32_BLOCKS;
     let (wide, narrow) = values.split_at_mut(GROUP);
     for start in (0..BLOCK).step_by(SPAN) {
-        store(wide, start, f32_sums::<GROUP>(layer, 0, rows, x + start, geometry));
-        store(narrow, start, f32_sums::<{ OUTPUTS - GROUP }>(layer, GROUP, rows, x + start, geometry));
+        store(
+            wide,
+            start,
+            f32_sums::<GROUP>(layer, 0, rows, x + start, geometry),
+        );
+        store(
+            narrow,
+            start,
+            f32_sums::<{ OUTPUTS - GROUP }>(layer, GROUP, rows, x + start, geometry),
+        );
     }
 }
 
 /// Stores the registers that fall into the block.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn store<const O: usize>(values: &mut [[f32; BLOCK]], start: usize, sums: [[__m256; F32_BLOCKS]; O]) {
+fn store<const O: usize>(
+    values: &mut [[f32; BLOCK]],
+    start: usize,
+    sums: [[__m256; F32_BLOCKS]; O],
+) {
     for (values, sums) in values.iter_mut().zip(sums) {
         for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
             // SAFETY: 8 values.
             unsafe { _mm256_storeu_ps(values.as_mut_ptr(), sum) };
         }
     }
+}
+
+/// [`int8::quantise_row`], compiled for AVX2. The AVX-512 kernels take it too: they imply AVX2.
+pub(crate) fn quantise_row(
+    source: SourceRow<'_>,
+    rounding: Rounding,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    #[target_feature(enable = "avx2")]
+    fn compiled(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
+        int8::quantise_row(source, rounding, out, geometry);
+    }
+    // SAFETY: the constructors of the kernels have found AVX2, or AVX-512, which implies it.
+    unsafe { compiled(source, rounding, out, geometry) }
+}
+
+/// [`int8::rescale_row`], likewise.
+pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
+    #[target_feature(enable = "avx2")]
+    fn compiled(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
+        int8::rescale_row(row, factor, zero_point, geometry);
+    }
+    // SAFETY: as above.
+    unsafe { compiled(row, factor, zero_point, geometry) }
 }

@@ -8,7 +8,11 @@ use std::arch::x86_64::*;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
-    is_x86_feature_detected!("avx512f").then_some(Kernels { size, hidden_row, last_row })
+    is_x86_feature_detected!("avx512f").then_some(Kernels {
+        size,
+        hidden_row,
+        last_row,
+    })
 }
 
 fn size(left: usize) -> usize {
@@ -98,7 +102,10 @@ fn sums<const O: usize, const B: usize>(
     geometry: Geometry,
 ) -> [[__m512; B]; O] {
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
-    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= layer.inputs * geometry.stride())
+    );
     assert!(x + 16 * B <= geometry.padded && MARGIN >= 1);
     let mut sums = [[_mm512_setzero_ps(); B]; O];
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {

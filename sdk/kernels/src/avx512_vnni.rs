@@ -2,13 +2,20 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
+use crate::avx2::{quantise_row, rescale_row};
 use crate::int8::{GROUP, Kernels, Packed, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
 use std::arch::x86_64::*;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
-    available().then_some(Kernels { pack, hidden_row, last_row })
+    available().then_some(Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        quantise_row,
+        rescale_row,
+    })
 }
 
 pub(crate) fn available() -> bool {
@@ -57,9 +64,33 @@ fn hidden_row(
         // SAFETY: `kernels` has found the features. The slices hold what the functions state.
         unsafe {
             match size {
-                24 => filters::<24, 1>(&rows, layer.groups, weights, &constants, skip, out, geometry),
-                16 => filters::<16, 1>(&rows, layer.groups, weights, &constants, skip, out, geometry),
-                _ => filters::<8, 2>(&rows, layer.groups, weights, &constants, skip, out, geometry),
+                24 => filters::<24, 1>(
+                    &rows,
+                    layer.groups,
+                    weights,
+                    &constants,
+                    skip,
+                    out,
+                    geometry,
+                ),
+                16 => filters::<16, 1>(
+                    &rows,
+                    layer.groups,
+                    weights,
+                    &constants,
+                    skip,
+                    out,
+                    geometry,
+                ),
+                _ => filters::<8, 2>(
+                    &rows,
+                    layer.groups,
+                    weights,
+                    &constants,
+                    skip,
+                    out,
+                    geometry,
+                ),
             }
         }
         first += size;
@@ -101,8 +132,11 @@ impl<'a> Constants<'a> {
 
 /// Checks that three rows hold `groups` groups of blocks and margins, so that block reads stay inside.
 pub(crate) fn check_rows(rows: &[&[u8]; 3], groups: usize, geometry: Geometry) {
-    assert!(rows.iter().all(|row| row.len() >= groups * geometry.stride()));
-    assert!(geometry.group == GROUP && geometry.padded % BLOCK == 0 && MARGIN >= 16);
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= groups * geometry.stride())
+    );
+    assert!(geometry.group == GROUP && geometry.padded.is_multiple_of(BLOCK) && MARGIN >= 16);
 }
 
 /// `O` filters on a row, `B` registers of pixels at a time.
@@ -124,6 +158,7 @@ fn filters<const O: usize, const B: usize>(
         // SAFETY: `x` is a block of the row; the asserts above hold for what is read.
         let sums = unsafe { sums::<O, B>(rows, groups, weights, constants.bias, x, geometry) };
         for g in 0..O / GROUP {
+            #[allow(clippy::needless_range_loop)]
             for b in 0..B {
                 let at = g * stride + geometry.start() + (x + 16 * b) * GROUP;
                 let four: [__m512i; GROUP] = std::array::from_fn(|k| sums[g * GROUP + k][b]);
@@ -138,7 +173,10 @@ fn filters<const O: usize, const B: usize>(
                         _ => requantise(four, multiplier),
                     };
                     let zero = _mm512_set1_epi8(constants.zero_point as i8);
-                    _mm512_storeu_si512(out.as_mut_ptr().add(at).cast(), _mm512_adds_epu8(value, zero));
+                    _mm512_storeu_si512(
+                        out.as_mut_ptr().add(at).cast(),
+                        _mm512_adds_epu8(value, zero),
+                    );
                 }
             }
         }
@@ -201,7 +239,14 @@ fn last_block(
     assert!(layer.weights.len() == OUTPUTS * 9 * layer.groups && x + BLOCK <= geometry.padded);
     // SAFETY: the asserts above.
     unsafe {
-        let sums = sums::<OUTPUTS, 4>(rows, layer.groups, &layer.weights, &layer.bias[..OUTPUTS], x, geometry);
+        let sums = sums::<OUTPUTS, 4>(
+            rows,
+            layer.groups,
+            &layer.weights,
+            &layer.bias[..OUTPUTS],
+            x,
+            geometry,
+        );
         for (o, (sums, values)) in sums.iter().zip(values).enumerate() {
             let multiplier = _mm512_set1_ps(layer.multiplier[o]);
             for (b, sum) in sums.iter().enumerate() {
@@ -217,7 +262,10 @@ fn last_block(
 #[target_feature(enable = "avx512f,avx512bw")]
 pub(crate) fn requantise(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
     let values = std::array::from_fn(|k| {
-        _mm512_cvtps_epi32(_mm512_mul_ps(_mm512_cvtepi32_ps(sums[k]), _mm512_set1_ps(multiplier[k])))
+        _mm512_cvtps_epi32(_mm512_mul_ps(
+            _mm512_cvtepi32_ps(sums[k]),
+            _mm512_set1_ps(multiplier[k]),
+        ))
     });
     pack_groups(values)
 }
@@ -239,7 +287,10 @@ pub(crate) fn requantise_sum(
         let a = match factors.relu {
             Some(factor) => {
                 let v = _mm512_min_ps(v, _mm512_set1_ps(255.0));
-                _mm512_mul_ps(_mm512_cvtepi32_ps(_mm512_cvtps_epi32(v)), _mm512_set1_ps(factor))
+                _mm512_mul_ps(
+                    _mm512_cvtepi32_ps(_mm512_cvtps_epi32(v)),
+                    _mm512_set1_ps(factor),
+                )
             }
             None => v,
         };

@@ -31,6 +31,7 @@ pub(crate) struct Packed {
 
 /// An instruction set's kernels.
 #[derive(Clone, Copy)]
+#[allow(clippy::type_complexity)]
 pub(crate) struct Kernels {
     /// How many filters are computed together, for as many as are left.
     pub(crate) size: fn(usize) -> usize,
@@ -72,8 +73,13 @@ impl F32Chain {
             .ok_or_else(|| format!("this processor has no f32 kernels '{isa}'"))?;
         crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
         let pack = |layer: &F32Layer| {
-            if layer.kernel.len() != layer.outputs * layer.inputs * 9 || layer.bias.len() != layer.outputs {
-                return Err(format!("weights or biases do not fit {} filters", layer.outputs));
+            if layer.kernel.len() != layer.outputs * layer.inputs * 9
+                || layer.bias.len() != layer.outputs
+            {
+                return Err(format!(
+                    "weights or biases do not fit {} filters",
+                    layer.outputs
+                ));
             }
             let mut weights = Vec::with_capacity(layer.kernel.len());
             let mut first = 0;
@@ -90,10 +96,19 @@ impl F32Chain {
                 }
                 first += size;
             }
-            Ok(Packed { inputs: layer.inputs, outputs: layer.outputs, bias: layer.bias.clone(), weights })
+            Ok(Packed {
+                inputs: layer.inputs,
+                outputs: layer.outputs,
+                bias: layer.bias.clone(),
+                weights,
+            })
         };
         let layers = layers.iter().map(pack).collect::<Result<_, _>>()?;
-        Ok(F32Chain { isa, kernels, layers })
+        Ok(F32Chain {
+            isa,
+            kernels,
+            layers,
+        })
     }
 
     /// The kernels in use.
@@ -147,7 +162,11 @@ impl Chain for F32Chain {
     }
 
     fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
-        copy_rows(source, &mut out[self.layers[0].outputs * geometry.stride()..], geometry);
+        copy_rows(
+            source,
+            &mut out[self.layers[0].outputs * geometry.stride()..],
+            geometry,
+        );
     }
 
     fn hidden_row(
@@ -161,7 +180,13 @@ impl Chain for F32Chain {
         (self.kernels.hidden_row)(&self.layers[i], &window.rows(), skip, out, geometry);
     }
 
-    fn last_row(&self, window: Window<'_, f32>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    fn last_row(
+        &self,
+        window: Window<'_, f32>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    ) {
         if let Some(layer) = self.layers.last() {
             (self.kernels.last_row)(layer, &window.rows(), out, from, geometry);
         }
@@ -170,6 +195,7 @@ impl Chain for F32Chain {
 
 fn copy_rows(source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
     for (c, out) in out.chunks_exact_mut(geometry.stride()).enumerate() {
-        out[geometry.start()..][..geometry.width].copy_from_slice(source.channel(c, geometry.width));
+        out[geometry.start()..][..geometry.width]
+            .copy_from_slice(source.channel(c, geometry.width));
     }
 }

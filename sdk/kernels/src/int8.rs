@@ -104,7 +104,9 @@ impl Taps<'_> {
         std::array::from_fn(|k| {
             let channel = match group.checked_sub(split) {
                 None => Some(group * GROUP + k).filter(|&c| c < self.features),
-                Some(after) => Some(self.features + after * GROUP + k).filter(|&c| c < self.layer.inputs),
+                Some(after) => {
+                    Some(self.features + after * GROUP + k).filter(|&c| c < self.layer.inputs)
+                }
             };
             match channel {
                 Some(c) if filter < self.layer.outputs => {
@@ -133,7 +135,9 @@ impl Taps<'_> {
                 for group in 0..self.groups() {
                     for kx in 0..3 {
                         for filter in first..first + size {
-                            words.push(i32::from_le_bytes(self.group(filter, group, ky, kx).map(|w| w as u8)));
+                            words.push(i32::from_le_bytes(
+                                self.group(filter, group, ky, kx).map(|w| w as u8),
+                            ));
                         }
                     }
                 }
@@ -146,12 +150,25 @@ impl Taps<'_> {
 
 /// An instruction set's kernels.
 #[derive(Clone, Copy)]
+#[allow(clippy::type_complexity)]
 pub(crate) struct Kernels {
     pub(crate) pack: fn(&Taps<'_>) -> Vec<i32>,
     /// Layer, three rows, the skip's row, the row of features to write.
     pub(crate) hidden_row: fn(&Packed, Window<'_, u8>, Option<&[u8]>, &mut [u8], Geometry),
     /// Layer, three rows, the output planes' rows, the first pixel to yield.
     pub(crate) last_row: fn(&Packed, Window<'_, u8>, [&mut [f32]; OUTPUTS], usize, Geometry),
+    /// [`quantise_row`].
+    pub(crate) quantise_row: fn(SourceRow<'_>, Rounding, &mut [u8], Geometry),
+    /// [`rescale_row`].
+    pub(crate) rescale_row: fn(&mut [u8], f32, u8, Geometry),
+}
+
+/// How the network's input becomes u8: `channels` of it, rounded to `to`, after a rounding to `before` if there is one.
+#[derive(Clone, Copy)]
+pub(crate) struct Rounding {
+    channels: usize,
+    before: Option<Quantiser>,
+    to: Quantiser,
 }
 
 fn kernels(isa: Isa) -> Option<Kernels> {
@@ -202,7 +219,9 @@ impl Int8Chain {
         let kernels = kernels(isa)
             .filter(|_| Isa::int8().contains(&isa))
             .ok_or_else(|| format!("this processor has no int8 kernels '{isa}'"))?;
-        let [first, .., last] = layers else { return Err("a chain has two layers at least".into()) };
+        let [first, .., last] = layers else {
+            return Err("a chain has two layers at least".into());
+        };
         let (inputs, filters) = (first.inputs, first.outputs);
         crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
         let mut packed = Vec::new();
@@ -211,18 +230,27 @@ impl Int8Chain {
             check_numbers(layer, is_last).map_err(|why| format!("layer {i}: {why}"))?;
             let wants_skip = !is_last && wavefront::has_skip(i + 1);
             if wants_skip != (layer.requantise.skip.is_some() && !is_last) {
-                return Err(format!("layer {i}: a skip is summed for odd layers from 3 on, and only there"));
+                return Err(format!(
+                    "layer {i}: a skip is summed for odd layers from 3 on, and only there"
+                ));
             }
             if layer.requantise.rescale.is_some() && i + 2 != layers.len() {
-                return Err(format!("layer {i}: only what the concatenation reads is rounded a second time"));
+                return Err(format!(
+                    "layer {i}: only what the concatenation reads is rounded a second time"
+                ));
             }
-            let taps = Taps { layer, features: if is_last { filters } else { layer.inputs } };
+            let taps = Taps {
+                layer,
+                features: if is_last { filters } else { layer.inputs },
+            };
             let per_filter = layer.inputs * 9;
             let mut bias: Vec<i32> = layer
                 .kernel
                 .chunks_exact(per_filter)
                 .zip(&layer.bias)
-                .map(|(w, b)| b - i32::from(layer.zero_point) * w.iter().map(|&w| i32::from(w)).sum::<i32>())
+                .map(|(w, b)| {
+                    b - i32::from(layer.zero_point) * w.iter().map(|&w| i32::from(w)).sum::<i32>()
+                })
                 .collect();
             let mut multiplier = layer.multiplier.clone();
             let padded = layer.outputs.next_multiple_of(32);
@@ -235,14 +263,22 @@ impl Int8Chain {
                 bias,
                 multiplier,
                 skip: layer.requantise.skip,
-                zero_point: if layer.requantise.rescale.is_some() { 0 } else { next_zero },
+                zero_point: if layer.requantise.rescale.is_some() {
+                    0
+                } else {
+                    next_zero
+                },
                 weights: (kernels.pack)(&taps),
             });
         }
         let zero_points: Vec<u8> = layers.iter().map(|l| l.zero_point).collect();
-        let settled = first.zero_point == input.zero_point && last.zero_point == concatenated.zero_point;
+        let settled =
+            first.zero_point == input.zero_point && last.zero_point == concatenated.zero_point;
         if !settled || zero_points[1..layers.len() - 1].iter().any(|&z| z != 0) {
-            return Err("hidden inputs have zero point 0, the first and last those of their quantisers".into());
+            return Err(
+                "hidden inputs have zero point 0, the first and last those of their quantisers"
+                    .into(),
+            );
         }
         for scale in [input.scale, concatenated.scale] {
             if !scale.is_normal() || scale < 0.0 {
@@ -250,7 +286,17 @@ impl Int8Chain {
             }
         }
         let rescale = layers[layers.len() - 2].requantise.rescale;
-        Ok(Int8Chain { isa, kernels, inputs, input, concatenated, rounded_twice, layers: packed, rescale, zero_points })
+        Ok(Int8Chain {
+            isa,
+            kernels,
+            inputs,
+            input,
+            concatenated,
+            rounded_twice,
+            layers: packed,
+            rescale,
+            zero_points,
+        })
     }
 
     /// The kernels in use.
@@ -282,23 +328,43 @@ impl Int8Chain {
 /// Sums must fit 32 bits, and their products with the factors stay where conversions are exact.
 fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
     let (outputs, per_filter) = (layer.outputs, layer.inputs * 9);
-    if layer.kernel.len() != outputs * per_filter || layer.bias.len() != outputs || layer.multiplier.len() != outputs {
-        return Err(format!("weights, biases or multipliers do not fit {outputs} filters of {per_filter} weights"));
+    if layer.kernel.len() != outputs * per_filter
+        || layer.bias.len() != outputs
+        || layer.multiplier.len() != outputs
+    {
+        return Err(format!(
+            "weights, biases or multipliers do not fit {outputs} filters of {per_filter} weights"
+        ));
     }
     for (o, (&bias, &multiplier)) in layer.bias.iter().zip(&layer.multiplier).enumerate() {
         let weights = &layer.kernel[o * per_filter..][..per_filter];
-        let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum::<i64>() + 2 * i64::from(bias).abs();
+        let reach: i64 = weights
+            .iter()
+            .map(|&w| 255 * i64::from(w).abs())
+            .sum::<i64>()
+            + 2 * i64::from(bias).abs();
         if 2 * reach > i64::from(i32::MAX) {
             return Err(format!("sums of filter {o} do not fit 32 bits"));
         }
         let normal = multiplier.is_normal() && multiplier > 0.0;
         if !normal || (!is_last && 2.0 * reach as f64 * f64::from(multiplier) > LARGEST) {
-            return Err(format!("filter {o} has the scale {multiplier}, out of any range that makes sense"));
+            return Err(format!(
+                "filter {o} has the scale {multiplier}, out of any range that makes sense"
+            ));
         }
     }
-    let skip = layer.requantise.skip.iter().flat_map(|s| [s.relu.unwrap_or(1.0), s.skip]);
-    match skip.chain(layer.requantise.rescale).find(|f| !f.is_normal() || *f < 0.0 || f64::from(*f) * 1e3 > LARGEST) {
-        Some(bad) => Err(format!("a rounding scales by {bad}, out of any range that makes sense")),
+    let skip = layer
+        .requantise
+        .skip
+        .iter()
+        .flat_map(|s| [s.relu.unwrap_or(1.0), s.skip]);
+    match skip
+        .chain(layer.requantise.rescale)
+        .find(|f| !f.is_normal() || *f < 0.0 || f64::from(*f) * 1e3 > LARGEST)
+    {
+        Some(bad) => Err(format!(
+            "a rounding scales by {bad}, out of any range that makes sense"
+        )),
         None => Ok(()),
     }
 }
@@ -324,31 +390,47 @@ impl Chain for Int8Chain {
     }
 
     fn input_row(&self, source: SourceRow<'_>, out: &mut [u8], geometry: Geometry) {
-        let input = self.input;
-        quantise_row(source, self.inputs, out, geometry, |real| input.quantise(real));
+        let rounding = Rounding {
+            channels: self.inputs,
+            before: None,
+            to: self.input,
+        };
+        (self.kernels.quantise_row)(source, rounding, out, geometry);
     }
 
     fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [u8], geometry: Geometry) {
         let features = self.layers[0].outputs / GROUP * geometry.stride();
         let (features, out) = out.split_at_mut(features);
-        let (input, concatenated) = (self.input, self.concatenated);
         if let Some(factor) = self.rescale {
-            rescale_row(features, factor, concatenated.zero_point, geometry);
+            (self.kernels.rescale_row)(features, factor, self.concatenated.zero_point, geometry);
         }
-        if self.rounded_twice {
-            quantise_row(source, self.inputs, out, geometry, |real| {
-                concatenated.quantise(input.dequantise(input.quantise(real)))
-            });
-        } else {
-            quantise_row(source, self.inputs, out, geometry, |real| concatenated.quantise(real));
-        }
+        let before = self.rounded_twice.then_some(self.input);
+        let rounding = Rounding {
+            channels: self.inputs,
+            before,
+            to: self.concatenated,
+        };
+        (self.kernels.quantise_row)(source, rounding, out, geometry);
     }
 
-    fn hidden_row(&self, i: usize, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+    fn hidden_row(
+        &self,
+        i: usize,
+        window: Window<'_, u8>,
+        skip: Option<&[u8]>,
+        out: &mut [u8],
+        geometry: Geometry,
+    ) {
         (self.kernels.hidden_row)(&self.layers[i], window, skip, out, geometry);
     }
 
-    fn last_row(&self, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    fn last_row(
+        &self,
+        window: Window<'_, u8>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    ) {
         if let Some(layer) = self.layers.last() {
             (self.kernels.last_row)(layer, window, out, from, geometry);
         }
@@ -357,7 +439,7 @@ impl Chain for Int8Chain {
 
 /// `x` rounded half to even as an integer in the low bits: adding 1.5·2²³ leaves no room for a fraction. For |x| < 2²².
 #[inline(always)]
-pub(crate) fn rint_bits(x: f32) -> u32 {
+fn rint_bits(x: f32) -> u32 {
     (x + 12_582_912.0).to_bits()
 }
 
@@ -375,9 +457,30 @@ impl Quantiser {
     }
 }
 
-/// Writes `channels` planes of a source row as groups of four; channels that pad a group get 0, and have weight 0.
+/// Writes planes of a source row as groups of four; channels that pad a group get 0, and have weight 0. Inlined into
+/// each instruction set's own copy.
 #[inline(always)]
-fn quantise_row(
+pub(crate) fn quantise_row(
+    source: SourceRow<'_>,
+    rounding: Rounding,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    let Rounding {
+        channels,
+        before,
+        to,
+    } = rounding;
+    match before {
+        Some(before) => quantise_by(source, channels, out, geometry, |real| {
+            to.quantise(before.dequantise(before.quantise(real)))
+        }),
+        None => quantise_by(source, channels, out, geometry, |real| to.quantise(real)),
+    }
+}
+
+#[inline(always)]
+fn quantise_by(
     source: SourceRow<'_>,
     channels: usize,
     out: &mut [u8],
@@ -386,9 +489,12 @@ fn quantise_row(
 ) {
     let width = geometry.width;
     for (g, out) in out.chunks_exact_mut(geometry.stride()).enumerate() {
-        let pixels = &mut out[geometry.start()..][..GROUP * width].as_chunks_mut::<GROUP>().0;
+        let pixels = out[geometry.start()..][..GROUP * width]
+            .as_chunks_mut::<GROUP>()
+            .0;
         if (g + 1) * GROUP <= channels {
-            let [a, b, c, d]: [&[f32]; GROUP] = std::array::from_fn(|k| source.channel(g * GROUP + k, width));
+            let [a, b, c, d]: [&[f32]; GROUP] =
+                std::array::from_fn(|k| source.channel(g * GROUP + k, width));
             for ((((pixel, &a), &b), &c), &d) in pixels.iter_mut().zip(a).zip(b).zip(c).zip(d) {
                 *pixel = [quantise(a), quantise(b), quantise(c), quantise(d)];
             }
@@ -396,18 +502,24 @@ fn quantise_row(
             for (x, pixel) in pixels.iter_mut().enumerate() {
                 *pixel = std::array::from_fn(|k| {
                     let c = g * GROUP + k;
-                    if c < channels { quantise(source.channel(c, width)[x]) } else { 0 }
+                    if c < channels {
+                        quantise(source.channel(c, width)[x])
+                    } else {
+                        0
+                    }
                 });
             }
         }
     }
 }
 
-/// The second rounding of a row of features.
-fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
+/// The second rounding of a row of features. Inlined into each instruction set's own copy.
+#[inline(always)]
+pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
     for group in row.chunks_exact_mut(geometry.stride()) {
         for value in &mut group[geometry.start()..][..GROUP * geometry.width] {
-            *value = (rint_bits((f32::from(*value) * factor).min(255.0)) as u8).saturating_add(zero_point);
+            let rounded = rint_bits((f32::from(*value) * factor).min(255.0)) as u8;
+            *value = rounded.saturating_add(zero_point);
         }
     }
 }

@@ -51,9 +51,16 @@ fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Re
         return Err(format!("{filters} filters; kernels take a multiple of 8"));
     }
     for (i, shape) in layers.enumerate() {
-        let right = if i + 2 == count { (filters + inputs, OUTPUTS) } else { (filters, filters) };
+        let right = if i + 2 == count {
+            (filters + inputs, OUTPUTS)
+        } else {
+            (filters, filters)
+        };
         if shape != right {
-            return Err(format!("layer {} has (inputs, outputs) {shape:?}; {right:?} is right", i + 1));
+            return Err(format!(
+                "layer {} has (inputs, outputs) {shape:?}; {right:?} is right",
+                i + 1
+            ));
         }
     }
     Ok(())

@@ -1,10 +1,16 @@
 //! Kernels in plain Rust: the definition that every other instruction set is tested against.
 
-use crate::int8::{GROUP, Kernels, Packed, Taps};
+use crate::int8::{GROUP, Kernels, Packed, Taps, quantise_row, rescale_row};
 use crate::wavefront::{Geometry, Window};
 use crate::{OUTPUTS, f32};
 
-pub(crate) const INT8: Kernels = Kernels { pack, hidden_row, last_row };
+pub(crate) const INT8: Kernels = Kernels {
+    pack,
+    hidden_row,
+    last_row,
+    quantise_row,
+    rescale_row,
+};
 
 /// `[filter][ky][group][kx]`, words of four weights.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
@@ -17,7 +23,10 @@ fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geo
     let weights = &layer.weights[filter * 3 * per_row..][..3 * per_row];
     let mut sum = layer.bias[filter];
     for (row, weights) in rows.iter().zip(weights.chunks_exact(per_row)) {
-        for (group, taps) in row.chunks_exact(geometry.stride()).zip(weights.chunks_exact(3)) {
+        for (group, taps) in row
+            .chunks_exact(geometry.stride())
+            .zip(weights.chunks_exact(3))
+        {
             let pixels = &group[geometry.start() + x * GROUP - GROUP..][..3 * GROUP];
             for (pixel, weights) in pixels.chunks_exact(GROUP).zip(taps) {
                 for (value, weight) in pixel.iter().zip(weights.to_le_bytes()) {
@@ -29,7 +38,13 @@ fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geo
     sum
 }
 
-fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+fn hidden_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
     let rows = window.rows();
     for filter in 0..layer.outputs {
         let at = filter / GROUP * geometry.stride() + geometry.start() + filter % GROUP;
@@ -51,7 +66,13 @@ fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: 
     }
 }
 
-fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+fn last_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    geometry: Geometry,
+) {
     let rows = window.rows();
     for (filter, out) in out.into_iter().enumerate() {
         for (x, out) in out.iter_mut().enumerate() {
@@ -60,16 +81,29 @@ fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], 
     }
 }
 
-pub(crate) const F32: f32::Kernels =
-    f32::Kernels { size: |_| 1, hidden_row: f32_hidden_row, last_row: f32_last_row };
+pub(crate) const F32: f32::Kernels = f32::Kernels {
+    size: |_| 1,
+    hidden_row: f32_hidden_row,
+    last_row: f32_last_row,
+};
 
 /// The sums of `filter` along a row, bias included.
-fn f32_sums(layer: &f32::Packed, rows: &[&[f32]; 3], filter: usize, sums: &mut [f32], from: usize, geometry: Geometry) {
+fn f32_sums(
+    layer: &f32::Packed,
+    rows: &[&[f32]; 3],
+    filter: usize,
+    sums: &mut [f32],
+    from: usize,
+    geometry: Geometry,
+) {
     sums.fill(layer.bias[filter]);
     let per_row = layer.inputs * 3;
     let weights = &layer.weights[filter * 3 * per_row..][..3 * per_row];
     for (row, weights) in rows.iter().zip(weights.chunks_exact(per_row)) {
-        for (channel, taps) in row.chunks_exact(geometry.stride()).zip(weights.chunks_exact(3)) {
+        for (channel, taps) in row
+            .chunks_exact(geometry.stride())
+            .zip(weights.chunks_exact(3))
+        {
             for (kx, weight) in taps.iter().enumerate() {
                 let pixels = &channel[geometry.start() + from + kx - 1..][..sums.len()];
                 for (sum, pixel) in sums.iter_mut().zip(pixels) {
@@ -92,7 +126,10 @@ fn f32_hidden_row(
         let out = &mut out[range.clone()][..geometry.width];
         f32_sums(layer, rows, filter, out, 0, geometry);
         match skip {
-            Some(skip) => out.iter_mut().zip(&skip[range]).for_each(|(out, skip)| *out = out.max(0.0) + skip),
+            Some(skip) => out
+                .iter_mut()
+                .zip(&skip[range])
+                .for_each(|(out, skip)| *out = out.max(0.0) + skip),
             None => out.iter_mut().for_each(|out| *out = out.max(0.0)),
         }
     }

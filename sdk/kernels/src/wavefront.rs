@@ -32,14 +32,21 @@ pub struct Tiling {
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     const CACHE: usize = 1 << 20;
     let layers = chain.layers();
-    let ring_column: usize =
-        (0..layers).map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>()).sum();
+    let ring_column: usize = (0..layers)
+        .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
+        .sum();
     let threads = rayon::current_num_threads();
     let bands_a_thread = (height / (threads * 32 * layers)).clamp(1, 2);
-    let band_rows = height.div_ceil(threads * bands_a_thread).max((4 * layers).min(height)).max(1);
+    let band_rows = height
+        .div_ceil(threads * bands_a_thread)
+        .max((4 * layers).min(height))
+        .max(1);
     let widest = (CACHE / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
     let strip_columns = width.div_ceil(width.div_ceil(widest).max(1)).max(1);
-    Tiling { band_rows, strip_columns }
+    Tiling {
+        band_rows,
+        strip_columns,
+    }
 }
 
 /// Whether `x[i]` is a sum with `x[i−2]`.
@@ -77,7 +84,11 @@ pub(crate) struct Geometry {
 
 impl Geometry {
     fn new(group: usize, width: usize) -> Geometry {
-        Geometry { group, padded: width.next_multiple_of(BLOCK), width }
+        Geometry {
+            group,
+            padded: width.next_multiple_of(BLOCK),
+            width,
+        }
     }
 
     /// Elements from one group of a row to the next.
@@ -108,7 +119,12 @@ pub(crate) trait Chain: Sync {
     /// Writes a row of `x[0]` from the network input's planes.
     fn input_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
     /// Writes the concatenated part of a row of `x[last]`; `out` is the whole row.
-    fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
+    fn concatenated_row(
+        &self,
+        source: SourceRow<'_>,
+        out: &mut [Self::Element],
+        geometry: Geometry,
+    );
     /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`; `skip` is the row of
     /// `x[i−1]`.
     fn hidden_row(
@@ -170,7 +186,9 @@ pub struct Scratch<E> {
 
 impl<E> Default for Scratch<E> {
     fn default() -> Self {
-        Scratch { free: Mutex::new(Vec::new()) }
+        Scratch {
+            free: Mutex::new(Vec::new()),
+        }
     }
 }
 
@@ -178,7 +196,10 @@ impl<E> Scratch<E> {
     /// Bytes held between frames.
     pub fn bytes(&self) -> usize {
         let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
-        free.iter().flatten().map(|ring| ring.memory.capacity() * size_of::<E>()).sum()
+        free.iter()
+            .flatten()
+            .map(|ring| ring.memory.capacity() * size_of::<E>())
+            .sum()
     }
 }
 
@@ -217,7 +238,10 @@ impl<E: Copy + Default> Ring<E> {
 
     /// The rows around `row`.
     fn window(&self, row: isize) -> Window<'_, E> {
-        Window { slots: &self.memory[self.start..][..RING * self.row], first: Self::slot(row - 1) }
+        Window {
+            slots: &self.memory[self.start..][..RING * self.row],
+            first: Self::slot(row - 1),
+        }
     }
 }
 
@@ -236,7 +260,14 @@ pub(crate) fn run<C: Chain>(
     if area == 0 {
         return;
     }
-    let frame = Frame { chain, input, height, width, tiling, scratch };
+    let frame = Frame {
+        chain,
+        input,
+        height,
+        width,
+        tiling,
+        scratch,
+    };
     let mut planes = output.chunks_exact_mut(area);
     let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
     frame.bands(0, height.div_ceil(tiling.band_rows.max(1)), planes);
@@ -263,12 +294,20 @@ impl<C: Chain> Frame<'_, C> {
         let mut halves = planes.map(|plane| plane.split_at_mut(split));
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);
-        rayon::join(|| self.bands(from, middle, first), || self.bands(middle, to, second));
+        rayon::join(
+            || self.bands(from, middle, first),
+            || self.bands(middle, to, second),
+        );
     }
 
     /// Runs the band that starts at row `top`, strip by strip.
     fn band(&self, top: usize, mut planes: [&mut [f32]; OUTPUTS]) {
-        let free = || self.scratch.free.lock().unwrap_or_else(PoisonError::into_inner);
+        let free = || {
+            self.scratch
+                .free
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
         let mut rings = free().pop().unwrap_or_default();
         let bottom = top + planes[0].len() / self.width;
         let columns = self.tiling.strip_columns.max(1);
@@ -336,7 +375,9 @@ impl<C: Chain> Frame<'_, C> {
             let row = step - depth;
             if (top..bottom).contains(&row) {
                 let at = (row - top) as usize * self.width + left;
-                let out = planes.each_mut().map(|plane| &mut plane[at..at + right - left]);
+                let out = planes
+                    .each_mut()
+                    .map(|plane| &mut plane[at..at + right - left]);
                 chain.last_row(rings[layers - 1].window(row), out, left - start, geometry);
             }
         }
