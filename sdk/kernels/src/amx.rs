@@ -33,6 +33,7 @@ pub(crate) fn kernels() -> Option<Kernels> {
         pack,
         hidden_row,
         last_row,
+        offset: 0,
         quantise_row,
         rescale_row,
     })
@@ -197,7 +198,7 @@ fn each_block(
     for (line, bias) in biases.0.iter_mut().zip(&layer.bias[first..]) {
         *line = [*bias; TILE];
     }
-    let filters = (layer.padded_outputs() - first).min(FILTERS);
+    let filters = (layer.outputs.next_multiple_of(8) - first).min(FILTERS);
     let wide = filters >= 16;
     let narrow = !filters.is_multiple_of(16);
     let mut panel = Panel([[[0; TILE * GROUP]; PANEL]; 2]);

@@ -16,6 +16,7 @@ pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
         pack,
         hidden_row,
         last_row,
+        offset: 0,
         quantise_row,
         rescale_row,
     })

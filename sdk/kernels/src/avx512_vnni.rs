@@ -13,6 +13,7 @@ pub(crate) fn kernels() -> Option<Kernels> {
         pack,
         hidden_row,
         last_row,
+        offset: 0,
         quantise_row,
         rescale_row,
     })

@@ -73,7 +73,7 @@ pub(crate) struct Packed {
     /// Groups of four input channels.
     pub(crate) groups: usize,
     pub(crate) outputs: usize,
-    /// With the zero point's share taken off; one a filter, zeros up to a multiple of 8 and beyond.
+    /// With the shares of the zero point and of the kernels' offset; one a filter, then zeros to a multiple of 32.
     pub(crate) bias: Vec<i32>,
     pub(crate) multiplier: Vec<f32>,
     pub(crate) skip: Option<SkipSum>,
@@ -81,13 +81,6 @@ pub(crate) struct Packed {
     pub(crate) zero_point: u8,
     /// In the order of the kernels' own `pack`.
     pub(crate) weights: Vec<i32>,
-}
-
-impl Packed {
-    /// Filters with the padding that `bias` and `multiplier` have.
-    pub(crate) fn padded_outputs(&self) -> usize {
-        self.outputs.next_multiple_of(8)
-    }
 }
 
 /// A layer's weights by filter, group of channels and tap, for packing: channels that pad a group have weight 0.
@@ -157,6 +150,8 @@ pub(crate) struct Kernels {
     pub(crate) hidden_row: fn(&Packed, Window<'_, u8>, Option<&[u8]>, &mut [u8], Geometry),
     /// Layer, three rows, the output planes' rows, the first pixel to yield.
     pub(crate) last_row: fn(&Packed, Window<'_, u8>, [&mut [f32]; OUTPUTS], usize, Geometry),
+    /// What these kernels take off the activations as they load them; the biases give it back.
+    pub(crate) offset: i32,
     /// [`quantise_row`].
     pub(crate) quantise_row: fn(SourceRow<'_>, Rounding, &mut [u8], Geometry),
     /// [`rescale_row`].
@@ -249,7 +244,8 @@ impl Int8Chain {
                 .chunks_exact(per_filter)
                 .zip(&layer.bias)
                 .map(|(w, b)| {
-                    b - i32::from(layer.zero_point) * w.iter().map(|&w| i32::from(w)).sum::<i32>()
+                    let weights: i32 = w.iter().map(|&w| i32::from(w)).sum();
+                    b + (kernels.offset - i32::from(layer.zero_point)) * weights
                 })
                 .collect();
             let mut multiplier = layer.multiplier.clone();

@@ -8,6 +8,7 @@ pub(crate) const INT8: Kernels = Kernels {
     pack,
     hidden_row,
     last_row,
+    offset: 0,
     quantise_row,
     rescale_row,
 };
