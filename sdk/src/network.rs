@@ -2,12 +2,15 @@
 //!
 //! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::run`] takes
 //! the planar input to the output planes; [`Head::field`] turns these into a complex field. What the chain is, stands
-//! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path.
+//! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
+//! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
 pub mod chain;
+mod fused;
 mod head;
 mod metadata;
 mod onnx;
+mod operator;
 pub mod reference;
 mod stock;
 mod tensor;
@@ -18,12 +21,16 @@ pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::{Error, Result};
 use chain::Chain;
+use fused::{FusedChain, FusedScratch};
+pub use phasefront_kernels::Isa;
 use stock::StockPlan;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::Framework;
 
 /// Most pixels of a frame on stock tract, which holds several layers at once: some 500 bytes a pixel.
 const MAX_STOCK_PIXELS: usize = 1 << 24;
+/// Most pixels of a frame at all.
+const MAX_PIXELS: usize = 1 << 28;
 
 /// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
 #[derive(Debug)]
@@ -136,7 +143,59 @@ impl Network {
     /// # Errors
     /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
-        self.plan_on_stock_tract(height, width)
+        match FusedChain::new(&self.chain, None) {
+            Ok(chain) => self.fused_plan(height, width, chain),
+            Err(why) => {
+                let mut plan = self.plan_on_stock_tract(height, width)?;
+                plan.engine.why = why;
+                Ok(plan)
+            }
+        }
+    }
+
+    /// Prepares the network on the kernels of one instruction set.
+    ///
+    /// # Errors
+    /// As [`Network::plan`]; [`Error::Plan`] where this processor or those kernels cannot.
+    pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
+        let chain = FusedChain::new(&self.chain, Some(isa));
+        self.fused_plan(
+            height,
+            width,
+            chain.map_err(|why| Error::Plan(format!("network: {why}")))?,
+        )
+    }
+
+    fn fused_plan(&self, height: usize, width: usize, chain: FusedChain) -> Result<NetworkPlan> {
+        check_size(height, width, MAX_PIXELS)?;
+        let isa = chain.isa();
+        let why = format!(
+            "{} layers of {} filters in {}: one fused chain",
+            self.layers(),
+            self.filters(),
+            self.precision()
+        );
+        Ok(NetworkPlan {
+            inputs: self.chain.inputs,
+            outputs: self.chain.outputs(),
+            height,
+            width,
+            path: Path::Fused(chain),
+            engine: Engine {
+                name: isa.name(),
+                why,
+            },
+        })
+    }
+
+    /// The network as a tract graph of any frame size, its chain one fused operator: for graphs built around it.
+    /// [`Network::plan`] runs the same kernels on the caller's memory, without tract's copies.
+    ///
+    /// # Errors
+    /// [`Error::Network`] when the kernels do not take the chain, or tract refuses the graph.
+    pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
+        let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
+        operator::model(&self.proto, chain, self.chain.inputs)
     }
 
     /// Prepares the network on stock tract whatever the fast path could do: the independent check of that path.
@@ -144,20 +203,7 @@ impl Network {
     /// # Errors
     /// As [`Network::plan`].
     pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
-        let pixels = height.checked_mul(width).filter(|&n| n <= MAX_STOCK_PIXELS);
-        match pixels {
-            Some(0) => {
-                return Err(Error::Plan(format!(
-                    "network: a frame of {width}×{height} pixels is empty"
-                )));
-            }
-            None => {
-                return Err(Error::Plan(format!(
-                    "network: a frame of {width}×{height} pixels is too large; {MAX_STOCK_PIXELS} pixels are the most"
-                )));
-            }
-            Some(_) => {}
-        }
+        check_size(height, width, MAX_STOCK_PIXELS)?;
         let plan = StockPlan::new(&self.proto, [1, self.chain.inputs, height, width])?;
         Ok(NetworkPlan {
             inputs: self.chain.inputs,
@@ -173,6 +219,18 @@ impl Network {
     }
 }
 
+fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
+    match height.checked_mul(width) {
+        Some(0) => Err(Error::Plan(format!(
+            "network: a frame of {width}×{height} pixels is empty"
+        ))),
+        Some(pixels) if pixels <= most => Ok(()),
+        _ => Err(Error::Plan(format!(
+            "network: a frame of {width}×{height} pixels is too large; {most} pixels are the most"
+        ))),
+    }
+}
+
 /// Which path runs a plan, and why that one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Engine {
@@ -183,6 +241,7 @@ pub struct Engine {
 }
 
 enum Path {
+    Fused(FusedChain),
     Stock(StockPlan),
 }
 
@@ -197,8 +256,19 @@ pub struct NetworkPlan {
 }
 
 /// Working memory of [`NetworkPlan::run`], from [`NetworkPlan::scratch`].
+///
+/// It is filled in the first frame, a few megabytes for each thread of the pool and independent of the frame's height.
 #[derive(Debug, Default)]
-pub struct NetworkScratch {}
+pub struct NetworkScratch {
+    fused: FusedScratch,
+}
+
+impl NetworkScratch {
+    /// Bytes held between frames.
+    pub fn bytes(&self) -> usize {
+        self.fused.bytes()
+    }
+}
 
 impl NetworkPlan {
     /// Working memory for one run at a time.
@@ -221,7 +291,8 @@ impl NetworkPlan {
         &self.engine
     }
 
-    /// Runs the network on one frame.
+    /// Runs the network on one frame, on the current rayon pool. After the first frame the fused path allocates
+    /// nothing.
     ///
     /// `input` is planar (C, H, W), RGB-D minus 0.5; `output` receives (6, H, W) as [`Head::field`] reads it.
     ///
@@ -231,7 +302,7 @@ impl NetworkPlan {
         &self,
         input: &[f32],
         output: &mut [f32],
-        _scratch: &mut NetworkScratch,
+        scratch: &mut NetworkScratch,
     ) -> Result<()> {
         let area = self.height * self.width;
         for (what, is, channels) in [
@@ -246,6 +317,10 @@ impl NetworkPlan {
             }
         }
         match &self.path {
+            Path::Fused(chain) => {
+                chain.run(input, output, self.size(), &scratch.fused);
+                Ok(())
+            }
             Path::Stock(plan) => plan.run(input, output),
         }
     }

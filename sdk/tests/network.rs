@@ -4,7 +4,7 @@
 mod network_models;
 
 use network_models::{Model, frame, int, ints};
-use phasefront::network::{Head, InputKind, Network, Precision, reference};
+use phasefront::network::{Head, InputKind, Isa, Network, Precision, reference};
 use prost::Message;
 use tract_onnx::pb::{ModelProto, NodeProto};
 
@@ -86,6 +86,136 @@ fn stock_tract_agrees_with_the_definition_in_int8() {
             }
         }
     }
+}
+
+/// The kernels of a network's precision that this processor runs.
+fn kernels(network: &Network) -> Vec<Isa> {
+    match network.precision() {
+        Precision::Int8 => Isa::int8(),
+        _ => Isa::f32(),
+    }
+}
+
+#[test]
+fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
+    let tanh = Model {
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(5, 8)
+    };
+    let models = [
+        Model::new(2, 8),
+        tanh.clone(),
+        Model {
+            inputs: 6,
+            input: "field",
+            ..tanh.clone()
+        },
+        Model {
+            inputs: 20,
+            input: "ldi5",
+            ..Model::new(8, 24)
+        },
+        Model::int8(2, 8),
+        Model::int8(3, 24),
+        Model::int8(4, 16),
+        Model { int8: true, ..tanh },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(8, 8)
+        },
+        Model::int8(8, 24),
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for (height, width) in SIZES {
+            let input = frame(model.inputs, height, width, 7);
+            let expected = reference::run(network.chain(), &input, height, width);
+            let mut first: Option<Vec<f32>> = None;
+            for isa in kernels(&network) {
+                let plan = network.plan_on(isa, height, width).unwrap();
+                assert_eq!(plan.engine().name, isa.name());
+                let mut output = vec![f32::NAN; 6 * height * width];
+                plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
+                let worst = largest_difference(&output, &expected);
+                let case = format!("{isa}, {} layers, {width}×{height}", model.layers);
+                if model.int8 {
+                    let off = output
+                        .iter()
+                        .zip(&expected)
+                        .filter(|(a, b)| (*a - *b).abs() > 1e-4)
+                        .count();
+                    assert!(
+                        off * 50 <= output.len() && worst < 0.1,
+                        "{case}: {off} off, {worst}"
+                    );
+                    assert!(
+                        *first.get_or_insert(output.clone()) == output,
+                        "{case}: other bits"
+                    );
+                } else {
+                    assert!(worst < 2e-5, "{case}: {worst}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
+    use tract_onnx::prelude::*;
+    for model in [
+        Model::int8(5, 8),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(4, 8)
+        },
+    ] {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        let graph = network.tract_model().unwrap();
+        let operators: Vec<_> = graph
+            .nodes()
+            .iter()
+            .map(|node| node.op.name().to_string())
+            .collect();
+        assert_eq!(operators, ["Source", "HologramChain"]);
+        let graph = graph.into_runnable().unwrap();
+        for (height, width) in SIZES {
+            let input = frame(4, height, width, 5);
+            let plan = network.plan(height, width).unwrap();
+            let mut expected = vec![0.0; 6 * height * width];
+            plan.run(&input, &mut expected, &mut plan.scratch())
+                .unwrap();
+            let tensor = Tensor::from_shape(&[1, 4, height, width], &input).unwrap();
+            let output = graph.run(tvec!(tensor.into())).unwrap();
+            assert_eq!(output[0].shape(), [1, 6, height, width]);
+            let view = output[0].to_plain_array_view::<f32>().unwrap();
+            assert!(view.iter().eq(&expected), "{width}×{height}");
+        }
+    }
+}
+
+#[test]
+fn chains_that_the_kernels_do_not_take_say_why_and_run_on_stock_tract() {
+    let network = Network::from_onnx(&Model::new(3, 5).bytes()).unwrap();
+    let plan = network.plan(4, 6).unwrap();
+    assert_eq!(plan.engine().name, "tract");
+    assert!(
+        plan.engine().why.contains("5 filters"),
+        "{}",
+        plan.engine().why
+    );
+    assert!(network.plan_on(Isa::Portable, 4, 6).is_err());
+    assert!(network.tract_model().is_err());
+    let input = frame(4, 4, 6, 1);
+    let mut output = vec![f32::NAN; 6 * 24];
+    plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
+    assert!(largest_difference(&output, &reference::run(network.chain(), &input, 4, 6)) < 1e-5);
 }
 
 #[test]

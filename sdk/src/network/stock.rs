@@ -45,7 +45,7 @@ impl StockPlan {
     }
 }
 
-fn one_line(why: &TractError) -> String {
+pub(super) fn one_line(why: &TractError) -> String {
     format!("{why:#}")
         .split_whitespace()
         .collect::<Vec<_>>()

@@ -1,5 +1,5 @@
 //! ONNX files of residual chains with random weights, written as a training package would export them.
-#![allow(clippy::unwrap_used, dead_code)]
+#![allow(clippy::unwrap_used, dead_code, unreachable_pub)]
 
 use prost::Message;
 use rand::{RngExt, SeedableRng};
