@@ -11,7 +11,7 @@ pub mod double_phase;
 use crate::error::{Error, Result};
 use crate::slm::Response;
 use crate::wave::fft::Scratch;
-use anti_alias::AntiAlias;
+use anti_alias::{AntiAlias, AntiAliasScratch};
 use band_limit::BandLimit;
 use num_complex::Complex32;
 
@@ -70,7 +70,7 @@ enum Prefilter {
 pub struct EncoderScratch(Option<PrefilterScratch>);
 
 enum PrefilterScratch {
-    Plane(Vec<Complex32>),
+    AntiAlias(AntiAliasScratch),
     Spectrum(Scratch),
 }
 
@@ -103,10 +103,9 @@ impl Encoder {
     pub fn scratch(&self) -> EncoderScratch {
         EncoderScratch(match &self.prefilter {
             Prefilter::None => None,
-            Prefilter::AntiAlias(_) => Some(PrefilterScratch::Plane(vec![
-                Complex32::new(0.0, 0.0);
-                self.height * self.width
-            ])),
+            Prefilter::AntiAlias(plan) => {
+                Some(PrefilterScratch::AntiAlias(plan.scratch(self.width)))
+            }
             Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
         })
     }
@@ -154,8 +153,8 @@ impl Encoder {
         assert_eq!(field.len(), 3 * plane);
         for plane in field.chunks_exact_mut(plane) {
             match (&self.prefilter, &mut scratch.0) {
-                (Prefilter::AntiAlias(plan), Some(PrefilterScratch::Plane(buffer))) => {
-                    plan.filter(plane, self.width, buffer);
+                (Prefilter::AntiAlias(plan), Some(PrefilterScratch::AntiAlias(rows))) => {
+                    plan.filter(plane, self.width, rows);
                 }
                 (Prefilter::BandLimit(plan), Some(PrefilterScratch::Spectrum(scratch))) => {
                     plan.filter(plane, scratch);
