@@ -433,3 +433,21 @@ fn last_filters(
         },
     );
 }
+
+/// Multiply-accumulates in tiles, for the machine's peak.
+pub(crate) fn burn(rounds: u64) -> u64 {
+    // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
+    unsafe {
+        asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",
+            in(reg) &raw const CONFIG, options(nostack, readonly));
+        for _ in 0..rounds {
+            asm!(
+                "tdpbsud tmm0, tmm4, tmm6",
+                "tdpbsud tmm1, tmm4, tmm7",
+                options(nostack, nomem)
+            );
+        }
+        asm!("tilerelease", options(nostack, nomem));
+    }
+    rounds * 2 * (TILE * TILE * TILE * GROUP) as u64
+}

@@ -9,6 +9,7 @@ use crate::f32;
 use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
 use std::arch::x86_64::*;
+use std::hint::black_box;
 
 /// The int8 kernels, where the processor has what they need.
 pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
@@ -418,4 +419,38 @@ pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry:
     }
     // SAFETY: as above.
     unsafe { compiled(row, factor, zero_point, geometry) }
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn int8_burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "avx2")]
+    fn run(rounds: u64) {
+        let x = black_box(_mm256_setzero_si256());
+        let mut sums = [x; 12];
+        for _ in 0..rounds {
+            sums = sums.map(|sum| _mm256_add_epi32(sum, _mm256_madd_epi16(sum, x)));
+            sums[0] = black_box(sums[0]);
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 12 * 16
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn f32_burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "avx2,fma")]
+    fn run(rounds: u64) {
+        let x = black_box(_mm256_setzero_ps());
+        let mut sums = [x; 12];
+        for _ in 0..rounds {
+            sums = sums.map(|sum| _mm256_fmadd_ps(x, x, sum));
+            sums[0] = black_box(sums[0]);
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 12 * 8
 }

@@ -80,8 +80,10 @@ impl Isa {
                 found.push(Isa::Avx2);
             }
         }
-        #[cfg(target_arch = "aarch64")]
-        found.push(Isa::Neon);
+        // NEON is part of every ARM64 processor.
+        if cfg!(target_arch = "aarch64") {
+            found.push(Isa::Neon);
+        }
         found.push(Isa::Portable);
         found
     }

@@ -13,6 +13,7 @@
 mod f32;
 mod int8;
 mod isa;
+mod peak;
 mod wavefront;
 
 mod portable;
@@ -36,6 +37,7 @@ mod neon_i8mm;
 pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
+pub use peak::{f32_peak, int8_peak};
 pub use wavefront::{Scratch, Tiling};
 
 /// Planes of a hologram network's output: two a colour.

@@ -8,6 +8,7 @@ use crate::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, re
 use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
 use std::arch::aarch64::*;
 use std::arch::asm;
+use std::hint::black_box;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
@@ -46,4 +47,21 @@ fn dot<const LANE: usize>(sum: int32x4_t, pixels: uint8x16_t, weights: int8x16_t
             options(pure, nomem, nostack, preserves_flags));
     }
     result
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "neon,i8mm")]
+    fn run(rounds: u64) {
+        let (x, w) = (black_box(vdupq_n_u8(0)), black_box(vdupq_n_s8(0)));
+        let mut sums = [black_box(vdupq_n_s32(0)); 24];
+        for _ in 0..rounds {
+            sums = sums.map(|sum| dot::<0>(sum, x, w));
+            sums[0] = black_box(sums[0]);
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 24 * 16
 }
