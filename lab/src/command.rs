@@ -1,6 +1,7 @@
 //! The command line: one file a command, each with its flags, defined once, and what it does with
 //! the laboratory. Flags that several commands share are in [`flags`].
 
+mod bench;
 mod compare;
 mod dataset;
 mod flags;
@@ -32,6 +33,7 @@ enum Command {
     Compare(compare::Compare),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
+    Bench(bench::Bench),
 }
 
 impl Phasefront {
@@ -50,6 +52,7 @@ impl Phasefront {
             Command::Compare(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
+            Command::Bench(command) => command.run(self.threads.map(usize::from), json),
         })
     }
 }

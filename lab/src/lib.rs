@@ -1,5 +1,6 @@
 //! Ground truth, data sets, evaluation: what prepares a display or a network for the phone.
 
+pub mod bench;
 pub mod dataset;
 pub mod error;
 pub mod files;

@@ -22,7 +22,7 @@ pub use metadata::{InputKind, TrainedDisplay};
 use crate::{Error, Result};
 use chain::Chain;
 use fused::{FusedChain, FusedScratch};
-pub use phasefront_kernels::Isa;
+pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
 use stock::StockPlan;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::Framework;
@@ -183,6 +183,7 @@ impl Network {
             path: Path::Fused(chain),
             engine: Engine {
                 name: isa.name(),
+                isa: Some(isa),
                 why,
             },
         })
@@ -213,6 +214,7 @@ impl Network {
             path: Path::Stock(plan),
             engine: Engine {
                 name: "tract",
+                isa: None,
                 why: "stock tract".into(),
             },
         })
@@ -236,6 +238,8 @@ fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
 pub struct Engine {
     /// The kernels' name, or "tract".
     pub name: &'static str,
+    /// The instruction set; none on tract.
+    pub isa: Option<Isa>,
     /// Why this path was taken.
     pub why: String,
 }

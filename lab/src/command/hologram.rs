@@ -29,6 +29,9 @@ pub(crate) struct Hologram {
     /// Layers of a network that comes along (8), or an ONNX file
     #[arg(long, value_name = "8|FILE", default_value = "8")]
     network: String,
+    /// Numbers that a network which comes along computes in
+    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
+    precision: PrecisionName,
     /// Planes of --method layers
     #[arg(long, value_name = "N", default_value_t = 256)]
     planes: usize,
@@ -54,6 +57,21 @@ enum Method {
     Network,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
+}
+
+/// The numbers of a network.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub(crate) enum PrecisionName {
+    /// Whole numbers of 8 bits: the fastest
+    Int8,
+    /// Floating point
+    F32,
+}
+
+impl PrecisionName {
+    pub(crate) fn is_int8(self) -> bool {
+        self == PrecisionName::Int8
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -159,7 +177,7 @@ impl Hologram {
         display: &phasefront::Display,
         response: Response,
     ) -> Result<Made> {
-        let network = models::network(&self.network)?;
+        let network = models::network(&self.network, self.precision.is_int8())?;
         let (height, width) = frame.shape();
         let pipeline = Pipeline::new(
             height,

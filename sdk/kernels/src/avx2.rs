@@ -428,8 +428,9 @@ pub(crate) fn int8_burn(rounds: u64) -> u64 {
         let x = black_box(_mm256_setzero_si256());
         let mut sums = [x; 12];
         for _ in 0..rounds {
-            sums = sums.map(|sum| _mm256_add_epi32(sum, _mm256_madd_epi16(sum, x)));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*sum, x));
+            }
         }
         black_box(sums);
     }
@@ -445,8 +446,9 @@ pub(crate) fn f32_burn(rounds: u64) -> u64 {
         let x = black_box(_mm256_setzero_ps());
         let mut sums = [x; 12];
         for _ in 0..rounds {
-            sums = sums.map(|sum| _mm256_fmadd_ps(x, x, sum));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = _mm256_fmadd_ps(x, x, *sum);
+            }
         }
         black_box(sums);
     }

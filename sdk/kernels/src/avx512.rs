@@ -160,8 +160,9 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let x = black_box(_mm512_setzero_ps());
         let mut sums = [x; 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| _mm512_fmadd_ps(x, x, sum));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = _mm512_fmadd_ps(x, x, *sum);
+            }
         }
         black_box(sums);
     }

@@ -324,8 +324,9 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let x = black_box(_mm512_setzero_si512());
         let mut sums = [x; 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| _mm512_dpbusd_epi32(sum, x, x));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = _mm512_dpbusd_epi32(*sum, x, x);
+            }
         }
         black_box(sums);
     }

@@ -215,8 +215,9 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let x = black_box(vdupq_n_f32(0.0));
         let mut sums = [x; 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| vfmaq_f32(sum, x, x));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = vfmaq_f32(*sum, x, x);
+            }
         }
         black_box(sums);
     }

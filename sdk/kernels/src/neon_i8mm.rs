@@ -56,8 +56,9 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let (x, w) = (black_box(vdupq_n_u8(0)), black_box(vdupq_n_s8(0)));
         let mut sums = [black_box(vdupq_n_s32(0)); 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| dot::<0>(sum, x, w));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = dot::<0>(*sum, x, w);
+            }
         }
         black_box(sums);
     }
