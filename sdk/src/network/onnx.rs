@@ -171,6 +171,14 @@ impl<'a> Reader<'a> {
         self.layer_count - 1
     }
 
+    /// What layer `i` reads, the concatenation left out.
+    fn features(&self, i: usize) -> Step {
+        match Chain::has_skip(i) {
+            true => Step::Sum(i),
+            false => Step::Relu(i.saturating_sub(1)),
+        }
+    }
+
     fn read(&mut self, node: &'a NodeProto) -> Read<()> {
         if !matches!(node.domain.as_str(), "" | "ai.onnx") {
             return Err(format!(
@@ -282,7 +290,12 @@ impl<'a> Reader<'a> {
             ));
         }
         let quantisation = self.activation_quantisation(node)?;
-        if matches!(step, Step::Relu(_) | Step::Sum(_)) && quantisation.zero_point != 0 {
+        // What the last layer concatenates may be rounded as the whole is, whose other part has a sign.
+        let concatenated = step == self.features(self.last());
+        if matches!(step, Step::Relu(_) | Step::Sum(_))
+            && quantisation.zero_point != 0
+            && !concatenated
+        {
             return Err(format!(
                 "zero point {}; {step} is never negative: 0 is right",
                 quantisation.zero_point
@@ -395,26 +408,46 @@ impl<'a> Reader<'a> {
     }
 
     /// Fills in the roundings before the input's own, and settles the input's where a concatenation has none after it.
-    fn int8_roundings(&self, i: usize, quantisation: &mut InputQuantisation) -> Read<()> {
+    fn int8_roundings(&mut self, i: usize, quantisation: &mut InputQuantisation) -> Read<()> {
         if Chain::has_skip(i) {
             quantisation.relu = self.relu_in_sum.get(&i).copied().flatten();
         }
         if i == self.last()
             && let Some([features, network_input]) = self.concat
         {
-            match quantisation.input {
-                Some(_) if Chain::has_skip(i) => quantisation.sum = features,
-                Some(_) => quantisation.relu = features,
+            let whole = match quantisation.input {
+                Some(whole) => whole,
                 // Without a rounding of the whole, both parts must already have one and the same.
-                None if features == network_input => quantisation.input = features,
-                None => {
-                    return Err(
-                        "the concatenation's parts have different scales: round it as a whole \
-                                (QuantizeLinear, DequantizeLinear)"
-                            .into(),
-                    );
-                }
+                None => features.filter(|_| features == network_input).ok_or(
+                    "the concatenation's parts have different scales: round it as a whole \
+                                (QuantizeLinear, DequantizeLinear)",
+                )?,
+            };
+            // A part that is rounded as the whole is, is rounded once.
+            let before = |part: Option<Quantisation>| part.filter(|part| *part != whole);
+            let (features, network_input) = (before(features), before(network_input));
+            if let Some(features) = features
+                && features.zero_point != 0
+            {
+                return Err(format!(
+                    "the concatenated features have the zero point {}; they are never negative: 0, or the \
+                     concatenation's own scale and zero point, are right",
+                    features.zero_point
+                ));
             }
+            if network_input.is_some() && network_input != self.layers[0].quantisation.input {
+                return Err(
+                    "the concatenated network input must be rounded as for the first layer, as the concatenation is, \
+                     or not at all"
+                        .into(),
+                );
+            }
+            quantisation.input = Some(whole);
+            match Chain::has_skip(i) {
+                true => quantisation.sum = features,
+                false => quantisation.relu = features,
+            }
+            self.concat = Some([features, network_input]);
         }
         Ok(())
     }
@@ -561,11 +594,7 @@ impl<'a> Reader<'a> {
 
     fn concatenation(&mut self, node: &NodeProto) -> Read<Value<'a>> {
         let i = self.layers.len();
-        let features = if Chain::has_skip(i) {
-            Step::Sum(i)
-        } else {
-            Step::Relu(i.saturating_sub(1))
-        };
+        let features = self.features(i);
         if i != self.last() || i == 0 {
             return Err(format!(
                 "stands before layer {i}; only the last layer, {}, has a concatenation",
@@ -581,13 +610,6 @@ impl<'a> Reader<'a> {
                 "joins {} and {}; {features} and the network's input, in this order, are right",
                 a.0, b.0
             ));
-        }
-        if let Some(rounding) = b.1
-            && self.layers[0].quantisation.input != Some(rounding)
-        {
-            return Err(
-                "the network's input must be rounded as for the first layer, or not at all".into(),
-            );
         }
         self.concat = Some([a.1, b.1]);
         Ok(Value::Activation {
