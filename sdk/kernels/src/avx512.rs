@@ -4,6 +4,7 @@
 use crate::OUTPUTS;
 use crate::f32::{Kernels, Packed};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
+use std::arch::asm;
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
@@ -160,8 +161,13 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let x = black_box(_mm512_setzero_ps());
         let mut sums = [x; 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| _mm512_fmadd_ps(x, x, sum));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = _mm512_fmadd_ps(x, x, *sum);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(zmm_reg) sums[0], options(nomem, nostack, preserves_flags));
+            }
         }
         black_box(sums);
     }

@@ -58,8 +58,13 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         let (x, w) = (black_box(vdupq_n_s8(0)), black_box(vdupq_n_s8(0)));
         let mut sums = [black_box(vdupq_n_s32(0)); 24];
         for _ in 0..rounds {
-            sums = sums.map(|sum| dot::<0>(sum, x, w));
-            sums[0] = black_box(sums[0]);
+            for sum in &mut sums {
+                *sum = dot::<0>(*sum, x, w);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
+            }
         }
         black_box(sums);
     }
