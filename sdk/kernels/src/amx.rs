@@ -16,6 +16,7 @@ use crate::int8::{GROUP, Kernels, Packed, Taps};
 use crate::wavefront::{BLOCK, Geometry, Window};
 use std::arch::asm;
 use std::arch::x86_64::*;
+use std::cell::RefCell;
 use std::sync::OnceLock;
 
 /// Lines of a tile, and pixels of a line.
@@ -174,9 +175,48 @@ struct Panel([[[u8; TILE * GROUP]; PANEL]; 2]);
 #[repr(C, align(64))]
 struct Biases([[i32; TILE]; FILTERS]);
 
+/// What a row needs beside the rows: kept by each thread, as clearing it would take longer than some rows.
+struct Work {
+    biases: Biases,
+    panels: [Panel; 2],
+    sums: [Sums; 3],
+}
+
+thread_local! {
+    static WORK: RefCell<Work> = const {
+        RefCell::new(Work {
+            biases: Biases([[0; TILE]; FILTERS]),
+            panels: [const { Panel([[[0; TILE * GROUP]; PANEL]; 2]) }; 2],
+            sums: [const { Sums([[[0; TILE]; FILTERS]; 2]) }; 3],
+        })
+    };
+}
+
 /// Runs `done(x, sums)` for every 32 pixels of `from..to`, with the sums of filters `first..first + 24`.
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 fn each_block(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    first: usize,
+    span: (usize, usize),
+    geometry: Geometry,
+    done: impl FnMut(usize, &Sums),
+) {
+    WORK.with_borrow_mut(|work| {
+        for (line, bias) in work.biases.0.iter_mut().zip(&layer.bias[first..]) {
+            *line = [*bias; TILE];
+        }
+        each_block_in(work, layer, window, first, span, geometry, done);
+    });
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn each_block_in(
+    Work {
+        biases,
+        panels,
+        sums,
+    }: &mut Work,
     layer: &Packed,
     window: Window<'_, u8>,
     first: usize,
@@ -194,42 +234,36 @@ fn each_block(
     );
     let turn_words = steps.count() * STEP_WORDS;
     let weights = &layer.weights[(first / FILTERS * 3 + window.first) * turn_words..][..turn_words];
-    let mut biases = Biases([[0; TILE]; FILTERS]);
-    for (line, bias) in biases.0.iter_mut().zip(&layer.bias[first..]) {
-        *line = [*bias; TILE];
-    }
     let filters = (layer.outputs.next_multiple_of(8) - first).min(FILTERS);
     let wide = filters >= 16;
     let narrow = !filters.is_multiple_of(16);
-    let mut panel = Panel([[[0; TILE * GROUP]; PANEL]; 2]);
-    let mut sums = [
-        Sums([[[0; TILE]; FILTERS]; 2]),
-        Sums([[[0; TILE]; FILTERS]; 2]),
-    ];
-    let mut waiting: Option<usize> = None;
-    let mut current = 0;
+    // A tile can not be loaded from stores still on their way, so panels are gathered a block ahead and sums wait a
+    // block before they are turned into values.
+    let blocks = (to - from).div_ceil(2 * TILE);
+    let block_x = |block: usize| from + block * 2 * TILE;
     // SAFETY: `kernels` has found the processor and the system willing. Every line read starts one pixel before the
     // block at the earliest and ends 17 after at the latest, within a group's margins. Weights and biases have the
     // tiles' shapes. Tiles are this thread's own between configuration and release, and `done` knows nothing of them.
     unsafe {
-        asm!("ldtilecfg [{}]", in(reg) &raw const CONFIG, options(nostack, readonly));
-        for x in (from..to).step_by(2 * TILE) {
-            let pixels = window
-                .slots
-                .as_ptr()
-                .add(geometry.start() + x * GROUP - GROUP);
-            let left = pixels.add(steps.direct * TILE * stride);
-            for half in 0..2 {
+        let pixels = window.slots.as_ptr().add(geometry.start() - GROUP);
+        let gather = |panel: &mut Panel, block: usize| {
+            let left = pixels.add(steps.direct * TILE * stride + block_x(block) * GROUP);
+            for (half, panel) in panel.0.iter_mut().enumerate() {
                 for kx in 0..3 {
                     for line in 0..steps.left {
                         let from = left.add(line * stride + (kx + half * TILE) * GROUP);
-                        let to = &raw mut panel.0[half][kx * steps.left + line];
+                        let to = panel[kx * steps.left + line].as_mut_ptr();
                         _mm512_store_si512(to.cast(), _mm512_loadu_si512(from.cast()));
                     }
                 }
             }
+        };
+        asm!("ldtilecfg [{}]", in(reg) &raw const CONFIG, options(nostack, readonly));
+        gather(&mut panels[0], 0);
+        for block in 0..blocks {
+            let pixels = pixels.add(block_x(block) * GROUP);
             let mut weight = weights.as_ptr();
-            start(&biases, wide, narrow);
+            start(biases, wide, narrow);
             for kx in 0..3 {
                 for tile in 0..steps.direct {
                     let line = pixels.add(tile * TILE * stride + kx * GROUP);
@@ -238,21 +272,22 @@ fn each_block(
                 }
             }
             for tile in 0..steps.panels {
-                let lines = [0, 1].map(|half| panel.0[half][tile * TILE].as_ptr());
+                let lines = [0, 1].map(|half| panels[block % 2].0[half][tile * TILE].as_ptr());
                 step(weight, lines, TILE * GROUP, wide, narrow);
                 weight = weight.add(STEP_WORDS);
             }
-            // While the tiles compute, the previous block's sums are turned into values.
-            if let Some(x) = waiting.replace(x) {
-                done(x, &sums[1 - current]);
+            if block + 1 < blocks {
+                gather(&mut panels[(block + 1) % 2], block + 1);
             }
-            finish(&mut sums[current], wide, narrow);
-            current = 1 - current;
+            if block >= 2 {
+                done(block_x(block - 2), &sums[(block - 2) % 3]);
+            }
+            finish(&mut sums[block % 3], wide, narrow);
         }
         asm!("tilerelease", options(nostack, nomem));
     }
-    if let Some(x) = waiting {
-        done(x, &sums[1 - current]);
+    for block in blocks.saturating_sub(2)..blocks {
+        done(block_x(block), &sums[block % 3]);
     }
 }
 
@@ -426,7 +461,13 @@ fn last_filters(
                     continue;
                 }
                 for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
-                    let values = sums.map(|sum| sum as f32 * multiplier);
+                    let mut values = [0.0; TILE];
+                    // SAFETY: the features are this function's; 16 sums and 16 values.
+                    unsafe {
+                        let sums = _mm512_cvtepi32_ps(_mm512_load_si512(sums.as_ptr().cast()));
+                        let scaled = _mm512_mul_ps(sums, _mm512_set1_ps(*multiplier));
+                        _mm512_storeu_ps(values.as_mut_ptr(), scaled);
+                    }
                     out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
                 }
             }

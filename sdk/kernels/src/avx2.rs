@@ -8,6 +8,7 @@ use crate::OUTPUTS;
 use crate::f32;
 use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
+use std::arch::asm;
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
@@ -129,10 +130,12 @@ fn int8_sums(
     // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
     unsafe {
         let mut weight = weights.as_ptr();
+        // Kept from unrolling, which would run out of registers.
+        let taps = black_box(3);
         for row in rows {
             let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
             for _ in 0..layer.groups {
-                for kx in 0..3 {
+                for kx in 0..taps {
                     let halves: [[__m256i; 2]; INT8_BLOCKS] = std::array::from_fn(|b| {
                         let bytes = _mm256_loadu_si256(pixels.add((kx + 8 * b) * GROUP).cast());
                         [_mm256_and_si256(bytes, even), _mm256_srli_epi16::<8>(bytes)]
@@ -431,6 +434,10 @@ pub(crate) fn int8_burn(rounds: u64) -> u64 {
             for sum in &mut sums {
                 *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*sum, x));
             }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(ymm_reg) sums[0], options(nomem, nostack, preserves_flags));
+            }
         }
         black_box(sums);
     }
@@ -448,6 +455,10 @@ pub(crate) fn f32_burn(rounds: u64) -> u64 {
         for _ in 0..rounds {
             for sum in &mut sums {
                 *sum = _mm256_fmadd_ps(x, x, *sum);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(ymm_reg) sums[0], options(nomem, nostack, preserves_flags));
             }
         }
         black_box(sums);

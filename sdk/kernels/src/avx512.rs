@@ -4,6 +4,7 @@
 use crate::OUTPUTS;
 use crate::f32::{Kernels, Packed};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
+use std::arch::asm;
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
@@ -162,6 +163,10 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         for _ in 0..rounds {
             for sum in &mut sums {
                 *sum = _mm512_fmadd_ps(x, x, *sum);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(zmm_reg) sums[0], options(nomem, nostack, preserves_flags));
             }
         }
         black_box(sums);

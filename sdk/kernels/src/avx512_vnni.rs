@@ -5,6 +5,7 @@ use crate::OUTPUTS;
 use crate::avx2::{quantise_row, rescale_row};
 use crate::int8::{GROUP, Kernels, Packed, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use std::arch::asm;
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
@@ -326,6 +327,10 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         for _ in 0..rounds {
             for sum in &mut sums {
                 *sum = _mm512_dpbusd_epi32(*sum, x, x);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(zmm_reg) sums[0], options(nomem, nostack, preserves_flags));
             }
         }
         black_box(sums);

@@ -7,6 +7,7 @@ use crate::f32;
 use crate::int8::{self, GROUP, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
 use std::arch::aarch64::*;
+use std::arch::asm;
 use std::hint::black_box;
 
 /// The f32 kernels.
@@ -217,6 +218,10 @@ pub(crate) fn burn(rounds: u64) -> u64 {
         for _ in 0..rounds {
             for sum in &mut sums {
                 *sum = vfmaq_f32(*sum, x, x);
+            }
+            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+            unsafe {
+                asm!("/* {0} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
             }
         }
         black_box(sums);
