@@ -1,7 +1,15 @@
 //! Ground truth, data sets, evaluation: what prepares a display or a network for the phone.
 
+pub mod bench;
+pub mod dataset;
 pub mod error;
+pub mod files;
 pub mod ldi;
+pub mod metrics;
+pub mod models;
+pub mod reconstruct;
+pub mod rgbd;
 pub mod scene;
+pub mod sm_lbm;
 
 pub use error::{Error, Result};

@@ -1,0 +1,192 @@
+//! How fast a frame is on this machine: every stage of the pipeline, medians of many frames, beside the
+//! machine's own peak measured in the same run.
+
+use crate::error::{Error, Result};
+use ndarray::{Array2, Array3};
+use num_complex::Complex32;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::network::{Precision, f32_peak, int8_peak};
+use phasefront::slm::Response;
+use phasefront::{Display, Network, Pipeline, RgbdFrame};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// How long the peak is measured.
+const PEAK_TIME: Duration = Duration::from_millis(200);
+
+/// One combination that is measured.
+#[derive(Debug, Clone)]
+pub struct Case<'a> {
+    /// The network.
+    pub network: &'a Network,
+    /// Width and height, pixels.
+    pub size: (usize, usize),
+    /// Threads of the pool.
+    pub threads: usize,
+}
+
+/// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// Convolution layers.
+    pub layers: usize,
+    /// `f32` or `int8`.
+    pub precision: String,
+    /// Always `cpu`.
+    pub backend: &'static str,
+    /// The kernels that ran.
+    pub kernels: String,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Threads of the pool.
+    pub threads: usize,
+    /// Each stage's median.
+    pub stage_ms: BTreeMap<&'static str, f64>,
+    /// The median of whole frames.
+    pub total_ms: f64,
+    /// The fastest and the slowest frame.
+    pub spread_ms: [f64; 2],
+    /// Frames that were measured.
+    pub frames: usize,
+    /// The network's multiply-adds in its median time, 10⁹ a second.
+    pub gmac_per_s: f64,
+    /// That, of what these kernels' instructions do here from registers alone, on as many threads.
+    pub peak_percent: Option<f64>,
+    /// The most memory this process held, where the system tells.
+    pub peak_memory_mb: Option<f64>,
+}
+
+/// The machine that was measured.
+#[derive(Debug, Clone, Serialize)]
+pub struct Machine {
+    /// The processor's name, where the system tells.
+    pub cpu: String,
+    /// Its logical cores.
+    pub cores: usize,
+    /// Version of this program.
+    pub version: &'static str,
+}
+
+impl Machine {
+    /// This machine.
+    pub fn this() -> Self {
+        let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let name = info.lines().find_map(|line| {
+            let (key, value) = line.split_once(':')?;
+            (key.trim() == "model name").then(|| value.trim().to_owned())
+        });
+        Machine {
+            cpu: name.unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+}
+
+/// Measures one case with `display`: frames until `budget` is spent, five at least, after one that is not
+/// counted.
+///
+/// # Errors
+/// A case that cannot be planned.
+pub fn measure(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(case.threads)
+        .build()
+        .map_err(|e| Error::Input(format!("--threads {}: {e}", case.threads)))?;
+    pool.install(|| measure_here(case, display, budget))
+}
+
+fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
+    let (width, height) = case.size;
+    let network = case.network;
+    forget_peak_memory();
+    let pipeline = Pipeline::new(
+        height,
+        width,
+        network,
+        display,
+        Encoding::ANTI_ALIAS,
+        Scale::Fixed(1.0),
+        Response::linear(display.bits())?,
+    )?;
+    let frame = test_frame(height, width)?;
+    let mut scratch = pipeline.scratch();
+    let mut field = vec![Complex32::ZERO; 3 * height * width];
+    let mut levels = vec![0; 3 * height * width];
+    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    let mut totals = Vec::new();
+    pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
+    let start = Instant::now();
+    while totals.len() < 5 || start.elapsed() < budget {
+        let times = pipeline
+            .process(&frame, &mut field, &mut levels, &mut scratch)?
+            .times;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        for (stage, time) in [
+            ("network", times.network),
+            ("propagate", times.propagate),
+            ("encode", times.encode),
+        ] {
+            stages.entry(stage).or_default().push(ms(time));
+        }
+        totals.push(ms(times.total()));
+    }
+    let stage_ms: BTreeMap<_, _> = (stages.into_iter())
+        .map(|(stage, mut times)| (stage, median(&mut times)))
+        .collect();
+    let total_ms = median(&mut totals);
+    let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
+    let gmac_per_s = macs / stage_ms["network"] / 1e6;
+    let isa = pipeline.network().engine().isa;
+    let peak = isa.and_then(|isa| match network.precision() {
+        Precision::Int8 => int8_peak(isa, PEAK_TIME),
+        _ => f32_peak(isa, PEAK_TIME),
+    });
+    Ok(Row {
+        layers: network.layers(),
+        precision: network.precision().to_string(),
+        backend: "cpu",
+        kernels: pipeline.network().engine().name.to_owned(),
+        width,
+        height,
+        threads: case.threads,
+        stage_ms,
+        total_ms,
+        spread_ms: [totals[0], totals[totals.len() - 1]],
+        frames: totals.len(),
+        gmac_per_s,
+        peak_percent: peak.map(|peak| 100.0 * gmac_per_s * 1e9 / peak),
+        peak_memory_mb: peak_memory_mb(),
+    })
+}
+
+/// A frame with detail everywhere: what is in it does not change what it costs.
+fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
+    let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    Ok(RgbdFrame::new(
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| value(c, y, x)),
+        Array2::from_shape_fn((height, width), |(y, x)| value(9, y / 8, x / 8)),
+    )?)
+}
+
+/// Sorts `values`, which are not empty, and gives the middle one.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Linux counts a process's most memory from here on.
+fn forget_peak_memory() {
+    // Where this is not Linux there is nothing to forget.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some((kilobytes / 102.4).round() / 10.0)
+}

@@ -1,0 +1,66 @@
+//! The command line: one file a command, each with its flags, defined once, and what it does with
+//! the laboratory. Flags that several commands share are in [`flags`].
+
+mod bench;
+mod compare;
+mod dataset;
+mod flags;
+mod hologram;
+mod refocus;
+mod scene;
+
+use clap::{Parser, Subcommand};
+use phasefront_lab::Result;
+
+/// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
+#[derive(Parser)]
+#[command(name = "phasefront", version, max_term_width = 100)]
+pub(crate) struct Phasefront {
+    #[command(subcommand)]
+    command: Command,
+    /// Threads to compute with; all cores if not given.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print the result as JSON on stdout.
+    #[arg(long, global = true)]
+    json: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Hologram(hologram::Hologram),
+    Refocus(refocus::Refocus),
+    Compare(compare::Compare),
+    Scene(scene::Scene),
+    Dataset(dataset::Dataset),
+    Bench(bench::Bench),
+}
+
+impl Phasefront {
+    pub(crate) fn run(self) -> Result<()> {
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = self.threads {
+            pool = pool.num_threads(threads.into());
+        }
+        let pool = pool
+            .build()
+            .map_err(|e| phasefront_lab::Error::Input(format!("--threads: {e}")))?;
+        let json = self.json;
+        pool.install(|| match self.command {
+            Command::Hologram(command) => command.run(json),
+            Command::Refocus(command) => command.run(json),
+            Command::Compare(command) => command.run(json),
+            Command::Scene(command) => command.run(json),
+            Command::Dataset(command) => command.run(json),
+            Command::Bench(command) => command.run(self.threads.map(usize::from), json),
+        })
+    }
+}
+
+/// Prints a command's result: `json` in one line, or `text`.
+fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
+    match json {
+        true => println!("{value}"),
+        false => println!("{text}"),
+    }
+}

@@ -1,0 +1,57 @@
+//! `phasefront compare`: PSNR and SSIM of the amplitudes of two images or holograms.
+
+use clap::Args;
+use ndarray::Array3;
+use phasefront_lab::{Error, Result, files, metrics};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Compare two images or holograms: PSNR and SSIM of their amplitudes, per colour and overall
+#[derive(Args)]
+pub(crate) struct Compare {
+    /// An image, or a hologram, which is looked at from --z-mm
+    a: PathBuf,
+    /// What to compare it with
+    b: PathBuf,
+    /// Focus for holograms, mm from the middle of the volume, positive toward the viewer
+    #[arg(
+        long,
+        value_name = "Z",
+        allow_negative_numbers = true,
+        default_value_t = 0.0
+    )]
+    z_mm: f64,
+}
+
+impl Compare {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let a = self.amplitude(&self.a)?;
+        let b = self.amplitude(&self.b)?;
+        let result = metrics::compare(a.view(), b.view()).map_err(|e| Error::file(&self.b, e))?;
+        let mut text = String::from("        PSNR dB    SSIM");
+        let colours = ["red", "green", "blue"];
+        for (i, colour) in colours.iter().enumerate() {
+            text += &format!(
+                "\n{colour:7} {:7.2}  {:6.4}",
+                result.psnr[i], result.ssim[i]
+            );
+        }
+        text += &format!(
+            "\noverall {:7.2}  {:6.4}",
+            result.psnr_overall, result.ssim_overall
+        );
+        super::print(json, &json!(result), text);
+        Ok(())
+    }
+
+    fn amplitude(&self, path: &Path) -> Result<Array3<f32>> {
+        if files::is_hologram(path)? {
+            let hologram = files::read_hologram(path)?;
+            let mut views = hologram
+                .views(&[self.z_mm / 1e3])
+                .map_err(|e| Error::file(path, e))?;
+            return Ok(views.remove(0));
+        }
+        files::read_rgb(path)
+    }
+}

@@ -1,0 +1,78 @@
+//! `phasefront dataset`: LDI and hologram pairs, resumable, shardable.
+
+use super::flags::{DisplayFlags, progress_bar};
+use clap::Args;
+use phasefront_lab::dataset::{self, Manifest};
+use phasefront_lab::{Error, Result};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Make a data set: random scenes as layered depth images and their holograms
+///
+/// Made again into the same folder it goes on where it was stopped.
+#[derive(Args)]
+pub(crate) struct Dataset {
+    /// Pairs to make
+    #[arg(long, value_name = "N")]
+    scenes: usize,
+    /// Height and width of a scene, pixels
+    #[arg(long, value_name = "PX", default_value_t = 384)]
+    size: usize,
+    /// Planes of SM-LBM
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    planes: usize,
+    /// Layers of a layered depth image
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    ldi_layers: usize,
+    /// The same seed gives the same data set
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+    /// Make every nth pair only, from the ith of 0..n
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    shard: Option<(usize, usize)>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Folder of the data set
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
+    let parsed = text
+        .split_once('/')
+        .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+    match parsed {
+        Some((i, n)) if i < n => Ok((i, n)),
+        _ => Err("a shard is written i/n with i from 0 to n − 1, as 0/4".into()),
+    }
+}
+
+impl Dataset {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let display = self.display.read()?.display;
+        if display.offset_m() != 0.0 {
+            return Err(Error::Input(
+                "a data set holds midpoint holograms; the display's offset must be 0".into(),
+            ));
+        }
+        let manifest = Manifest::new(
+            self.scenes,
+            self.size,
+            self.planes,
+            self.ldi_layers,
+            self.seed,
+            display,
+        )?;
+        let shard = self.shard.unwrap_or((0, 1));
+        let mine = self.scenes.saturating_sub(shard.0).div_ceil(shard.1);
+        let bar = progress_bar(mine as u64, "pairs");
+        dataset::make(&manifest, &self.output, shard, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        super::print(
+            json,
+            &json!({"folder": self.output, "pairs": mine, "scenes": self.scenes}),
+            format!("{}: {mine} pairs", self.output.display()),
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,122 @@
+//! Flags that several commands share.
+
+use clap::{Args, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use phasefront::RgbdFrame;
+use phasefront::depth::DepthUnit;
+use phasefront_lab::files::{self, DisplayFile};
+use phasefront_lab::rgbd::{self, DepthOptions};
+use phasefront_lab::{Error, Result};
+use std::path::PathBuf;
+
+/// The display that a hologram is for.
+#[derive(Args)]
+pub(crate) struct DisplayFlags {
+    /// TOML file of the display [default: 1920×1080, 8 µm, 638/520/450 nm, 6 mm]
+    #[arg(long, value_name = "FILE")]
+    display: Option<PathBuf>,
+    /// z of the hologram against the middle of the volume, mm, positive toward the viewer
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    offset_mm: Option<f64>,
+}
+
+impl DisplayFlags {
+    pub(crate) fn read(&self) -> Result<DisplayFile> {
+        let mut file = match &self.display {
+            Some(path) => files::read_display(path)?,
+            None => DisplayFile {
+                display: phasefront::Display::default(),
+                lut: None,
+            },
+        };
+        if let Some(mm) = self.offset_mm {
+            file.display = file.display.with_offset_m(mm / 1e3)?;
+        }
+        Ok(file)
+    }
+}
+
+/// An RGB-D image and what its depth means.
+#[derive(Args)]
+pub(crate) struct FrameFlags {
+    /// Colour image, PNG or JPEG
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "depth",
+        required_unless_present = "ldi"
+    )]
+    rgb: Option<PathBuf>,
+    /// Depth image: grey PNG of 8 or 16 bits, or .npy
+    #[arg(long, value_name = "FILE", requires = "rgb")]
+    depth: Option<PathBuf>,
+    /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth
+    #[arg(long, value_enum, default_value_t = UnitName::Normalized)]
+    depth_unit: UnitName,
+    /// Units in a metre, for --depth-unit raw
+    #[arg(long, value_name = "N", required_if_eq("depth_unit", "raw"))]
+    depth_scale: Option<f64>,
+    /// Metres shown nearest [default: the 1st percentile]
+    #[arg(long, value_name = "M")]
+    near: Option<f32>,
+    /// Metres shown farthest [default: the 99th percentile]
+    #[arg(long, value_name = "M")]
+    far: Option<f32>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum UnitName {
+    /// 0 nearest to the largest number farthest
+    Normalized,
+    /// Metres
+    M,
+    /// Millimetres
+    Mm,
+    /// Inverse metres
+    Disparity,
+    /// --depth-scale units a metre
+    Raw,
+}
+
+impl FrameFlags {
+    pub(crate) fn read(&self) -> Result<RgbdFrame> {
+        let (Some(rgb), Some(depth)) = (&self.rgb, &self.depth) else {
+            return Err(Error::Input("this method needs --rgb and --depth".into()));
+        };
+        let unit = match self.depth_unit {
+            UnitName::Normalized => DepthUnit::Normalized,
+            UnitName::M => DepthUnit::Metres,
+            UnitName::Mm => DepthUnit::Millimetres,
+            UnitName::Disparity => DepthUnit::Disparity,
+            UnitName::Raw => DepthUnit::Raw {
+                units_per_m: self.depth_scale.unwrap_or(f64::NAN),
+            },
+        };
+        let options = DepthOptions {
+            unit,
+            near_m: self.near,
+            far_m: self.far,
+        };
+        rgbd::read(rgb, depth, options)
+    }
+}
+
+/// Width and height as 1920x1080.
+pub(crate) fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
+    let parsed = text
+        .split_once(['x', '×'])
+        .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match parsed {
+        Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) => Ok((w, h)),
+        _ => Err("a size is written WxH, as 1920x1080, each up to 16384".into()),
+    }
+}
+
+/// A progress bar on stderr, with the time left, where stderr is a terminal.
+pub(crate) fn progress_bar(total: u64, what: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {elapsed} {eta} left")
+        .expect("a well-formed template");
+    ProgressBar::new(total)
+        .with_style(style)
+        .with_message(what.to_owned())
+}

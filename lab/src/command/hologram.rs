@@ -1,0 +1,305 @@
+//! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
+
+use super::flags::{DisplayFlags, FrameFlags, progress_bar};
+use clap::{Args, ValueEnum};
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::modulator::Modulator;
+use phasefront::slm::Response;
+use phasefront::{Pipeline, RgbdFrame};
+use phasefront_lab::files::{self, HologramInfo};
+use phasefront_lab::ldi::{Ldi, LdiLayer};
+use phasefront_lab::{Error, Result, models, sm_lbm};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Make a phase-only hologram of an RGB-D image or a layered depth image
+#[derive(Args)]
+pub(crate) struct Hologram {
+    #[command(flatten)]
+    frame: FrameFlags,
+    /// Folder of a layered depth image, for --method layers
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
+    ldi: Option<PathBuf>,
+    /// How the midpoint hologram is made [default: network; layers with --ldi]
+    #[arg(long, value_enum)]
+    method: Option<Method>,
+    /// Layers of a network that comes along (8), or an ONNX file
+    #[arg(long, value_name = "8|FILE", default_value = "8")]
+    network: String,
+    /// Numbers that a network which comes along computes in
+    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
+    precision: PrecisionName,
+    /// Planes of --method layers
+    #[arg(long, value_name = "N", default_value_t = 256)]
+    planes: usize,
+    /// How the field becomes phases
+    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
+    encoder: EncoderName,
+    /// The amplitude that full light stands for [default: the largest of the image]
+    #[arg(long, value_name = "A")]
+    scale: Option<f32>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Write the complex field at the modulator there too, with a .json beside it
+    #[arg(long, value_name = "FILE.npy")]
+    complex: Option<PathBuf>,
+    /// The hologram: a PNG of modulator levels
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Method {
+    /// A trained network on the RGB-D image
+    Network,
+    /// Silhouette-mask layers: exact waves, slow
+    Layers,
+}
+
+/// The numbers of a network.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub(crate) enum PrecisionName {
+    /// Whole numbers of 8 bits: the fastest
+    Int8,
+    /// Floating point
+    F32,
+}
+
+impl PrecisionName {
+    pub(crate) fn is_int8(self) -> bool {
+        self == PrecisionName::Int8
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EncoderName {
+    /// Double phase
+    Double,
+    /// Double phase after a small blur (AA-DPM)
+    AntiAlias,
+    /// Double phase after a cut of high frequencies (BL-DPM)
+    BandLimit,
+}
+
+impl EncoderName {
+    fn encoding(self) -> Encoding {
+        match self {
+            EncoderName::Double => Encoding::DoublePhase,
+            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
+            EncoderName::BandLimit => Encoding::BAND_LIMIT,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            EncoderName::Double => "double",
+            EncoderName::AntiAlias => "anti-alias",
+            EncoderName::BandLimit => "band-limit",
+        }
+    }
+}
+
+/// A field at the modulator, its levels, and how long each stage took.
+struct Made {
+    field: Option<Array3<Complex32>>,
+    levels: Array3<u8>,
+    scale: f32,
+    stages: Vec<(&'static str, Duration)>,
+    engine: Option<String>,
+}
+
+impl Hologram {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        for (path, extension) in [(Some(&self.output), "png"), (self.complex.as_ref(), "npy")] {
+            if let Some(path) = path
+                && !files::has_extension(path, extension)
+            {
+                return Err(Error::file(
+                    path,
+                    format!("the name must end in .{extension}"),
+                ));
+            }
+        }
+        let display = self.display.read()?;
+        let response = match display.lut {
+            Some(lut) => Response::lut(lut),
+            None => Response::linear(display.display.bits())?,
+        };
+        let method = self.method.unwrap_or(match self.ldi {
+            Some(_) => Method::Layers,
+            None => Method::Network,
+        });
+        let made = match (method, &self.ldi) {
+            (Method::Network, None) => {
+                self.by_network(&self.frame.read()?, &display.display, response)?
+            }
+            (Method::Network, Some(dir)) => {
+                return Err(Error::file(
+                    dir,
+                    "--method network takes --rgb and --depth; for a layered depth image use --method layers",
+                ));
+            }
+            (Method::Layers, None) => self.by_layers(
+                &single_layer(&self.frame.read()?)?,
+                &display.display,
+                response,
+            )?,
+            (Method::Layers, Some(dir)) => {
+                self.by_layers(&Ldi::read(dir)?, &display.display, response)?
+            }
+        };
+        let info = HologramInfo {
+            display: display.display,
+            encoder: Some(self.encoder.name().into()),
+            scale: Some(made.scale),
+            lut: display.lut.map(Vec::from),
+        };
+        if let (Some(path), Some(field)) = (&self.complex, &made.field) {
+            let info = HologramInfo {
+                encoder: None,
+                scale: None,
+                lut: None,
+                ..info.clone()
+            };
+            files::write_complex(path, field.view(), &info)?;
+        }
+        files::write_phase_only(&self.output, made.levels.view(), &info)?;
+        self.report(json, &made);
+        Ok(())
+    }
+
+    fn by_network(
+        &self,
+        frame: &RgbdFrame,
+        display: &phasefront::Display,
+        response: Response,
+    ) -> Result<Made> {
+        let network = models::network(&self.network, self.precision.is_int8())?;
+        let (height, width) = frame.shape();
+        let pipeline = Pipeline::new(
+            height,
+            width,
+            &network,
+            display,
+            self.encoder.encoding(),
+            self.scale(),
+            response,
+        )?;
+        let mut scratch = pipeline.scratch();
+        let mut levels = Array3::zeros((3, height, width));
+        let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
+        let (values, bytes) = slices(&mut field, &mut levels);
+        let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
+        // The encoder filters the field that it is given, so a copy is kept where it is asked for.
+        let kept = self.complex.as_ref().map(|_| values.to_vec());
+        let modulation = pipeline.modulate(values, bytes, &mut scratch);
+        let engine = pipeline.network().engine();
+        Ok(Made {
+            field: kept.map(|values| stack(values, height, width)),
+            levels,
+            scale: modulation.scale,
+            stages: vec![
+                ("network", predict),
+                ("propagate", propagate),
+                ("encode", modulation.encode),
+            ],
+            engine: Some(format!("{} ({})", engine.name, engine.why)),
+        })
+    }
+
+    fn by_layers(
+        &self,
+        ldi: &Ldi,
+        display: &phasefront::Display,
+        response: Response,
+    ) -> Result<Made> {
+        let (height, width) = ldi.shape();
+        let modulator = Modulator::new(
+            height,
+            width,
+            display,
+            self.encoder.encoding(),
+            self.scale(),
+            response,
+        )?;
+        let mut scratch = modulator.scratch();
+        let start = Instant::now();
+        let bar = progress_bar(0, "planes");
+        let mut field = sm_lbm::hologram(ldi, display, self.planes, &|done, total| {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        })?;
+        bar.finish_and_clear();
+        let waved = Instant::now();
+        let mut levels = Array3::zeros((3, height, width));
+        let (values, bytes) = slices(&mut field, &mut levels);
+        modulator.propagate(values, &mut scratch);
+        let propagate = waved.elapsed();
+        let kept = self.complex.as_ref().map(|_| values.to_vec());
+        let modulation = modulator.modulate(values, bytes, &mut scratch);
+        Ok(Made {
+            field: kept.map(|values| stack(values, height, width)),
+            levels,
+            scale: modulation.scale,
+            stages: vec![
+                ("layers", waved - start),
+                ("propagate", propagate),
+                ("encode", modulation.encode),
+            ],
+            engine: None,
+        })
+    }
+
+    fn scale(&self) -> Scale {
+        self.scale.map_or(Scale::Max, Scale::Fixed)
+    }
+
+    fn report(&self, json: bool, made: &Made) {
+        let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        let stages: serde_json::Map<_, _> = (made.stages.iter())
+            .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
+            .collect();
+        let total: Duration = made.stages.iter().map(|(_, time)| *time).sum();
+        let (_, height, width) = made.levels.dim();
+        let list: Vec<_> = (made.stages.iter())
+            .map(|(stage, time)| format!("{stage} {:.1} ms", ms(time)))
+            .collect();
+        super::print(
+            json,
+            &json!({
+                "output": self.output, "complex": self.complex, "width": width, "height": height,
+                "scale": made.scale, "engine": made.engine, "stage_ms": stages, "total_ms": ms(&total),
+            }),
+            format!(
+                "{}: {width}×{height}, {}",
+                self.output.display(),
+                list.join(", ")
+            ),
+        );
+    }
+}
+
+fn slices<'a>(
+    field: &'a mut Array3<Complex32>,
+    levels: &'a mut Array3<u8>,
+) -> (&'a mut [Complex32], &'a mut [u8]) {
+    (
+        field.as_slice_mut().expect("standard layout"),
+        levels.as_slice_mut().expect("standard layout"),
+    )
+}
+
+fn stack(values: Vec<Complex32>, height: usize, width: usize) -> Array3<Complex32> {
+    Array3::from_shape_vec((3, height, width), values).expect("a stack of the frame's shape")
+}
+
+/// An RGB-D frame as a layered depth image of one layer.
+fn single_layer(frame: &RgbdFrame) -> Result<Ldi> {
+    Ldi::new(vec![LdiLayer {
+        rgb: frame.rgb().to_owned(),
+        depth: frame.depth().to_owned(),
+    }])
+}

@@ -1,0 +1,208 @@
+//! Data sets: pairs of a random scene's layered depth image and its hologram by SM-LBM, in files
+//! that NumPy opens.
+//!
+//! A folder holds `manifest.json` and a `pair_000123.npz` for each scene with the arrays `rgb`, uint8
+//! (L, H, W, 4), RGBA, front first, alpha 0 where there is no hit; `depth`, uint16 (L, H, W), d·65535;
+//! and `hologram`, complex64 (3, H, W), at the midpoint, carrier left out.
+//!
+//! A pair is written beside its place and renamed into it, so that one that is there is whole. A data
+//! set is resumed by making it again: pairs that are there are kept. Shards write into one folder
+//! or into several that are joined by copying.
+
+use crate::error::{Error, Result};
+use crate::files;
+use crate::ldi::Ldi;
+use crate::{scene, sm_lbm};
+use ndarray::{Array3, Array4};
+use ndarray_npy::NpzWriter;
+use num_complex::Complex32;
+use phasefront::Display;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// The first words of a manifest: what reads it knows what follows.
+const FORMAT: &str = "phasefront-dataset-1";
+
+/// Every parameter of a data set: two that are equal hold the same bytes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    format: String,
+    /// How many pairs.
+    pub scenes: usize,
+    /// Height and width of a scene, pixels.
+    pub size: usize,
+    /// Planes of SM-LBM.
+    pub planes: usize,
+    /// Layers of an LDI.
+    pub ldi_layers: usize,
+    /// Scene i is [`scene::random_scene`] of seed·2³² + i.
+    pub seed: u64,
+    /// The display that the holograms are for.
+    pub display: Display,
+    /// Which pairs are for what.
+    pub splits: Splits,
+}
+
+/// Half-open ranges of pair indices.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Splits {
+    /// To train on.
+    pub train: [usize; 2],
+    /// To choose by.
+    pub validation: [usize; 2],
+    /// To judge by, once.
+    pub test: [usize; 2],
+}
+
+impl Manifest {
+    /// A data set of `scenes` pairs, split as the paper's 3800/100/100.
+    ///
+    /// # Errors
+    /// A parameter that gives no data set.
+    pub fn new(
+        scenes: usize,
+        size: usize,
+        planes: usize,
+        ldi_layers: usize,
+        seed: u64,
+        display: Display,
+    ) -> Result<Self> {
+        for (name, value, most) in [
+            ("scenes", scenes, 1_000_000),
+            ("size", size, 4096),
+            ("planes", planes, 1_000_000),
+            ("ldi-layers", ldi_layers, 64),
+            ("seed", seed as usize + 1, u32::MAX as usize + 1),
+        ] {
+            if !(1..=most).contains(&value) {
+                return Err(Error::Input(format!(
+                    "--{name} is out of range; it must lie in {}..={}",
+                    usize::from(name != "seed"),
+                    most - usize::from(name == "seed"),
+                )));
+            }
+        }
+        let held_out = scenes / 40;
+        let (validation, test) = (scenes - 2 * held_out, scenes - held_out);
+        Ok(Manifest {
+            format: FORMAT.into(),
+            scenes,
+            size,
+            planes,
+            ldi_layers,
+            seed,
+            display,
+            splits: Splits {
+                train: [0, validation],
+                validation: [validation, test],
+                test: [test, scenes],
+            },
+        })
+    }
+
+    /// Reads the manifest of the data set in `dir`.
+    ///
+    /// # Errors
+    /// No manifest, or one that is not of this format.
+    pub fn read(dir: &Path) -> Result<Self> {
+        let path = dir.join("manifest.json");
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        let manifest: Manifest = serde_json::from_str(&text).map_err(|e| Error::file(&path, e))?;
+        if manifest.format != FORMAT {
+            return Err(Error::file(
+                path,
+                format!("format is {:?}; it must be {FORMAT:?}", manifest.format),
+            ));
+        }
+        Ok(manifest)
+    }
+
+    /// The seed of scene `index`.
+    pub fn scene_seed(&self, index: usize) -> u64 {
+        (self.seed << 32) + index as u64
+    }
+
+    /// The file of pair `index` in `dir`.
+    pub fn pair_path(dir: &Path, index: usize) -> PathBuf {
+        dir.join(format!("pair_{index:06}.npz"))
+    }
+}
+
+/// Makes the pairs of `manifest` that are in `shard` (of all pairs, or i/n of them: those whose index is i
+/// modulo n) and not in `dir` yet. `made` hears of each that is there.
+///
+/// # Errors
+/// A folder that holds another data set, or that cannot be written.
+pub fn make(
+    manifest: &Manifest,
+    dir: &Path,
+    (shard, shards): (usize, usize),
+    made: &(dyn Fn() + Sync),
+) -> Result<()> {
+    std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
+    let place = dir.join("manifest.json");
+    if place.exists() {
+        if Manifest::read(dir)? != *manifest {
+            return Err(Error::file(
+                place,
+                "the folder holds a data set of other parameters; choose another folder or the same parameters",
+            ));
+        }
+    } else {
+        let mut text = serde_json::to_vec_pretty(manifest).map_err(|e| Error::file(&place, e))?;
+        text.push(b'\n');
+        files::write_atomically(&place, |file| std::io::Write::write_all(file, &text))?;
+    }
+    // In order, so that what a stopped run leaves is a beginning.
+    let mine: Range<usize> = 0..manifest.scenes.saturating_sub(shard).div_ceil(shards);
+    mine.par_bridge().try_for_each(|i| {
+        let index = i * shards + shard;
+        let path = Manifest::pair_path(dir, index);
+        if !path.exists() {
+            let scene =
+                scene::random_scene(manifest.scene_seed(index), manifest.size, manifest.size);
+            let ldi = scene::render_ldi_reference(
+                &scene,
+                manifest.size,
+                manifest.size,
+                manifest.ldi_layers,
+            )?
+            .quantized();
+            let hologram = sm_lbm::hologram(&ldi, &manifest.display, manifest.planes, &|_, _| {})?;
+            write_pair(&path, &ldi, &hologram)?;
+        }
+        made();
+        Ok(())
+    })
+}
+
+/// Writes one pair.
+fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()> {
+    let (height, width) = ldi.shape();
+    let layers = ldi.layers.len();
+    let rgb = Array4::from_shape_fn((layers, height, width, 4), |(l, y, x, c)| {
+        let layer = &ldi.layers[l];
+        match (layer.depth[(y, x)].is_nan(), c) {
+            (true, _) => 0,
+            (false, 3) => 255,
+            (false, c) => (layer.rgb[(c, y, x)] * 255.0).round() as u8,
+        }
+    });
+    let depth = Array3::from_shape_fn((layers, height, width), |(l, y, x)| {
+        let d = ldi.layers[l].depth[(y, x)];
+        match d.is_nan() {
+            true => u16::MAX,
+            false => (d * 65535.0).round() as u16,
+        }
+    });
+    files::write_atomically(path, |file| {
+        let mut npz = NpzWriter::new_compressed(file);
+        npz.add_array("rgb", &rgb)
+            .and_then(|()| npz.add_array("depth", &depth))
+            .and_then(|()| npz.add_array("hologram", hologram))
+            .and_then(|()| npz.finish().map(drop))
+            .map_err(std::io::Error::other)
+    })
+}

@@ -1,0 +1,384 @@
+//! The files of the laboratory: images in, holograms out and back. LDI folders are [`crate::ldi`]'s, data
+//! sets [`crate::dataset`]'s.
+//!
+//! What is written is whole: it is written beside its place and renamed into it.
+
+use crate::error::{Error, Result};
+use image::{DynamicImage, ImageReader};
+use ndarray::{Array2, Array3, ArrayView3};
+use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::slm::Response;
+use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Name of the PNG text chunk that holds a [`HologramInfo`].
+const PNG_CHUNK: &str = "phasefront";
+
+/// What is needed to look at a hologram again; it travels with the file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct HologramInfo {
+    /// The display it was made for; the hologram stands at its offset.
+    pub display: Display,
+    /// How the field became phases; absent for a complex hologram.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub encoder: Option<String>,
+    /// The amplitude that full light stands for; absent for a complex hologram.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scale: Option<f32>,
+    /// The modulator's look-up table, if it is not linear: the level of each of 256 phase steps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lut: Option<Vec<u8>>,
+}
+
+impl HologramInfo {
+    /// The modulator's response.
+    ///
+    /// # Errors
+    /// A table that has not 256 entries.
+    pub fn response(&self) -> Result<Response> {
+        match &self.lut {
+            None => Ok(Response::linear(self.display.bits())?),
+            Some(lut) => Ok(Response::lut(lut_of(lut)?)),
+        }
+    }
+}
+
+fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
+    levels.try_into().map_err(|_| {
+        Error::Input(format!(
+            "the look-up table has {} entries; it must have 256",
+            levels.len()
+        ))
+    })
+}
+
+/// A hologram as a file holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Hologram {
+    /// Modulator levels, (3, H, W).
+    PhaseOnly(Array3<u8>, HologramInfo),
+    /// A complex field, (3, H, W).
+    Complex(Array3<Complex32>, HologramInfo),
+}
+
+/// Opens the file at a temporary place beside `path`, lets `write` fill it, and renames it to `path`.
+///
+/// # Errors
+/// Whatever goes wrong, naming `path`; what was there is left as it was.
+pub fn write_atomically(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
+) -> Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let refuse = |e: std::io::Error| Error::file(path, format!("cannot be written: {e}"));
+    if path.is_dir() {
+        return Err(Error::file(path, "is a folder; a file's name is needed"));
+    }
+    let mut temporary = tempfile::Builder::new()
+        .prefix(".phasefront-")
+        .tempfile_in(folder)
+        .map_err(refuse)?;
+    let mut buffer = BufWriter::new(temporary.as_file_mut());
+    write(&mut buffer)
+        .and_then(|()| buffer.flush())
+        .map_err(refuse)?;
+    drop(buffer);
+    #[cfg(unix)]
+    {
+        // A temporary file is its owner's alone; the file itself is as any other that is created.
+        use std::os::unix::fs::PermissionsExt;
+        let mode = std::fs::Permissions::from_mode(0o644);
+        temporary.as_file().set_permissions(mode).map_err(refuse)?;
+    }
+    temporary.persist(path).map_err(|e| refuse(e.error))?;
+    Ok(())
+}
+
+fn open_image(path: &Path) -> Result<DynamicImage> {
+    ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?
+        .decode()
+        .map_err(|e| Error::file(path, format!("is not a whole PNG or JPEG image: {e}")))
+}
+
+/// The amplitudes of an image, (3, H, W) in \[0, 1]. Grey images have three equal colours; alpha is left out.
+///
+/// # Errors
+/// A file that is missing, cut short, or not a PNG or JPEG.
+pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
+    let image = open_image(path)?.into_rgb32f();
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let pixels = image.into_raw();
+    Ok(Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+        pixels[3 * (y * width + x) + c].clamp(0.0, 1.0)
+    }))
+}
+
+/// The numbers of a depth image, (H, W), as they stand in a grey PNG of 8 or 16 bits or a 2D `.npy`. For
+/// `normalized` depth whole numbers are divided by the largest their type holds.
+///
+/// # Errors
+/// A file that is missing, cut short, or of another kind.
+pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
+    if has_extension(path, "npy") {
+        return read_depth_npy(path, normalized);
+    }
+    let image = open_image(path)?;
+    let over = |most: f32| if normalized { most } else { 1.0 };
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let values: Vec<f32> = match image {
+        DynamicImage::ImageLuma8(grey) => {
+            let over = over(255.0);
+            grey.into_raw()
+                .into_iter()
+                .map(|v| f32::from(v) / over)
+                .collect()
+        }
+        DynamicImage::ImageLuma16(grey) => {
+            let over = over(65535.0);
+            grey.into_raw()
+                .into_iter()
+                .map(|v| f32::from(v) / over)
+                .collect()
+        }
+        other => {
+            return Err(Error::file(
+                path,
+                format!(
+                    "holds {:?} pixels; depth must be a grey PNG of 8 or 16 bits or a .npy",
+                    other.color()
+                ),
+            ));
+        }
+    };
+    Array2::from_shape_vec((height, width), values).map_err(|e| Error::file(path, e))
+}
+
+fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
+    let read = |_: ()| -> Result<BufReader<File>> {
+        let file =
+            File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+        Ok(BufReader::new(file))
+    };
+    let over = |most: f32| if normalized { most } else { 1.0 };
+    if let Ok(depth) = Array2::<f32>::read_npy(read(())?) {
+        return Ok(depth);
+    }
+    if let Ok(depth) = Array2::<f64>::read_npy(read(())?) {
+        return Ok(depth.mapv(|v| v as f32));
+    }
+    if let Ok(depth) = Array2::<u16>::read_npy(read(())?) {
+        return Ok(depth.mapv(|v| f32::from(v) / over(65535.0)));
+    }
+    Array2::<u8>::read_npy(read(())?)
+        .map(|depth| depth.mapv(|v| f32::from(v) / over(255.0)))
+        .map_err(|_| {
+            Error::file(
+                path,
+                "is not a whole .npy of shape (H, W) and type float32, float64, uint16 or uint8",
+            )
+        })
+}
+
+/// Writes amplitudes, (3, H, W), as an 8-bit RGB PNG; what is over 1 is white.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
+    let bytes = amplitude_bytes(amplitude);
+    let (_, height, width) = amplitude.dim();
+    write_png(path, width, height, &bytes, None)
+}
+
+/// Amplitudes, (3, H, W), as rows of RGB bytes.
+pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
+    interleaved(amplitude, |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
+    let pixels = stack.permuted_axes([1, 2, 0]);
+    pixels.iter().map(|v| byte(*v)).collect()
+}
+
+fn write_png(
+    path: &Path,
+    width: usize,
+    height: usize,
+    rgb: &[u8],
+    info: Option<&HologramInfo>,
+) -> Result<()> {
+    let text = info
+        .map(serde_json::to_string)
+        .transpose()
+        .map_err(|e| Error::file(path, e))?;
+    write_atomically(path, |file| {
+        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let other = std::io::Error::other;
+        if let Some(text) = text {
+            encoder
+                .add_text_chunk(PNG_CHUNK.into(), text)
+                .map_err(other)?;
+        }
+        let mut writer = encoder.write_header().map_err(other)?;
+        writer.write_image_data(rgb).map_err(other)?;
+        writer.finish().map_err(other)
+    })
+}
+
+/// Writes a phase-only hologram, (3, H, W), as an 8-bit RGB PNG of levels that carries `info`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_phase_only(
+    path: &Path,
+    levels: ArrayView3<'_, u8>,
+    info: &HologramInfo,
+) -> Result<()> {
+    let (_, height, width) = levels.dim();
+    write_png(path, width, height, &interleaved(levels, |v| v), Some(info))
+}
+
+/// Writes a complex hologram, (3, H, W), as a `.npy` of complex64 with `info` in `NAME.json` beside it.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_complex(
+    path: &Path,
+    field: ArrayView3<'_, Complex32>,
+    info: &HologramInfo,
+) -> Result<()> {
+    write_atomically(path, |file| {
+        field.write_npy(file).map_err(std::io::Error::other)
+    })?;
+    let beside = path.with_extension("json");
+    let text = serde_json::to_string_pretty(info).map_err(|e| Error::file(&beside, e))?;
+    write_atomically(&beside, |file| writeln!(file, "{text}"))
+}
+
+/// Reads a hologram: a PNG of levels that carries its [`HologramInfo`], or a `.npy` with its `.json`.
+///
+/// # Errors
+/// A file that is missing or cut short, or an image that is no hologram of ours.
+pub fn read_hologram(path: &Path) -> Result<Hologram> {
+    if has_extension(path, "npy") {
+        let file =
+            File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+        let field = Array3::<Complex32>::read_npy(BufReader::new(file)).map_err(|e| {
+            Error::file(
+                path,
+                format!("is not a whole complex64 .npy of shape (3, H, W): {e}"),
+            )
+        })?;
+        if field.dim().0 != 3 || field.is_empty() {
+            return Err(Error::file(
+                path,
+                format!("has shape {:?}; it must be (3, H, W)", field.dim()),
+            ));
+        }
+        let beside = path.with_extension("json");
+        let text = std::fs::read_to_string(&beside).map_err(|e| {
+            Error::file(&beside, format!("is needed beside {}: {e}", path.display()))
+        })?;
+        let info = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
+        return Ok(Hologram::Complex(
+            field.as_standard_layout().into_owned(),
+            info,
+        ));
+    }
+    let info = read_info(path)?.ok_or_else(|| {
+        Error::file(
+            path,
+            "carries no `phasefront` text chunk; it must be a hologram PNG as written by `phasefront hologram`",
+        )
+    })?;
+    let image = open_image(path)?;
+    let DynamicImage::ImageRgb8(image) = image else {
+        return Err(Error::file(path, "is not an 8-bit RGB image of levels"));
+    };
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let bytes = image.into_raw();
+    let levels = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+        bytes[3 * (y * width + x) + c]
+    });
+    Ok(Hologram::PhaseOnly(levels, info))
+}
+
+/// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
+fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
+    let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else {
+        return Ok(None);
+    };
+    let chunks = &reader.info().uncompressed_latin1_text;
+    match chunks.iter().find(|chunk| chunk.keyword == PNG_CHUNK) {
+        None => Ok(None),
+        Some(chunk) => serde_json::from_str(&chunk.text)
+            .map(Some)
+            .map_err(|e| Error::file(path, format!("its `phasefront` text chunk is broken: {e}"))),
+    }
+}
+
+/// Whether `path` holds a hologram of ours rather than a picture.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn is_hologram(path: &Path) -> Result<bool> {
+    Ok(has_extension(path, "npy") || read_info(path)?.is_some())
+}
+
+/// A display file and what it refers to.
+#[derive(Debug, Clone)]
+pub struct DisplayFile {
+    /// The physics.
+    pub display: Display,
+    /// The modulator's table, where it is calibrated.
+    pub lut: Option<[u8; 256]>,
+}
+
+/// Reads a display's TOML. A key `lut` names a text file of 256 levels, relative to it.
+///
+/// # Errors
+/// A file that is missing or says what cannot be.
+pub fn read_display(path: &Path) -> Result<DisplayFile> {
+    let read = |path: &Path| {
+        std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))
+    };
+    let text = read(path)?;
+    let mut table: toml::Table = toml::from_str(&text)
+        .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let lut_path: Option<PathBuf> = match table.remove("lut") {
+        None => None,
+        Some(toml::Value::String(name)) => Some(path.with_file_name(name)),
+        Some(_) => return Err(Error::file(path, "lut must be the name of a file")),
+    };
+    let display = Display::deserialize(table)
+        .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let lut = match lut_path {
+        None => None,
+        Some(path) => {
+            let levels: std::result::Result<Vec<u8>, _> =
+                read(&path)?.split_whitespace().map(str::parse).collect();
+            let levels = levels.map_err(|e| {
+                Error::file(&path, format!("holds what is no level of 0..=255: {e}"))
+            })?;
+            Some(lut_of(&levels).map_err(|e| Error::file(&path, e))?)
+        }
+    };
+    Ok(DisplayFile { display, lut })
+}
+
+/// Whether the name of `path` ends in `.extension`.
+pub fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case(extension))
+}

@@ -1,0 +1,65 @@
+//! The networks that come with the command, and those of files.
+
+use crate::error::{Error, Result};
+use phasefront::Network;
+use std::path::Path;
+
+/// A network of `models/` that the command holds.
+#[derive(Debug)]
+pub struct Built {
+    /// Convolution layers: its name for `--network`.
+    pub layers: usize,
+    /// Whether it is the quantized one.
+    pub int8: bool,
+    onnx: &'static [u8],
+}
+
+/// What comes along.
+pub const BUILT_IN: &[Built] = &[
+    Built {
+        layers: 8,
+        int8: false,
+        onnx: include_bytes!("../../models/rgbd-8.onnx"),
+    },
+    Built {
+        layers: 8,
+        int8: true,
+        onnx: include_bytes!("../../models/rgbd-8-int8.onnx"),
+    },
+];
+
+/// Reads a network that comes along.
+///
+/// # Errors
+/// Never, for the files in `models/` are tested.
+pub fn built_in(built: &Built) -> Result<Network> {
+    Ok(Network::from_onnx(built.onnx)?)
+}
+
+/// The network called `name`: its number of layers, where one comes along in that precision, or an ONNX
+/// file, whose precision is its own.
+///
+/// # Errors
+/// A name that is neither, or a file that is no hologram network.
+pub fn network(name: &str, int8: bool) -> Result<Network> {
+    let named = |built: &&Built| built.layers.to_string() == name && built.int8 == int8;
+    if let Some(built) = BUILT_IN.iter().find(named) {
+        return built_in(built);
+    }
+    let path = Path::new(name);
+    let bytes = std::fs::read(path).map_err(|e| {
+        let mut names: Vec<_> = BUILT_IN
+            .iter()
+            .map(|built| built.layers.to_string())
+            .collect();
+        names.dedup();
+        Error::file(
+            path,
+            format!(
+                "is neither a file that can be read ({e}) nor a network that comes along ({})",
+                names.join(", ")
+            ),
+        )
+    })?;
+    Network::from_onnx(&bytes).map_err(|e| Error::file(path, e))
+}

@@ -1,0 +1,527 @@
+//! The command as a user runs it: what it makes, and one line for each thing that is wrong.
+#![allow(clippy::unwrap_used)]
+
+use ndarray::{Array2, Array3, s};
+use ndarray_npy::WriteNpyExt;
+use phasefront_lab::{files, metrics};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const SAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../samples");
+const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../models");
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Folder(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs the command in this folder.
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args(arguments)
+            .current_dir(self.0.path())
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap()
+    }
+
+    fn succeeds(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// The command fails with `code` and one line that holds each of `words`; it leaves no file behind.
+    fn refuses(&self, arguments: &[&str], code: i32, words: &[&str]) {
+        let before = self.files();
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
+        if code == 1 {
+            let last = errors.lines().last().unwrap_or_default();
+            assert!(last.starts_with("error: "), "{arguments:?}: {errors}");
+            assert_eq!(
+                errors.lines().filter(|l| l.starts_with("error")).count(),
+                1,
+                "{errors}"
+            );
+        }
+        for word in words {
+            assert!(
+                errors.contains(word),
+                "{arguments:?}: no {word:?} in {errors}"
+            );
+        }
+        assert!(!errors.contains("panicked"), "{errors}");
+        assert_eq!(self.files(), before, "{arguments:?} left a file behind");
+    }
+
+    fn files(&self) -> Vec<PathBuf> {
+        let mut files: Vec<_> = fs::read_dir(self.0.path())
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .collect();
+        files.sort();
+        files
+    }
+
+    /// A small frame: `rgb.png` and `depth.png`.
+    fn with_frame(self) -> Self {
+        let rgb = image::RgbImage::from_fn(48, 32, |x, y| {
+            image::Rgb([(x * 5) as u8, (y * 7) as u8, 90])
+        });
+        rgb.save(self.path("rgb.png")).unwrap();
+        let depth =
+            image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 30 } else { 220 }]));
+        depth.save(self.path("depth.png")).unwrap();
+        self
+    }
+
+    fn depth_npy(&self, name: &str, depth: &Array2<f32>) {
+        depth
+            .write_npy(File::create(self.path(name)).unwrap())
+            .unwrap();
+    }
+}
+
+const FRAME: [&str; 5] = ["hologram", "--rgb", "rgb.png", "--depth", "depth.png"];
+
+fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    FRAME.iter().chain(more).copied().collect()
+}
+
+fn psnr(
+    a: &Array3<f32>,
+    b: &Array3<f32>,
+    y: std::ops::Range<usize>,
+    x: std::ops::Range<usize>,
+) -> f64 {
+    let part = s![.., y, x];
+    metrics::compare(a.slice(part), b.slice(part))
+        .unwrap()
+        .psnr_overall
+}
+
+#[test]
+fn a_hologram_travels_with_all_that_refocus_needs() {
+    let folder = Folder::new().with_frame();
+    fs::write(
+        folder.path("display.toml"),
+        "pitch_um = 8\noffset_mm = 3\nlut = \"lut.txt\"",
+    )
+    .unwrap();
+    let lut: String = (0..256).map(|i| format!("{}\n", 255 - i)).collect();
+    fs::write(folder.path("lut.txt"), lut).unwrap();
+    for method in ["network", "layers"] {
+        folder.succeeds(&with(&[
+            "--method",
+            method,
+            "--display",
+            "display.toml",
+            "--complex",
+            "h.npy",
+            "-o",
+            "h.png",
+        ]));
+        folder.succeeds(&["refocus", "h.png", "--z-mm", "1", "-o", "view.png"]);
+        folder.succeeds(&["refocus", "h.npy", "--z-mm", "1", "-o", "field.png"]);
+        let view = files::read_rgb(&folder.path("view.png")).unwrap();
+        let field = files::read_rgb(&folder.path("field.png")).unwrap();
+        let alike = psnr(&view, &field, 4..28, 4..44);
+        assert!(
+            alike > 20.0,
+            "{method}: phase-only and complex differ: {alike} dB"
+        );
+    }
+}
+
+#[test]
+fn json_is_one_object_on_stdout() {
+    let folder = Folder::new().with_frame();
+    let made: serde_json::Value =
+        serde_json::from_str(&folder.succeeds(&with(&["-o", "h.png", "--json"]))).unwrap();
+    assert_eq!(made["width"], 48);
+    for stage in ["network", "propagate", "encode"] {
+        assert!(made["stage_ms"][stage].is_number(), "{made}");
+    }
+    let compared: serde_json::Value =
+        serde_json::from_str(&folder.succeeds(&["compare", "rgb.png", "rgb.png", "--json"]))
+            .unwrap();
+    assert_eq!(compared["ssim_overall"], 1.0);
+    let scene = folder.succeeds(&[
+        "scene", "--seed", "1", "--size", "64x48", "-o", "s", "--json",
+    ]);
+    let scene: serde_json::Value = serde_json::from_str(&scene).unwrap();
+    assert_eq!(scene["hits"].as_array().unwrap().len(), 5);
+}
+
+#[test]
+fn scenes_and_stacks_are_written_and_read_back() {
+    let folder = Folder::new();
+    for name in ["a", "b"] {
+        folder.succeeds(&[
+            "scene", "--seed", "5", "--size", "61x47", "--layers", "3", "-o", name,
+        ]);
+    }
+    for file in ["layer_0.png", "depth_0.png", "layer_2.png"] {
+        assert_eq!(
+            fs::read(folder.path("a").join(file)).unwrap(),
+            fs::read(folder.path("b").join(file)).unwrap()
+        );
+    }
+    folder.succeeds(&["hologram", "--ldi", "a", "--planes", "20", "-o", "h.png"]);
+    folder.succeeds(&["refocus", "h.png", "--stack", "3", "-o", "stack"]);
+    assert_eq!(fs::read_dir(folder.path("stack")).unwrap().count(), 3);
+    folder.succeeds(&[
+        "refocus",
+        "h.png",
+        "--stack",
+        "3",
+        "--gif",
+        "-o",
+        "stack.gif",
+    ]);
+    assert!(
+        fs::read(folder.path("stack.gif"))
+            .unwrap()
+            .starts_with(b"GIF89a")
+    );
+}
+
+#[test]
+fn the_object_in_focus_matches_the_sample_there_and_not_elsewhere() {
+    let folder = Folder::new();
+    let rgb = format!("{SAMPLES}/scene_rgb.jpg");
+    let depth = format!("{SAMPLES}/scene_depth.png");
+    folder.succeeds(&[
+        "hologram",
+        "--rgb",
+        &rgb,
+        "--depth",
+        &depth,
+        "--method",
+        "layers",
+        "--planes",
+        "48",
+        "--encoder",
+        "anti-alias",
+        "--complex",
+        "h.npy",
+        "-o",
+        "h.png",
+    ]);
+    let image = files::read_rgb(Path::new(&rgb)).unwrap();
+    // The board with the text stands at d ≈ 0.1, the clock on the wall at d ≈ 0.92.
+    let (near, far) = ("2.38", "-2.5");
+    let board = (580..860, 130..600);
+    let clock = (200..400, 1480..1680);
+    for hologram in ["h.npy", "h.png"] {
+        let view = |z| {
+            folder.succeeds(&["refocus", hologram, "--z-mm", z, "-o", "view.png"]);
+            files::read_rgb(&folder.path("view.png")).unwrap()
+        };
+        let (near, far) = (view(near), view(far));
+        for (what, at, sharp, blurred) in [
+            ("board", &board, &near, &far),
+            ("clock", &clock, &far, &near),
+        ] {
+            let sharp = psnr(sharp, &image, at.0.clone(), at.1.clone());
+            let blurred = psnr(blurred, &image, at.0.clone(), at.1.clone());
+            assert!(
+                sharp > blurred + 5.0,
+                "{hologram} {what}: {sharp:.2} dB in focus, {blurred:.2} dB out of it"
+            );
+        }
+    }
+}
+
+#[test]
+fn real_captures_are_filled_and_shown() {
+    let tum = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/tum");
+    if !tum.is_dir() {
+        println!("skipped: the captured frames are not beside the project");
+        return;
+    }
+    let folder = Folder::new();
+    let (rgb, depth) = (tum.join("color.png"), tum.join("depth.png"));
+    for method in ["network", "layers"] {
+        folder.succeeds(&[
+            "hologram",
+            "--rgb",
+            rgb.to_str().unwrap(),
+            "--depth",
+            depth.to_str().unwrap(),
+            "--depth-unit",
+            "raw",
+            "--depth-scale",
+            "5000",
+            "--method",
+            method,
+            "--planes",
+            "16",
+            "-o",
+            "h.png",
+        ]);
+        folder.succeeds(&["refocus", "h.png", "--z-mm", "-2", "-o", "view.png"]);
+    }
+}
+
+#[test]
+fn depth_of_another_size_is_resampled_with_a_warning() {
+    let folder = Folder::new().with_frame();
+    let depth = image::GrayImage::from_pixel(24, 16, image::Luma([128]));
+    depth.save(folder.path("depth.png")).unwrap();
+    let output = folder.run(&with(&["-o", "h.png"]));
+    assert!(output.status.success());
+    let warnings = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        warnings.contains("warn") && warnings.contains("24×16"),
+        "{warnings}"
+    );
+}
+
+#[test]
+fn bad_input_is_one_line_and_leaves_nothing_behind() {
+    let folder = Folder::new().with_frame();
+    let out = ["-o", "h.png"];
+    let hologram = |rgb: &'static str, depth: &'static str| {
+        vec!["hologram", "--rgb", rgb, "--depth", depth, "-o", "h.png"]
+    };
+    folder.refuses(
+        &hologram("none.png", "depth.png"),
+        1,
+        &["none.png", "cannot be read"],
+    );
+    let whole = fs::read(folder.path("rgb.png")).unwrap();
+    fs::write(folder.path("short.png"), &whole[..whole.len() / 2]).unwrap();
+    folder.refuses(
+        &hologram("short.png", "depth.png"),
+        1,
+        &["short.png", "whole"],
+    );
+    fs::write(folder.path("empty.png"), []).unwrap();
+    folder.refuses(&hologram("empty.png", "depth.png"), 1, &["empty.png"]);
+    folder.refuses(&hologram("rgb.png", "rgb.png"), 1, &["rgb.png", "grey"]);
+    image::GrayImage::new(40, 40)
+        .save(folder.path("square.png"))
+        .unwrap();
+    folder.refuses(&hologram("rgb.png", "square.png"), 1, &["aspect"]);
+
+    let mut depth = Array2::from_elem((32, 48), 0.5f32);
+    depth[(3, 4)] = f32::INFINITY;
+    folder.depth_npy("infinite.npy", &depth);
+    folder.refuses(
+        &hologram("rgb.png", "infinite.npy"),
+        1,
+        &["infinite.npy", "inf"],
+    );
+    folder.depth_npy("nan.npy", &Array2::from_elem((32, 48), f32::NAN));
+    folder.refuses(
+        &hologram("rgb.png", "nan.npy"),
+        1,
+        &["nan.npy", "no reading"],
+    );
+    folder.depth_npy("metres.npy", &Array2::from_elem((32, 48), 2.0));
+    folder.refuses(
+        &hologram("rgb.png", "metres.npy"),
+        1,
+        &["metres.npy", "unit"],
+    );
+    folder.depth_npy("nothing.npy", &Array2::zeros((0, 0)));
+    folder.refuses(&hologram("rgb.png", "nothing.npy"), 1, &["nothing.npy"]);
+    depth[(3, 4)] = f32::NAN;
+    folder.depth_npy("hole.npy", &depth);
+    folder.succeeds(&[
+        "hologram", "--rgb", "rgb.png", "--depth", "hole.npy", "-o", "hole.png",
+    ]);
+    depth[(3, 4)] = f32::INFINITY;
+    folder.depth_npy("hole.npy", &depth);
+    folder.succeeds(&[
+        "hologram",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "hole.npy",
+        "--depth-unit",
+        "m",
+        "-o",
+        "hole.png",
+    ]);
+
+    folder.refuses(
+        &with(&["--offset-mm", "9000", out[0], out[1]]),
+        1,
+        &["9000", "smaller"],
+    );
+    folder.refuses(
+        &with(&["--offset-mm", "nan", out[0], out[1]]),
+        1,
+        &["offset_mm"],
+    );
+    folder.refuses(
+        &with(&["--method", "layers", "--planes", "0", out[0], out[1]]),
+        1,
+        &["plane"],
+    );
+    folder.refuses(&with(&["--scale", "0", out[0], out[1]]), 1, &["scale"]);
+    folder.refuses(
+        &with(&[
+            "--near",
+            "2",
+            "--far",
+            "1",
+            "--depth-unit",
+            "mm",
+            out[0],
+            out[1],
+        ]),
+        1,
+        &["range"],
+    );
+    folder.refuses(
+        &with(&["--depth-unit", "raw", out[0], out[1]]),
+        2,
+        &["--depth-scale"],
+    );
+    folder.refuses(
+        &with(&["-o", "missing/h.png"]),
+        1,
+        &["missing/h.png", "written"],
+    );
+    folder.refuses(&with(&["-o", "h.jpg"]), 1, &["h.jpg", ".png"]);
+    folder.refuses(&with(&["--nonsense"]), 2, &["--nonsense"]);
+    folder.refuses(&["hologram", "-o", "h.png"], 2, &["--rgb"]);
+
+    fs::write(folder.path("display.toml"), "pitch_um = 3.74").unwrap();
+    folder.refuses(
+        &with(&["--display", "display.toml", out[0], out[1]]),
+        1,
+        &["pitch", "3.740"],
+    );
+    fs::write(folder.path("display.toml"), "bits = 12").unwrap();
+    folder.refuses(
+        &with(&["--display", "display.toml", out[0], out[1]]),
+        1,
+        &["display.toml", "bits"],
+    );
+    fs::write(folder.path("display.toml"), "lut = \"lut.txt\"").unwrap();
+    folder.refuses(
+        &with(&["--display", "display.toml", out[0], out[1]]),
+        1,
+        &["lut.txt"],
+    );
+    fs::write(folder.path("lut.txt"), "1 2 3").unwrap();
+    folder.refuses(
+        &with(&["--display", "display.toml", out[0], out[1]]),
+        1,
+        &["lut.txt", "256"],
+    );
+
+    fs::write(folder.path("net.onnx"), b"not a network").unwrap();
+    folder.refuses(
+        &with(&["--network", "net.onnx", out[0], out[1]]),
+        1,
+        &["net.onnx"],
+    );
+    let model = fs::read(format!("{MODELS}/rgbd-8.onnx")).unwrap();
+    fs::write(folder.path("net.onnx"), &model[..model.len() / 2]).unwrap();
+    folder.refuses(
+        &with(&["--network", "net.onnx", out[0], out[1]]),
+        1,
+        &["net.onnx"],
+    );
+    folder.refuses(
+        &with(&["--network", "9", out[0], out[1]]),
+        1,
+        &["9", "comes along"],
+    );
+
+    folder.refuses(
+        &["refocus", "rgb.png", "--z-mm", "0", "-o", "v.png"],
+        1,
+        &["rgb.png", "hologram"],
+    );
+    folder.refuses(&["refocus", "rgb.png", "-o", "v.png"], 2, &["--z-mm"]);
+    folder.refuses(
+        &["compare", "rgb.png", "square.png"],
+        1,
+        &["48×32", "40×40"],
+    );
+    folder.refuses(
+        &["scene", "--seed", "1", "--size", "0x5", "-o", "s"],
+        2,
+        &["WxH"],
+    );
+    folder.refuses(
+        &["hologram", "--ldi", "nowhere", "-o", "h.png"],
+        1,
+        &["nowhere"],
+    );
+}
+
+#[test]
+fn a_data_set_resumed_or_sharded_is_the_one_made_in_one_go() {
+    let folder = Folder::new();
+    let make = |name: &'static str, more: &[&'static str]| {
+        let mut arguments = vec![
+            "dataset",
+            "--scenes",
+            "6",
+            "--size",
+            "32",
+            "--planes",
+            "12",
+            "--ldi-layers",
+            "3",
+            "--seed",
+            "4",
+            "-o",
+            name,
+        ];
+        arguments.extend(more);
+        folder.succeeds(&arguments)
+    };
+    let contents = |name: &str| {
+        let mut files: Vec<_> = fs::read_dir(folder.path(name))
+            .unwrap()
+            .map(|e| e.unwrap().path())
+            .collect();
+        files.sort();
+        (files.iter())
+            .map(|path| {
+                (
+                    path.file_name().unwrap().to_owned(),
+                    fs::read(path).unwrap(),
+                )
+            })
+            .collect::<Vec<_>>()
+    };
+    make("whole", &[]);
+    assert_eq!(contents("whole").len(), 7);
+    for shard in ["0/4", "1/4", "2/4", "3/4"] {
+        make("shards", &["--shard", shard]);
+    }
+    assert!(contents("whole") == contents("shards"));
+    make("resumed", &[]);
+    fs::remove_file(folder.path("resumed/pair_000003.npz")).unwrap();
+    make("resumed", &[]);
+    assert!(contents("whole") == contents("resumed"));
+    folder.refuses(
+        &["dataset", "--scenes", "7", "--size", "32", "-o", "whole"],
+        1,
+        &["manifest.json", "other parameters"],
+    );
+    folder.refuses(
+        &["dataset", "--scenes", "7", "--shard", "4/4", "-o", "x"],
+        2,
+        &["i/n"],
+    );
+}

@@ -1,0 +1,453 @@
+//! int8 kernels for AMX: a tile instruction multiplies 16 filters by 16 pixels, 64 products each.
+//!
+//! The groups of four channels are the second operand's layout: a tile is 16 "lines" of 16 pixels, a line being one
+//! group at one tap. Lines of the three rows lie evenly spaced in memory whatever slot a row is in, so a tile of 16
+//! lines loads straight from the rows, once for each column tap, with the weights packed for each of the three turns
+//! of the ring. What is left of a column tap's lines over its tiles is gathered into a small panel. Sums are then
+//! requantised with AVX-512 while the tiles compute the next block.
+//!
+//! The tile instructions are inline assembly: their intrinsics are not stable.
+#![allow(unsafe_code)]
+
+use crate::OUTPUTS;
+use crate::avx2::{quantise_row, rescale_row};
+use crate::avx512_vnni::{self, Constants, check_rows, requantise, requantise_sum};
+use crate::int8::{GROUP, Kernels, Packed, Taps};
+use crate::wavefront::{BLOCK, Geometry, Window};
+use std::arch::asm;
+use std::arch::x86_64::*;
+use std::sync::OnceLock;
+
+/// Lines of a tile, and pixels of a line.
+const TILE: usize = 16;
+/// Filters computed together: a tile of 16 and one of 8.
+const FILTERS: usize = 24;
+/// Words of weights for one step: 16 words for each filter.
+const STEP_WORDS: usize = FILTERS * TILE;
+/// Most lines that a panel gathers: those left over three column taps, in whole tiles.
+const PANEL: usize = 48;
+
+/// The kernels, where the processor and the system have what they need.
+pub(crate) fn kernels() -> Option<Kernels> {
+    available().then_some(Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        offset: 0,
+        quantise_row,
+        rescale_row,
+    })
+}
+
+/// Whether the processor has AMX int8 and the system lets this process use it.
+pub(crate) fn available() -> bool {
+    static AVAILABLE: OnceLock<bool> = OnceLock::new();
+    *AVAILABLE.get_or_init(|| avx512_vnni::available() && has_tiles() && permitted())
+}
+
+fn has_tiles() -> bool {
+    // AMX-TILE and AMX-INT8 are bits 24 and 25 of EDX in leaf 7.
+    if __cpuid(0).eax < 7 || __cpuid_count(7, 0).edx >> 24 & 3 != 3 {
+        return false;
+    }
+    // Tile configuration and data: bits 17 and 18 of XCR0. AVX-512, found before, implies XGETBV.
+    let (low, _high): (u32, u32);
+    // SAFETY: XGETBV of register 0 reads; OSXSAVE is implied by AVX-512 in use.
+    unsafe {
+        asm!("xgetbv", in("ecx") 0, out("eax") low, out("edx") _high, options(nomem, nostack));
+    }
+    low >> 17 & 3 == 3
+}
+
+/// Asks Linux for the tile data state; elsewhere AMX is left alone.
+#[cfg(target_os = "linux")]
+fn permitted() -> bool {
+    const ARCH_PRCTL: i64 = 158;
+    const ARCH_REQ_XCOMP_PERM: i64 = 0x1023;
+    const TILE_DATA: i64 = 18;
+    let mut result = ARCH_PRCTL;
+    // SAFETY: the system call reads its two numbers and touches no memory of ours.
+    unsafe {
+        asm!("syscall", inlateout("rax") result, in("rdi") ARCH_REQ_XCOMP_PERM, in("rsi") TILE_DATA,
+            lateout("rcx") _, lateout("r11") _, options(nostack));
+    }
+    result == 0
+}
+
+#[cfg(not(target_os = "linux"))]
+fn permitted() -> bool {
+    false
+}
+
+/// How the lines of a layer's 3·`groups` groups and three column taps fall into tiles.
+struct Steps {
+    /// Whole tiles loaded straight from the rows, for each column tap.
+    direct: usize,
+    /// Lines of each column tap that the panel gathers.
+    left: usize,
+    /// Tiles of the panel.
+    panels: usize,
+}
+
+impl Steps {
+    fn new(groups: usize) -> Steps {
+        let lines = 3 * groups;
+        let left = lines % TILE;
+        Steps {
+            direct: lines / TILE,
+            left,
+            panels: (3 * left).div_ceil(TILE),
+        }
+    }
+
+    fn count(&self) -> usize {
+        3 * self.direct + self.panels
+    }
+
+    /// The (line, column tap) of each line of each step, in order; `None` where a panel's tile is not full.
+    fn lines(&self) -> Vec<Option<(usize, usize)>> {
+        let direct =
+            (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
+        let first = self.direct * TILE;
+        let panel =
+            (0..3).flat_map(|kx| (first..first + self.left).map(move |line| Some((line, kx))));
+        let mut lines: Vec<_> = direct.chain(panel).collect();
+        lines.resize(self.count() * TILE, None);
+        lines
+    }
+}
+
+/// `[24 filters][turn][step][filter][line]`, words of four weights; filters beyond the layer's have weight 0. For 16
+/// filters or fewer in a group the second, or the first, tile is never used.
+fn pack(taps: &Taps<'_>) -> Vec<i32> {
+    let groups = taps.groups();
+    let lines = Steps::new(groups).lines();
+    let mut words = Vec::new();
+    for first in (0..taps.outputs()).step_by(FILTERS) {
+        for turn in 0..3 {
+            for step in lines.chunks_exact(TILE) {
+                for filter in first..first + FILTERS {
+                    words.extend(step.iter().map(|line| match line {
+                        Some((line, kx)) => {
+                            // Slot 0 holds row `ky` with turn + ky ≡ 0 (mod 3).
+                            let ky = (line / groups + 3 - turn) % 3;
+                            i32::from_le_bytes(
+                                taps.group(filter, line % groups, ky, *kx).map(|w| w as u8),
+                            )
+                        }
+                        None => 0,
+                    }));
+                }
+            }
+        }
+    }
+    words
+}
+
+/// The tiles' shapes: 0 and 1 sums of 16 filters, 2 and 3 of 8; 4 and 5 their weights; 6 and 7 pixels.
+#[repr(C, align(64))]
+struct TileConfig {
+    palette: u8,
+    start_row: u8,
+    reserved: [u8; 14],
+    bytes_a_row: [u16; 16],
+    rows: [u8; 16],
+}
+
+static CONFIG: TileConfig = TileConfig {
+    palette: 1,
+    start_row: 0,
+    reserved: [0; 14],
+    bytes_a_row: [64, 64, 64, 64, 64, 64, 64, 64, 0, 0, 0, 0, 0, 0, 0, 0],
+    rows: [16, 16, 8, 8, 16, 8, 16, 16, 0, 0, 0, 0, 0, 0, 0, 0],
+};
+
+/// The sums of 24 filters at two lines of pixels.
+#[repr(C, align(64))]
+struct Sums([[[i32; TILE]; FILTERS]; 2]);
+
+/// Lines gathered for the tiles that are not loaded straight, for two lines of pixels.
+#[repr(C, align(64))]
+struct Panel([[[u8; TILE * GROUP]; PANEL]; 2]);
+
+/// A layer's biases as a tile of first sums.
+#[repr(C, align(64))]
+struct Biases([[i32; TILE]; FILTERS]);
+
+/// Runs `done(x, sums)` for every 32 pixels of `from..to`, with the sums of filters `first..first + 24`.
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn each_block(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    first: usize,
+    (from, to): (usize, usize),
+    geometry: Geometry,
+    mut done: impl FnMut(usize, &Sums),
+) {
+    let steps = Steps::new(layer.groups);
+    let stride = geometry.stride();
+    let rows = window.rows();
+    check_rows(&rows, layer.groups, geometry);
+    assert!(
+        window.slots.len() == 3 * layer.groups * stride
+            && to.next_multiple_of(2 * TILE) <= geometry.padded
+    );
+    let turn_words = steps.count() * STEP_WORDS;
+    let weights = &layer.weights[(first / FILTERS * 3 + window.first) * turn_words..][..turn_words];
+    let mut biases = Biases([[0; TILE]; FILTERS]);
+    for (line, bias) in biases.0.iter_mut().zip(&layer.bias[first..]) {
+        *line = [*bias; TILE];
+    }
+    let filters = (layer.outputs.next_multiple_of(8) - first).min(FILTERS);
+    let wide = filters >= 16;
+    let narrow = !filters.is_multiple_of(16);
+    let mut panel = Panel([[[0; TILE * GROUP]; PANEL]; 2]);
+    let mut sums = [
+        Sums([[[0; TILE]; FILTERS]; 2]),
+        Sums([[[0; TILE]; FILTERS]; 2]),
+    ];
+    let mut waiting: Option<usize> = None;
+    let mut current = 0;
+    // SAFETY: `kernels` has found the processor and the system willing. Every line read starts one pixel before the
+    // block at the earliest and ends 17 after at the latest, within a group's margins. Weights and biases have the
+    // tiles' shapes. Tiles are this thread's own between configuration and release, and `done` knows nothing of them.
+    unsafe {
+        asm!("ldtilecfg [{}]", in(reg) &raw const CONFIG, options(nostack, readonly));
+        for x in (from..to).step_by(2 * TILE) {
+            let pixels = window
+                .slots
+                .as_ptr()
+                .add(geometry.start() + x * GROUP - GROUP);
+            let left = pixels.add(steps.direct * TILE * stride);
+            for half in 0..2 {
+                for kx in 0..3 {
+                    for line in 0..steps.left {
+                        let from = left.add(line * stride + (kx + half * TILE) * GROUP);
+                        let to = &raw mut panel.0[half][kx * steps.left + line];
+                        _mm512_store_si512(to.cast(), _mm512_loadu_si512(from.cast()));
+                    }
+                }
+            }
+            let mut weight = weights.as_ptr();
+            start(&biases, wide, narrow);
+            for kx in 0..3 {
+                for tile in 0..steps.direct {
+                    let line = pixels.add(tile * TILE * stride + kx * GROUP);
+                    step(weight, [line, line.add(TILE * GROUP)], stride, wide, narrow);
+                    weight = weight.add(STEP_WORDS);
+                }
+            }
+            for tile in 0..steps.panels {
+                let lines = [0, 1].map(|half| panel.0[half][tile * TILE].as_ptr());
+                step(weight, lines, TILE * GROUP, wide, narrow);
+                weight = weight.add(STEP_WORDS);
+            }
+            // While the tiles compute, the previous block's sums are turned into values.
+            if let Some(x) = waiting.replace(x) {
+                done(x, &sums[1 - current]);
+            }
+            finish(&mut sums[current], wide, narrow);
+            current = 1 - current;
+        }
+        asm!("tilerelease", options(nostack, nomem));
+    }
+    if let Some(x) = waiting {
+        done(x, &sums[1 - current]);
+    }
+}
+
+/// Loads the biases as the first sums.
+///
+/// # Safety
+/// Tiles are configured.
+#[inline(always)]
+unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
+    let (first, second) = (
+        biases.0.as_ptr(),
+        biases.0[if wide { TILE } else { 0 }..].as_ptr(),
+    );
+    // SAFETY: 16 and 8 lines of 64 bytes lie there.
+    unsafe {
+        if wide {
+            asm!("tileloadd tmm0, [{b} + {s}]", "tileloadd tmm1, [{b} + {s}]",
+                b = in(reg) first, s = in(reg) 64usize, options(nostack, readonly));
+        }
+        if narrow {
+            asm!("tileloadd tmm2, [{b} + {s}]", "tileloadd tmm3, [{b} + {s}]",
+                b = in(reg) second, s = in(reg) 64usize, options(nostack, readonly));
+        }
+    }
+}
+
+/// Adds one tile of lines, for two lines of pixels, times its weights.
+///
+/// # Safety
+/// Tiles are configured; 24 lines of 64 bytes lie at `weights`, 16 lines `stride` bytes apart at each of `lines`.
+#[inline(always)]
+unsafe fn step(
+    weights: *const i32,
+    lines: [*const u8; 2],
+    stride: usize,
+    wide: bool,
+    narrow: bool,
+) {
+    // SAFETY: as the function's own.
+    unsafe {
+        asm!("tileloadd tmm6, [{a} + {s}]", "tileloadd tmm7, [{b} + {s}]",
+            a = in(reg) lines[0], b = in(reg) lines[1], s = in(reg) stride, options(nostack, readonly));
+        if wide {
+            asm!("tileloadd tmm4, [{w} + {s}]", "tdpbsud tmm0, tmm4, tmm6", "tdpbsud tmm1, tmm4, tmm7",
+                w = in(reg) weights, s = in(reg) 64usize, options(nostack, readonly));
+        }
+        if narrow {
+            let weights = weights.add(if wide { TILE * TILE } else { 0 });
+            asm!("tileloadd tmm5, [{w} + {s}]", "tdpbsud tmm2, tmm5, tmm6", "tdpbsud tmm3, tmm5, tmm7",
+                w = in(reg) weights, s = in(reg) 64usize, options(nostack, readonly));
+        }
+    }
+}
+
+/// Stores the sums.
+///
+/// # Safety
+/// Tiles are configured.
+#[inline(always)]
+unsafe fn finish(sums: &mut Sums, wide: bool, narrow: bool) {
+    let [first, second] = &mut sums.0;
+    let after = if wide { TILE } else { 0 };
+    // SAFETY: the lines of the tiles' shapes lie there.
+    unsafe {
+        if wide {
+            asm!("tilestored [{a} + {s}], tmm0", "tilestored [{b} + {s}], tmm1",
+                a = in(reg) first.as_mut_ptr(), b = in(reg) second.as_mut_ptr(), s = in(reg) 64usize,
+                options(nostack));
+        }
+        if narrow {
+            asm!("tilestored [{a} + {s}], tmm2", "tilestored [{b} + {s}], tmm3",
+                a = in(reg) first[after..].as_mut_ptr(), b = in(reg) second[after..].as_mut_ptr(),
+                s = in(reg) 64usize, options(nostack));
+        }
+    }
+}
+
+fn hidden_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    for first in (0..layer.outputs).step_by(FILTERS) {
+        // SAFETY: `kernels` has found the features.
+        unsafe { hidden_filters(layer, first, window, skip, out, geometry) };
+    }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn hidden_filters(
+    layer: &Packed,
+    first: usize,
+    window: Window<'_, u8>,
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    let size = (layer.outputs - first).min(FILTERS);
+    let constants = Constants::new(layer, first, size);
+    let groups = first / GROUP * geometry.stride()..(first + size) / GROUP * geometry.stride();
+    let skip = skip.map(|skip| &skip[groups.clone()]);
+    let out = &mut out[groups];
+    let zero = _mm512_set1_epi8(constants.zero_point as i8);
+    each_block(
+        layer,
+        window,
+        first,
+        (0, geometry.width),
+        geometry,
+        |x, sums| {
+            for g in 0..size / GROUP {
+                for (half, sums) in sums.0.iter().enumerate() {
+                    let at = g * geometry.stride() + geometry.start() + (x + half * TILE) * GROUP;
+                    let multiplier = &constants.multiplier[g * GROUP..][..GROUP];
+                    let out = &mut out[at..at + TILE * GROUP];
+                    // SAFETY: the features are this function's; the slices are 64 bytes long.
+                    unsafe {
+                        let four = std::array::from_fn(|k| {
+                            _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast())
+                        });
+                        let value = match (constants.skip, skip) {
+                            (Some(factors), Some(skip)) => {
+                                let skip = &skip[at..at + TILE * GROUP];
+                                let skip = _mm512_loadu_si512(skip.as_ptr().cast());
+                                requantise_sum(four, multiplier, factors, skip)
+                            }
+                            _ => requantise(four, multiplier),
+                        };
+                        _mm512_storeu_si512(out.as_mut_ptr().cast(), _mm512_adds_epu8(value, zero));
+                    }
+                }
+            }
+        },
+    );
+}
+
+fn last_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    geometry: Geometry,
+) {
+    // SAFETY: `kernels` has found the features.
+    unsafe { last_filters(layer, window, out, from, geometry) }
+}
+
+#[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
+fn last_filters(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    mut out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    geometry: Geometry,
+) {
+    let to = from + out[0].len();
+    let multiplier = &layer.multiplier[..OUTPUTS];
+    each_block(
+        layer,
+        window,
+        0,
+        (from / BLOCK * BLOCK, to),
+        geometry,
+        |block, sums| {
+            for (half, sums) in sums.0.iter().enumerate() {
+                let x = block + half * TILE;
+                let (start, end) = (x.max(from), (x + TILE).min(to));
+                if start >= end {
+                    continue;
+                }
+                for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
+                    let values = sums.map(|sum| sum as f32 * multiplier);
+                    out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
+                }
+            }
+        },
+    );
+}
+
+/// Multiply-accumulates in tiles, for the machine's peak.
+pub(crate) fn burn(rounds: u64) -> u64 {
+    // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
+    unsafe {
+        asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",
+            in(reg) &raw const CONFIG, options(nostack, readonly));
+        for _ in 0..rounds {
+            asm!(
+                "tdpbsud tmm0, tmm4, tmm6",
+                "tdpbsud tmm1, tmm4, tmm7",
+                options(nostack, nomem)
+            );
+        }
+        asm!("tilerelease", options(nostack, nomem));
+    }
+    rounds * 2 * (TILE * TILE * TILE * GROUP) as u64
+}

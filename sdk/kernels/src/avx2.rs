@@ -1,0 +1,458 @@
+//! int8 and f32 kernels for AVX2: 8 pixels to a register, 4 filters at a time.
+//!
+//! The byte multiply of AVX2 saturates its 16-bit sums, so int8 products are made from 16-bit halves: a group's even
+//! and odd channels, each pair multiplied and added exactly in 32 bits.
+#![allow(unsafe_code)]
+
+use crate::OUTPUTS;
+use crate::f32;
+use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
+use std::arch::x86_64::*;
+use std::hint::black_box;
+
+/// The int8 kernels, where the processor has what they need.
+pub(crate) fn int8_kernels() -> Option<int8::Kernels> {
+    available().then_some(int8::Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        offset: 0,
+        quantise_row,
+        rescale_row,
+    })
+}
+
+/// The f32 kernels, where the processor has what they need.
+pub(crate) fn f32_kernels() -> Option<f32::Kernels> {
+    let size = |left: usize| left.min(GROUP);
+    available().then_some(f32::Kernels {
+        size,
+        hidden_row: f32_hidden_row,
+        last_row: f32_last_row,
+    })
+}
+
+fn available() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+/// Registers of pixels computed together.
+const INT8_BLOCKS: usize = 2;
+const F32_BLOCKS: usize = 3;
+
+/// `[4 filters][ky][group][kx][filter][even, odd]`: words of two 16-bit weights.
+fn pack(taps: &Taps<'_>) -> Vec<i32> {
+    let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
+    let dots = taps.dot_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)]);
+    dots.iter()
+        .flat_map(|word| {
+            let [a, b, c, d] = word.to_le_bytes().map(|w| w as i8);
+            [pair(a, c), pair(b, d)]
+        })
+        .collect()
+}
+
+fn hidden_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    let rows = window.rows();
+    // SAFETY: `int8_kernels` has found the features.
+    unsafe { int8_filters(layer, &rows, skip, out, geometry) }
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn int8_filters(
+    layer: &Packed,
+    rows: &[&[u8]; 3],
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    let groups = layer.outputs / GROUP;
+    assert!(out.len() >= groups * geometry.stride());
+    assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
+    let zero = _mm256_set1_epi8(layer.zero_point as i8);
+    for g in 0..groups {
+        let multiplier = &layer.multiplier[g * GROUP..][..GROUP];
+        for x in (0..geometry.width).step_by(8 * INT8_BLOCKS) {
+            let sums = int8_sums(layer, g, rows, x, geometry);
+            #[allow(clippy::needless_range_loop)]
+            for b in 0..INT8_BLOCKS {
+                let at = g * geometry.stride() + geometry.start() + (x + 8 * b) * GROUP;
+                let four = std::array::from_fn(|k| sums[k][b]);
+                // SAFETY: 32 bytes at `at` lie in the group, whose blocks are whole.
+                unsafe {
+                    let value = match (layer.skip, skip) {
+                        (Some(factors), Some(skip)) => {
+                            let skip = _mm256_loadu_si256(skip.as_ptr().add(at).cast());
+                            requantise_sum(four, multiplier, factors, skip)
+                        }
+                        _ => requantise(four, multiplier),
+                    };
+                    _mm256_storeu_si256(
+                        out.as_mut_ptr().add(at).cast(),
+                        _mm256_adds_epu8(value, zero),
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// The sums of the four filters of group `g` at `8·INT8_BLOCKS` pixels from `x`.
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn int8_sums(
+    layer: &Packed,
+    g: usize,
+    rows: &[&[u8]; 3],
+    x: usize,
+    geometry: Geometry,
+) -> [[__m256i; INT8_BLOCKS]; GROUP] {
+    let words = 9 * layer.groups * GROUP * 2;
+    let weights = &layer.weights[g * words..][..words];
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= layer.groups * geometry.stride())
+    );
+    assert!(x + 8 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
+    let even = _mm256_set1_epi16(255);
+    let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
+    for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
+        *sums = [_mm256_set1_epi32(*bias); INT8_BLOCKS];
+    }
+    // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
+    unsafe {
+        let mut weight = weights.as_ptr();
+        for row in rows {
+            let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
+            for _ in 0..layer.groups {
+                for kx in 0..3 {
+                    let halves: [[__m256i; 2]; INT8_BLOCKS] = std::array::from_fn(|b| {
+                        let bytes = _mm256_loadu_si256(pixels.add((kx + 8 * b) * GROUP).cast());
+                        [_mm256_and_si256(bytes, even), _mm256_srli_epi16::<8>(bytes)]
+                    });
+                    for sums in &mut sums {
+                        for half in 0..2 {
+                            let pair = _mm256_set1_epi32(*weight);
+                            weight = weight.add(1);
+                            for (sum, halves) in sums.iter_mut().zip(halves) {
+                                *sum =
+                                    _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
+                            }
+                        }
+                    }
+                }
+                pixels = pixels.add(geometry.stride());
+            }
+        }
+    }
+    sums
+}
+
+/// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
+    pack_groups(std::array::from_fn(|k| {
+        _mm256_cvtps_epi32(_mm256_mul_ps(
+            _mm256_cvtepi32_ps(sums[k]),
+            _mm256_set1_ps(multiplier[k]),
+        ))
+    }))
+}
+
+/// The same with the sum of a skip.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn requantise_sum(
+    sums: [__m256i; GROUP],
+    multiplier: &[f32],
+    factors: SkipSum,
+    skip: __m256i,
+) -> __m256i {
+    pack_groups(std::array::from_fn(|k| {
+        let v = _mm256_mul_ps(_mm256_cvtepi32_ps(sums[k]), _mm256_set1_ps(multiplier[k]));
+        let v = _mm256_max_ps(v, _mm256_setzero_ps());
+        let a = match factors.relu {
+            Some(factor) => {
+                let v = _mm256_min_ps(v, _mm256_set1_ps(255.0));
+                _mm256_mul_ps(
+                    _mm256_cvtepi32_ps(_mm256_cvtps_epi32(v)),
+                    _mm256_set1_ps(factor),
+                )
+            }
+            None => v,
+        };
+        // Byte k of each group, widened.
+        let shift = _mm256_set1_epi32(8 * k as i32);
+        let byte = _mm256_and_si256(_mm256_srlv_epi32(skip, shift), _mm256_set1_epi32(255));
+        let s = _mm256_mul_ps(_mm256_cvtepi32_ps(byte), _mm256_set1_ps(factors.skip));
+        _mm256_cvtps_epi32(_mm256_add_ps(a, s))
+    }))
+}
+
+/// Four registers of one channel's 8 pixels to 8 groups of bytes, saturating.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
+    // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d; the shuffle turns this 4×4 block.
+    let bytes = _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
+    let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(
+        0x0f0b_0703,
+        0x0e0a_0602,
+        0x0d09_0501,
+        0x0c08_0400,
+    ));
+    _mm256_shuffle_epi8(bytes, turn)
+}
+
+fn last_row(
+    layer: &Packed,
+    window: Window<'_, u8>,
+    out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    geometry: Geometry,
+) {
+    let rows = window.rows();
+    last_row_by_blocks(out, from, |x, values| {
+        // SAFETY: `int8_kernels` has found the features.
+        unsafe { int8_last_block(layer, &rows, x, values, geometry) }
+    });
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn int8_last_block(
+    layer: &Packed,
+    rows: &[&[u8]; 3],
+    x: usize,
+    values: &mut [[f32; BLOCK]; OUTPUTS],
+    geometry: Geometry,
+) {
+    for g in 0..OUTPUTS.div_ceil(GROUP) {
+        for start in (0..BLOCK).step_by(8 * INT8_BLOCKS) {
+            let sums = int8_sums(layer, g, rows, x + start, geometry);
+            for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
+                let multiplier = _mm256_set1_ps(layer.multiplier[o]);
+                for (values, sum) in values[o][start..]
+                    .as_chunks_mut::<8>()
+                    .0
+                    .iter_mut()
+                    .zip(sums)
+                {
+                    let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
+                    // SAFETY: 8 values.
+                    unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
+                }
+            }
+        }
+    }
+}
+
+fn f32_hidden_row(
+    layer: &f32::Packed,
+    rows: &[&[f32]; 3],
+    skip: Option<&[f32]>,
+    out: &mut [f32],
+    geometry: Geometry,
+) {
+    for first in (0..layer.outputs).step_by(GROUP) {
+        let range = first * geometry.stride()..(first + GROUP) * geometry.stride();
+        let skip = skip.map(|skip| &skip[range.clone()]);
+        // SAFETY: `f32_kernels` has found the features.
+        unsafe { f32_filters(layer, first, rows, skip, &mut out[range], geometry) }
+    }
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn f32_filters(
+    layer: &f32::Packed,
+    first: usize,
+    rows: &[&[f32]; 3],
+    skip: Option<&[f32]>,
+    out: &mut [f32],
+    geometry: Geometry,
+) {
+    assert!(
+        out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len())
+    );
+    for x in (0..geometry.width).step_by(8 * F32_BLOCKS) {
+        let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
+        for (o, sums) in sums.iter().enumerate() {
+            for (b, sum) in sums.iter().enumerate() {
+                let at = o * geometry.stride() + geometry.start() + x + 8 * b;
+                let mut value = _mm256_max_ps(*sum, _mm256_setzero_ps());
+                // SAFETY: 8 pixels at `at` lie in the filter's row or the margin after it.
+                unsafe {
+                    if let Some(skip) = skip {
+                        value = _mm256_add_ps(value, _mm256_loadu_ps(skip.as_ptr().add(at)));
+                    }
+                    _mm256_storeu_ps(out.as_mut_ptr().add(at), value);
+                }
+            }
+        }
+    }
+}
+
+/// The sums of `O` filters at `8·F32_BLOCKS` pixels from `x`.
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+fn f32_sums<const O: usize>(
+    layer: &f32::Packed,
+    first: usize,
+    rows: &[&[f32]; 3],
+    x: usize,
+    geometry: Geometry,
+) -> [[__m256; F32_BLOCKS]; O] {
+    let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
+    assert!(
+        rows.iter()
+            .all(|row| row.len() >= layer.inputs * geometry.stride())
+    );
+    assert!(x + 8 * F32_BLOCKS < geometry.padded + MARGIN);
+    let mut sums = [[_mm256_setzero_ps(); F32_BLOCKS]; O];
+    for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
+        *sums = [_mm256_set1_ps(*bias); F32_BLOCKS];
+    }
+    // SAFETY: the asserts above: rows with their margin reach past the block, weights are as many as the loops take.
+    unsafe {
+        let mut weight = weights.as_ptr();
+        for row in rows {
+            let mut pixels = row.as_ptr().add(geometry.start() + x - 1);
+            for _ in 0..layer.inputs {
+                for kx in 0..3 {
+                    let values: [__m256; F32_BLOCKS] =
+                        std::array::from_fn(|b| _mm256_loadu_ps(pixels.add(kx + 8 * b)));
+                    for sums in &mut sums {
+                        let w = _mm256_set1_ps(*weight);
+                        weight = weight.add(1);
+                        for (sum, value) in sums.iter_mut().zip(values) {
+                            *sum = _mm256_fmadd_ps(value, w, *sum);
+                        }
+                    }
+                }
+                pixels = pixels.add(geometry.stride());
+            }
+        }
+    }
+    sums
+}
+
+fn f32_last_row(
+    layer: &f32::Packed,
+    rows: &[&[f32]; 3],
+    out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    geometry: Geometry,
+) {
+    last_row_by_blocks(out, from, |x, values| {
+        // SAFETY: `f32_kernels` has found the features.
+        unsafe { f32_last_block(layer, rows, x, values, geometry) }
+    });
+}
+
+#[target_feature(enable = "avx2,fma")]
+fn f32_last_block(
+    layer: &f32::Packed,
+    rows: &[&[f32]; 3],
+    x: usize,
+    values: &mut [[f32; BLOCK]; OUTPUTS],
+    geometry: Geometry,
+) {
+    const SPAN: usize = 8 * F32_BLOCKS;
+    let (wide, narrow) = values.split_at_mut(GROUP);
+    for start in (0..BLOCK).step_by(SPAN) {
+        store(
+            wide,
+            start,
+            f32_sums::<GROUP>(layer, 0, rows, x + start, geometry),
+        );
+        store(
+            narrow,
+            start,
+            f32_sums::<{ OUTPUTS - GROUP }>(layer, GROUP, rows, x + start, geometry),
+        );
+    }
+}
+
+/// Stores the registers that fall into the block.
+#[inline]
+#[target_feature(enable = "avx2")]
+fn store<const O: usize>(
+    values: &mut [[f32; BLOCK]],
+    start: usize,
+    sums: [[__m256; F32_BLOCKS]; O],
+) {
+    for (values, sums) in values.iter_mut().zip(sums) {
+        for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
+            // SAFETY: 8 values.
+            unsafe { _mm256_storeu_ps(values.as_mut_ptr(), sum) };
+        }
+    }
+}
+
+/// [`int8::quantise_row`], compiled for AVX2. The AVX-512 kernels take it too: they imply AVX2.
+pub(crate) fn quantise_row(
+    source: SourceRow<'_>,
+    rounding: Rounding,
+    out: &mut [u8],
+    geometry: Geometry,
+) {
+    #[target_feature(enable = "avx2")]
+    fn compiled(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
+        int8::quantise_row(source, rounding, out, geometry);
+    }
+    // SAFETY: the constructors of the kernels have found AVX2, or AVX-512, which implies it.
+    unsafe { compiled(source, rounding, out, geometry) }
+}
+
+/// [`int8::rescale_row`], likewise.
+pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
+    #[target_feature(enable = "avx2")]
+    fn compiled(row: &mut [u8], factor: f32, zero_point: u8, geometry: Geometry) {
+        int8::rescale_row(row, factor, zero_point, geometry);
+    }
+    // SAFETY: as above.
+    unsafe { compiled(row, factor, zero_point, geometry) }
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn int8_burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "avx2")]
+    fn run(rounds: u64) {
+        let x = black_box(_mm256_setzero_si256());
+        let mut sums = [x; 12];
+        for _ in 0..rounds {
+            for sum in &mut sums {
+                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*sum, x));
+            }
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 12 * 16
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn f32_burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "avx2,fma")]
+    fn run(rounds: u64) {
+        let x = black_box(_mm256_setzero_ps());
+        let mut sums = [x; 12];
+        for _ in 0..rounds {
+            for sum in &mut sums {
+                *sum = _mm256_fmadd_ps(x, x, *sum);
+            }
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 12 * 8
+}

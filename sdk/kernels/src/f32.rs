@@ -1,0 +1,201 @@
+//! The chain in 32-bit floating point, and how its weights are packed for the kernels.
+//!
+//! A row is one run of pixels for each channel; the network's input follows the features in the last layer's rows. A
+//! hidden layer yields `max(sum + bias, 0)`, plus the skip's value where there is one. Instruction sets differ in
+//! whether products are fused into sums, so they agree to rounding and not to the bit.
+
+use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
+use crate::{Isa, OUTPUTS};
+
+/// One layer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct F32Layer {
+    /// Channels read, the concatenated ones of the last layer included.
+    pub inputs: usize,
+    /// Filters.
+    pub outputs: usize,
+    /// `(outputs, inputs, 3, 3)`.
+    pub kernel: Vec<f32>,
+    /// One a filter.
+    pub bias: Vec<f32>,
+}
+
+/// A layer as the kernels read it.
+pub(crate) struct Packed {
+    pub(crate) inputs: usize,
+    pub(crate) outputs: usize,
+    pub(crate) bias: Vec<f32>,
+    /// `[filters by the kernels' sizes][ky][channel][kx][filter]`.
+    pub(crate) weights: Vec<f32>,
+}
+
+/// An instruction set's kernels.
+#[derive(Clone, Copy)]
+#[allow(clippy::type_complexity)]
+pub(crate) struct Kernels {
+    /// How many filters are computed together, for as many as are left.
+    pub(crate) size: fn(usize) -> usize,
+    /// Layer, three rows, the skip's row, the row of features to write.
+    pub(crate) hidden_row: fn(&Packed, &[&[f32]; 3], Option<&[f32]>, &mut [f32], Geometry),
+    /// Layer, three rows, the output planes' rows, the first pixel to yield.
+    pub(crate) last_row: fn(&Packed, &[&[f32]; 3], [&mut [f32]; OUTPUTS], usize, Geometry),
+}
+
+fn kernels(isa: Isa) -> Option<Kernels> {
+    match isa {
+        Isa::Portable => Some(crate::portable::F32),
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => crate::avx512::kernels(),
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 => crate::avx2::f32_kernels(),
+        #[cfg(target_arch = "aarch64")]
+        Isa::Neon => Some(crate::neon::KERNELS),
+        _ => None,
+    }
+}
+
+/// An f32 chain packed for one instruction set. Immutable; threads share it.
+pub struct F32Chain {
+    isa: Isa,
+    kernels: Kernels,
+    layers: Vec<Packed>,
+}
+
+impl F32Chain {
+    /// Packs a chain.
+    ///
+    /// # Errors
+    /// What the kernels cannot run: shapes that are no chain, filters not in eights, or an instruction set that this
+    /// processor lacks.
+    pub fn new(layers: &[F32Layer], isa: Isa) -> Result<F32Chain, String> {
+        let kernels = kernels(isa)
+            .filter(|_| Isa::f32().contains(&isa))
+            .ok_or_else(|| format!("this processor has no f32 kernels '{isa}'"))?;
+        crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
+        let pack = |layer: &F32Layer| {
+            if layer.kernel.len() != layer.outputs * layer.inputs * 9
+                || layer.bias.len() != layer.outputs
+            {
+                return Err(format!(
+                    "weights or biases do not fit {} filters",
+                    layer.outputs
+                ));
+            }
+            let mut weights = Vec::with_capacity(layer.kernel.len());
+            let mut first = 0;
+            while first < layer.outputs {
+                let size = (kernels.size)(layer.outputs - first);
+                for ky in 0..3 {
+                    for channel in 0..layer.inputs {
+                        for kx in 0..3 {
+                            weights.extend((first..first + size).map(|filter| {
+                                layer.kernel[((filter * layer.inputs + channel) * 3 + ky) * 3 + kx]
+                            }));
+                        }
+                    }
+                }
+                first += size;
+            }
+            Ok(Packed {
+                inputs: layer.inputs,
+                outputs: layer.outputs,
+                bias: layer.bias.clone(),
+                weights,
+            })
+        };
+        let layers = layers.iter().map(pack).collect::<Result<_, _>>()?;
+        Ok(F32Chain {
+            isa,
+            kernels,
+            layers,
+        })
+    }
+
+    /// The kernels in use.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// The tiling that suits a frame size and the current rayon pool.
+    pub fn tiling(&self, height: usize, width: usize) -> Tiling {
+        wavefront::tiling_for(self, height, width)
+    }
+
+    /// Runs the chain on the current rayon pool: `input` planar `(C, H, W)`, `output` `(6, H, W)`.
+    ///
+    /// # Panics
+    /// If a length does not fit the size.
+    pub fn run(
+        &self,
+        input: &[f32],
+        output: &mut [f32],
+        size: (usize, usize),
+        tiling: Tiling,
+        scratch: &Scratch<f32>,
+    ) {
+        wavefront::run(self, input, output, size, tiling, scratch);
+    }
+}
+
+impl Chain for F32Chain {
+    type Element = f32;
+    const GROUP: usize = 1;
+
+    fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
+    fn inputs(&self) -> usize {
+        self.layers[0].inputs
+    }
+
+    fn groups(&self, i: usize) -> usize {
+        self.layers[i].inputs
+    }
+
+    fn zero(&self, _i: usize) -> f32 {
+        0.0
+    }
+
+    fn input_row(&self, source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
+        copy_rows(source, out, geometry);
+    }
+
+    fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
+        copy_rows(
+            source,
+            &mut out[self.layers[0].outputs * geometry.stride()..],
+            geometry,
+        );
+    }
+
+    fn hidden_row(
+        &self,
+        i: usize,
+        window: Window<'_, f32>,
+        skip: Option<&[f32]>,
+        out: &mut [f32],
+        geometry: Geometry,
+    ) {
+        (self.kernels.hidden_row)(&self.layers[i], &window.rows(), skip, out, geometry);
+    }
+
+    fn last_row(
+        &self,
+        window: Window<'_, f32>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    ) {
+        if let Some(layer) = self.layers.last() {
+            (self.kernels.last_row)(layer, &window.rows(), out, from, geometry);
+        }
+    }
+}
+
+fn copy_rows(source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
+    for (c, out) in out.chunks_exact_mut(geometry.stride()).enumerate() {
+        out[geometry.start()..][..geometry.width]
+            .copy_from_slice(source.channel(c, geometry.width));
+    }
+}

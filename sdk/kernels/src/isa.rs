@@ -1,0 +1,96 @@
+//! The instruction sets that kernels exist for, and which of them this processor has.
+
+/// An instruction set with kernels of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Isa {
+    /// Plain Rust; runs everywhere.
+    Portable,
+    /// x86-64 AVX2 with FMA.
+    Avx2,
+    /// x86-64 AVX-512 (F, BW); f32 only.
+    Avx512,
+    /// x86-64 AVX-512 with VNNI; int8 only.
+    Avx512Vnni,
+    /// x86-64 AMX tiles with int8, beside AVX-512; int8 only.
+    Amx,
+    /// ARM64 NEON; f32 only.
+    Neon,
+    /// ARM64 NEON with signed dot products; int8 only.
+    NeonDotprod,
+    /// ARM64 NEON with mixed-sign dot products (i8mm); int8 only.
+    NeonI8mm,
+}
+
+impl Isa {
+    /// A short name for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Isa::Portable => "portable",
+            Isa::Avx2 => "avx2",
+            Isa::Avx512 => "avx512",
+            Isa::Avx512Vnni => "avx512-vnni",
+            Isa::Amx => "amx-int8",
+            Isa::Neon => "neon",
+            Isa::NeonDotprod => "neon-dotprod",
+            Isa::NeonI8mm => "neon-i8mm",
+        }
+    }
+
+    /// The int8 kernels that this processor runs, fastest first; the last is always [`Isa::Portable`].
+    pub fn int8() -> Vec<Isa> {
+        let mut found = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            let avx512 =
+                is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw");
+            let vnni = avx512 && is_x86_feature_detected!("avx512vnni");
+            if vnni && crate::amx::available() {
+                found.push(Isa::Amx);
+            }
+            if vnni {
+                found.push(Isa::Avx512Vnni);
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                found.push(Isa::Avx2);
+            }
+        }
+        #[cfg(target_arch = "aarch64")]
+        {
+            if std::arch::is_aarch64_feature_detected!("i8mm") {
+                found.push(Isa::NeonI8mm);
+            }
+            if std::arch::is_aarch64_feature_detected!("dotprod") {
+                found.push(Isa::NeonDotprod);
+            }
+        }
+        found.push(Isa::Portable);
+        found
+    }
+
+    /// The f32 kernels that this processor runs, fastest first; the last is always [`Isa::Portable`].
+    pub fn f32() -> Vec<Isa> {
+        let mut found = Vec::new();
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw") {
+                found.push(Isa::Avx512);
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                found.push(Isa::Avx2);
+            }
+        }
+        // NEON is part of every ARM64 processor.
+        if cfg!(target_arch = "aarch64") {
+            found.push(Isa::Neon);
+        }
+        found.push(Isa::Portable);
+        found
+    }
+}
+
+impl std::fmt::Display for Isa {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}

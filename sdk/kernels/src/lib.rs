@@ -1,0 +1,69 @@
+//! Fused chains of 3×3 convolutions: the inner loops of Phasefront's hologram networks.
+//!
+//! A chain runs depth first. A frame is cut into bands of rows, each a task for the current rayon pool; in a band,
+//! rows flow through all layers at once, three rows of each layer's input being kept ([`wavefront`](self)). So the
+//! working memory is small and independent of the frame's height, and a result does not depend on how a frame was cut.
+//!
+//! [`int8`] defines the quantised chain's arithmetic so that every instruction set gives the same bits; [`f32`](mod@f32)
+//! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
+//! against. `unsafe` lives in those files alone.
+//!
+//! Nothing here knows ONNX, tract or optics.
+
+mod f32;
+mod int8;
+mod isa;
+mod peak;
+mod wavefront;
+
+mod portable;
+
+#[cfg(target_arch = "x86_64")]
+mod amx;
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+#[cfg(target_arch = "x86_64")]
+mod avx512_vnni;
+
+#[cfg(target_arch = "aarch64")]
+mod neon;
+#[cfg(target_arch = "aarch64")]
+mod neon_dotprod;
+#[cfg(target_arch = "aarch64")]
+mod neon_i8mm;
+
+pub use f32::{F32Chain, F32Layer};
+pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
+pub use isa::Isa;
+pub use peak::{f32_peak, int8_peak};
+pub use wavefront::{Scratch, Tiling};
+
+/// Planes of a hologram network's output: two a colour.
+pub const OUTPUTS: usize = 6;
+
+/// A chain's shapes: `(inputs, outputs)` of each layer.
+fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Result<(), String> {
+    let count = layers.len();
+    let Some((inputs, filters)) = layers.next().filter(|_| count >= 2) else {
+        return Err("a chain has two layers at least".into());
+    };
+    if filters == 0 || filters % 8 != 0 || inputs == 0 {
+        return Err(format!("{filters} filters; kernels take a multiple of 8"));
+    }
+    for (i, shape) in layers.enumerate() {
+        let right = if i + 2 == count {
+            (filters + inputs, OUTPUTS)
+        } else {
+            (filters, filters)
+        };
+        if shape != right {
+            return Err(format!(
+                "layer {} has (inputs, outputs) {shape:?}; {right:?} is right",
+                i + 1
+            ));
+        }
+    }
+    Ok(())
+}

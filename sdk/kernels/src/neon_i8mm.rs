@@ -1,0 +1,68 @@
+//! int8 kernels for ARM64 with the mixed-sign dot product of i8mm: USDOT multiplies the activations as
+//! they are. Inline assembly: the intrinsics are not stable.
+#![allow(unsafe_code)]
+
+use crate::OUTPUTS;
+use crate::int8::{GROUP, Kernels, Packed, quantise_row, rescale_row};
+use crate::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, requantise, store};
+use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
+use std::arch::aarch64::*;
+use std::arch::asm;
+use std::hint::black_box;
+
+/// The kernels, where the processor has what they need.
+pub(crate) fn kernels() -> Option<Kernels> {
+    std::arch::is_aarch64_feature_detected!("i8mm").then_some(Kernels {
+        pack,
+        hidden_row,
+        last_row,
+        offset: 0,
+        quantise_row,
+        rescale_row,
+    })
+}
+
+int8_kernels!("neon,i8mm");
+
+/// Sixteen bytes: four pixels of a group.
+///
+/// # Safety
+/// They lie at `pixels`.
+#[inline]
+#[target_feature(enable = "neon,i8mm")]
+unsafe fn load(pixels: *const u8) -> uint8x16_t {
+    // SAFETY: as the function's own.
+    unsafe { vld1q_u8(pixels) }
+}
+
+/// `sum + dot(pixels, weights[LANE])` for each of four pixels.
+#[inline]
+#[target_feature(enable = "neon,i8mm")]
+fn dot<const LANE: usize>(sum: int32x4_t, pixels: uint8x16_t, weights: int8x16_t) -> int32x4_t {
+    let mut result = sum;
+    // SAFETY: registers alone; the feature is the function's.
+    unsafe {
+        asm!("usdot {0:v}.4s, {1:v}.16b, {2:v}.4b[{lane}]",
+            inout(vreg) result, in(vreg) pixels, in(vreg) weights, lane = const LANE,
+            options(pure, nomem, nostack, preserves_flags));
+    }
+    result
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn burn(rounds: u64) -> u64 {
+    #[target_feature(enable = "neon,i8mm")]
+    fn run(rounds: u64) {
+        let (x, w) = (black_box(vdupq_n_u8(0)), black_box(vdupq_n_s8(0)));
+        let mut sums = [black_box(vdupq_n_s32(0)); 24];
+        for _ in 0..rounds {
+            for sum in &mut sums {
+                *sum = dot::<0>(*sum, x, w);
+            }
+        }
+        black_box(sums);
+    }
+    // SAFETY: the caller has found the features.
+    unsafe { run(rounds) };
+    rounds * 24 * 16
+}

@@ -1,0 +1,57 @@
+//! The most multiply-accumulates that an instruction set does here: registers alone, no memory. What a kernel is
+//! measured against, in the same run, on the same threads.
+
+use crate::Isa;
+use std::time::{Duration, Instant};
+
+/// Rounds between looks at the clock.
+const ROUNDS: u64 = 10_000;
+
+/// Runs rounds of multiply-accumulates in registers and yields how many it did.
+pub(crate) type Burn = fn(u64) -> u64;
+
+/// Multiply-accumulates a second of all threads of the current rayon pool together, with the int8 instructions of
+/// `isa`; `None` where it has none here, or none of its own (portable).
+pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
+    let burn: Burn = match isa {
+        #[cfg(target_arch = "x86_64")]
+        Isa::Amx => crate::amx::burn,
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512Vnni => crate::avx512_vnni::burn,
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 => crate::avx2::int8_burn,
+        #[cfg(target_arch = "aarch64")]
+        Isa::NeonDotprod => crate::neon_dotprod::burn,
+        #[cfg(target_arch = "aarch64")]
+        Isa::NeonI8mm => crate::neon_i8mm::burn,
+        _ => return None,
+    };
+    Isa::int8().contains(&isa).then(|| rate(burn, duration))
+}
+
+/// The same with the f32 instructions of `isa`.
+pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
+    let burn: Burn = match isa {
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => crate::avx512::burn,
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 => crate::avx2::f32_burn,
+        #[cfg(target_arch = "aarch64")]
+        Isa::Neon => crate::neon::burn,
+        _ => return None,
+    };
+    Isa::f32().contains(&isa).then(|| rate(burn, duration))
+}
+
+fn rate(burn: Burn, duration: Duration) -> f64 {
+    let rates = rayon::broadcast(|_| {
+        burn(ROUNDS);
+        let start = Instant::now();
+        let mut done = 0;
+        while start.elapsed() < duration {
+            done += burn(ROUNDS);
+        }
+        done as f64 / start.elapsed().as_secs_f64()
+    });
+    rates.into_iter().sum()
+}

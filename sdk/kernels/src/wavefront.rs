@@ -1,0 +1,385 @@
+//! The schedule: bands of rows in parallel, and in a band every layer one row behind the one before it.
+//!
+//! `x[i]` is layer `i`'s input. While row `r + 1` of `x[i]` is written, row `r` of `x[i+1]` can be: it needs rows
+//! `r−1 … r+1` of `x[i]`, and row `r` of `x[i−1]` for a skip. Three rows of each `x[i]` are therefore enough, in a
+//! ring. A row lies in memory group by group (see [`Geometry`]) with [`MARGIN`] pixels before and after, which hold the
+//! padding value at the frame's edges.
+//!
+//! At a band's inner edges the rows beyond are computed again, one more for each layer yet to come, so that a result
+//! is the same to the bit however the frame was cut. The same holds for columns where a band is cut into strips.
+
+use crate::OUTPUTS;
+use std::sync::{Mutex, PoisonError};
+
+/// Pixels before a row's first and after its last one; kernels may read one and write up to this many past the end.
+pub(crate) const MARGIN: usize = 16;
+/// Rows are as long as a multiple of this many pixels, so that kernels write whole blocks.
+pub(crate) const BLOCK: usize = 64;
+/// Rows kept of each layer's input.
+const RING: usize = 3;
+
+/// How a frame is cut. The result does not depend on it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tiling {
+    /// Rows of a band; a band is one task.
+    pub band_rows: usize,
+    /// Columns of a strip within a band.
+    pub strip_columns: usize,
+}
+
+/// What measured best for `chain` on the current pool: two bands a thread where the frame is high enough that little is
+/// computed twice, and strips whose rings stay in a core's second-level cache.
+pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
+    const CACHE: usize = 1 << 20;
+    let layers = chain.layers();
+    let ring_column: usize = (0..layers)
+        .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
+        .sum();
+    let threads = rayon::current_num_threads();
+    let bands_a_thread = (height / (threads * 32 * layers)).clamp(1, 2);
+    let band_rows = height
+        .div_ceil(threads * bands_a_thread)
+        .max((4 * layers).min(height))
+        .max(1);
+    let widest = (CACHE / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
+    let strip_columns = width.div_ceil(width.div_ceil(widest).max(1)).max(1);
+    Tiling {
+        band_rows,
+        strip_columns,
+    }
+}
+
+/// Whether `x[i]` is a sum with `x[i−2]`.
+pub(crate) fn has_skip(i: usize) -> bool {
+    i >= 3 && i % 2 == 1
+}
+
+/// Runs `block` on the whole blocks of a row that hold pixels `from..`, and copies those into the output's rows.
+pub(crate) fn last_row_by_blocks(
+    mut out: [&mut [f32]; OUTPUTS],
+    from: usize,
+    mut block: impl FnMut(usize, &mut [[f32; BLOCK]; OUTPUTS]),
+) {
+    let to = from + out[0].len();
+    let mut values = [[0.0; BLOCK]; OUTPUTS];
+    for x in (from / BLOCK * BLOCK..to).step_by(BLOCK) {
+        block(x, &mut values);
+        let (start, end) = (x.max(from), (x + BLOCK).min(to));
+        for (out, values) in out.iter_mut().zip(&values) {
+            out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
+        }
+    }
+}
+
+/// Where a row's pixels lie: `groups` runs of `stride` elements, each of [`MARGIN`] pixels, the row, and the margin.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Geometry {
+    /// Elements of one pixel in a group: 4 for the int8 chain, 1 for f32.
+    pub(crate) group: usize,
+    /// Pixels of a row, its whole blocks.
+    pub(crate) padded: usize,
+    /// Pixels of a row that mean something.
+    pub(crate) width: usize,
+}
+
+impl Geometry {
+    fn new(group: usize, width: usize) -> Geometry {
+        Geometry {
+            group,
+            padded: width.next_multiple_of(BLOCK),
+            width,
+        }
+    }
+
+    /// Elements from one group of a row to the next.
+    pub(crate) fn stride(&self) -> usize {
+        (self.padded + 2 * MARGIN) * self.group
+    }
+
+    /// Element of a row's group where pixel 0 lies.
+    pub(crate) fn start(&self) -> usize {
+        MARGIN * self.group
+    }
+}
+
+/// What a chain is to the schedule. Rows are slices of `groups(i) · geometry.stride()` elements.
+pub(crate) trait Chain: Sync {
+    /// An element of a row.
+    type Element: Copy + Default + Send + Sync;
+    /// Channels in a group: elements of one pixel that lie together.
+    const GROUP: usize;
+
+    fn layers(&self) -> usize;
+    /// Channels of the network's input.
+    fn inputs(&self) -> usize;
+    /// Groups of `x[i]`, the concatenated network input of the last layer included.
+    fn groups(&self, i: usize) -> usize;
+    /// The element that stands for 0 in `x[i]`.
+    fn zero(&self, i: usize) -> Self::Element;
+    /// Writes a row of `x[0]` from the network input's planes.
+    fn input_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
+    /// Writes the concatenated part of a row of `x[last]`; `out` is the whole row.
+    fn concatenated_row(
+        &self,
+        source: SourceRow<'_>,
+        out: &mut [Self::Element],
+        geometry: Geometry,
+    );
+    /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`; `skip` is the row of
+    /// `x[i−1]`.
+    fn hidden_row(
+        &self,
+        i: usize,
+        window: Window<'_, Self::Element>,
+        skip: Option<&[Self::Element]>,
+        out: &mut [Self::Element],
+        geometry: Geometry,
+    );
+    /// Runs the last layer: pixels `from..from + out[c].len()` of the row, into the output planes' rows.
+    fn last_row(
+        &self,
+        window: Window<'_, Self::Element>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    );
+}
+
+/// Three rows of a layer's input, adjacent in memory but turned: the row above lies in slot `first`, the next ones
+/// in the slots after it, modulo 3.
+#[derive(Clone, Copy)]
+pub(crate) struct Window<'a, E> {
+    pub(crate) slots: &'a [E],
+    pub(crate) first: usize,
+}
+
+impl<'a, E> Window<'a, E> {
+    /// The rows from above to below.
+    pub(crate) fn rows(&self) -> [&'a [E]; RING] {
+        let length = self.slots.len() / RING;
+        std::array::from_fn(|k| &self.slots[(self.first + k) % RING * length..][..length])
+    }
+}
+
+/// One row of the network's input, planar.
+#[derive(Clone, Copy)]
+pub(crate) struct SourceRow<'a> {
+    pub(crate) planes: &'a [f32],
+    /// Elements from one plane to the next.
+    pub(crate) plane: usize,
+    /// Element of the first plane where the row's (or strip's) first pixel lies.
+    pub(crate) offset: usize,
+}
+
+impl<'a> SourceRow<'a> {
+    /// `count` pixels of channel `c`.
+    pub(crate) fn channel(&self, c: usize, count: usize) -> &'a [f32] {
+        &self.planes[c * self.plane + self.offset..][..count]
+    }
+}
+
+/// Working memory for as many bands as run at once; grows in the first frame and is kept.
+#[derive(Debug)]
+pub struct Scratch<E> {
+    free: Mutex<Vec<Vec<Ring<E>>>>,
+}
+
+impl<E> Default for Scratch<E> {
+    fn default() -> Self {
+        Scratch {
+            free: Mutex::new(Vec::new()),
+        }
+    }
+}
+
+impl<E> Scratch<E> {
+    /// Bytes held between frames.
+    pub fn bytes(&self) -> usize {
+        let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
+        free.iter()
+            .flatten()
+            .map(|ring| ring.memory.capacity() * size_of::<E>())
+            .sum()
+    }
+}
+
+/// The last three rows of one layer's input: row `r` in slot `r mod 3`.
+#[derive(Debug, Default)]
+struct Ring<E> {
+    memory: Vec<E>,
+    /// Where the first slot starts: at a cache line, which kernels are faster on.
+    start: usize,
+    row: usize,
+}
+
+impl<E: Copy + Default> Ring<E> {
+    fn prepare(&mut self, row: usize, zero: E) {
+        const LINE: usize = 64;
+        let needed = RING * row + LINE;
+        if self.memory.len() < needed {
+            self.memory.resize(needed, zero);
+        }
+        self.memory.fill(zero);
+        self.start = self.memory.as_ptr().align_offset(LINE).min(LINE);
+        self.row = row;
+    }
+
+    fn slot(row: isize) -> usize {
+        row.rem_euclid(RING as isize) as usize
+    }
+
+    fn row(&self, row: isize) -> &[E] {
+        &self.memory[self.start + Self::slot(row) * self.row..][..self.row]
+    }
+
+    fn row_mut(&mut self, row: isize) -> &mut [E] {
+        &mut self.memory[self.start + Self::slot(row) * self.row..][..self.row]
+    }
+
+    /// The rows around `row`.
+    fn window(&self, row: isize) -> Window<'_, E> {
+        Window {
+            slots: &self.memory[self.start..][..RING * self.row],
+            first: Self::slot(row - 1),
+        }
+    }
+}
+
+/// Runs `chain` on a frame: `input` planar, `output` (6, H, W).
+pub(crate) fn run<C: Chain>(
+    chain: &C,
+    input: &[f32],
+    output: &mut [f32],
+    (height, width): (usize, usize),
+    tiling: Tiling,
+    scratch: &Scratch<C::Element>,
+) {
+    let area = height * width;
+    assert_eq!(input.len(), chain.inputs() * area, "planes of the input");
+    assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
+    if area == 0 {
+        return;
+    }
+    let frame = Frame {
+        chain,
+        input,
+        height,
+        width,
+        tiling,
+        scratch,
+    };
+    let mut planes = output.chunks_exact_mut(area);
+    let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
+    frame.bands(0, height.div_ceil(tiling.band_rows.max(1)), planes);
+}
+
+struct Frame<'a, C: Chain> {
+    chain: &'a C,
+    input: &'a [f32],
+    height: usize,
+    width: usize,
+    tiling: Tiling,
+    scratch: &'a Scratch<C::Element>,
+}
+
+impl<C: Chain> Frame<'_, C> {
+    /// Runs bands `from..to`, whose rows `planes` hold, dividing them among the pool's threads.
+    fn bands(&self, from: usize, to: usize, planes: [&mut [f32]; OUTPUTS]) {
+        let rows = self.tiling.band_rows.max(1);
+        if to - from == 1 {
+            return self.band(from * rows, planes);
+        }
+        let middle = (from + to) / 2;
+        let split = (middle - from) * rows * self.width;
+        let mut halves = planes.map(|plane| plane.split_at_mut(split));
+        let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
+        let first = halves.map(|half| half.0);
+        rayon::join(
+            || self.bands(from, middle, first),
+            || self.bands(middle, to, second),
+        );
+    }
+
+    /// Runs the band that starts at row `top`, strip by strip.
+    fn band(&self, top: usize, mut planes: [&mut [f32]; OUTPUTS]) {
+        let free = || {
+            self.scratch
+                .free
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+        };
+        let mut rings = free().pop().unwrap_or_default();
+        let bottom = top + planes[0].len() / self.width;
+        let columns = self.tiling.strip_columns.max(1);
+        for left in (0..self.width).step_by(columns) {
+            let right = (left + columns).min(self.width);
+            self.strip((top, bottom), (left, right), &mut planes, &mut rings);
+        }
+        free().push(rings);
+    }
+
+    fn strip(
+        &self,
+        (top, bottom): (usize, usize),
+        (left, right): (usize, usize),
+        planes: &mut [&mut [f32]; OUTPUTS],
+        rings: &mut Vec<Ring<C::Element>>,
+    ) {
+        let chain = self.chain;
+        let layers = chain.layers();
+        // The strip with the halo that its last layer reaches, one pixel a layer, within the frame.
+        let start = left.saturating_sub(layers);
+        let end = (right + layers).min(self.width);
+        let geometry = Geometry::new(C::GROUP, end - start);
+        if rings.len() < layers {
+            rings.resize_with(layers, Ring::default);
+        }
+        for (i, ring) in rings.iter_mut().take(layers).enumerate() {
+            ring.prepare(chain.groups(i) * geometry.stride(), chain.zero(i));
+        }
+        let source = |row: usize| SourceRow {
+            planes: self.input,
+            plane: self.height * self.width,
+            offset: row * self.width + start,
+        };
+        let (top, bottom, height) = (top as isize, bottom as isize, self.height as isize);
+        let depth = layers as isize;
+        for step in top - depth..bottom + depth {
+            for (i, reach) in (1..=depth).rev().enumerate() {
+                let row = step - i as isize;
+                if !(top - reach..bottom + reach).contains(&row) {
+                    continue;
+                }
+                let (before, ring) = rings.split_at_mut(i);
+                let out = ring[0].row_mut(row);
+                if !(0..height).contains(&row) {
+                    out.fill(chain.zero(i));
+                    continue;
+                }
+                match i {
+                    0 => chain.input_row(source(row as usize), out, geometry),
+                    _ => {
+                        let skip = has_skip(i).then(|| before[i - 2].row(row));
+                        chain.hidden_row(i - 1, before[i - 1].window(row), skip, out, geometry);
+                    }
+                }
+                if i == layers - 1 {
+                    chain.concatenated_row(source(row as usize), out, geometry);
+                }
+                // The next layer reads one pixel past the row: at the frame's edge that is padding.
+                let past = geometry.start() + geometry.width * geometry.group;
+                for group in out.chunks_exact_mut(geometry.stride()) {
+                    group[past..past + geometry.group].fill(chain.zero(i));
+                }
+            }
+            let row = step - depth;
+            if (top..bottom).contains(&row) {
+                let at = (row - top) as usize * self.width + left;
+                let out = planes
+                    .each_mut()
+                    .map(|plane| &mut plane[at..at + right - left]);
+                chain.last_row(rings[layers - 1].window(row), out, left - start, geometry);
+            }
+        }
+    }
+}

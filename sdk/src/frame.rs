@@ -1,0 +1,114 @@
+//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth.
+//!
+//! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
+
+use crate::error::{Error, Result};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+
+/// Colour as amplitude in \[0, 1], (3, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RgbdFrame {
+    rgb: Array3<f32>,
+    depth: Array2<f32>,
+}
+
+impl RgbdFrame {
+    /// Joins `rgb`, (3, H, W), and `depth`, (H, W).
+    ///
+    /// # Errors
+    /// Shapes that do not fit, an empty frame, or a value that is not finite or outside \[0, 1].
+    pub fn new(rgb: Array3<f32>, depth: Array2<f32>) -> Result<Self> {
+        let (channels, height, width) = rgb.dim();
+        if channels != 3 {
+            return Err(Error::Frame(format!(
+                "colour has {channels} planes; it must have 3: red, green, blue"
+            )));
+        }
+        if height == 0 || width == 0 {
+            return Err(Error::Frame(format!(
+                "the image is empty ({width}×{height}); each side must be at least 1"
+            )));
+        }
+        if depth.dim() != (height, width) {
+            return Err(Error::Frame(format!(
+                "colour is {width}×{height} and depth {}×{}; they must be alike",
+                depth.dim().1,
+                depth.dim().0
+            )));
+        }
+        for (what, bad) in [
+            ("colour", rgb.iter().find(|v| !(0.0..=1.0).contains(*v))),
+            ("depth", depth.iter().find(|v| !(0.0..=1.0).contains(*v))),
+        ] {
+            if let Some(value) = bad {
+                return Err(Error::Frame(format!(
+                    "{what} holds {value}; every value must lie in 0..=1"
+                )));
+            }
+        }
+        Ok(RgbdFrame {
+            rgb: rgb.as_standard_layout().into_owned(),
+            depth: depth.as_standard_layout().into_owned(),
+        })
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.depth.dim()
+    }
+
+    /// The amplitudes, (3, H, W), contiguous.
+    pub fn rgb(&self) -> ArrayView3<'_, f32> {
+        self.rgb.view()
+    }
+
+    /// The normalized depth, (H, W), contiguous.
+    pub fn depth(&self) -> ArrayView2<'_, f32> {
+        self.depth.view()
+    }
+
+    /// The network's input, (4, H, W): red, green, blue, depth, each minus ½.
+    ///
+    /// # Panics
+    /// If `input` has not 4·H·W values.
+    pub fn network_input(&self, input: &mut [f32]) {
+        assert_eq!(input.len(), 4 * self.depth.len());
+        let planes = self.rgb.iter().chain(&self.depth);
+        for (to, from) in input.iter_mut().zip(planes) {
+            *to = from - 0.5;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn message(rgb: Array3<f32>, depth: Array2<f32>) -> String {
+        RgbdFrame::new(rgb, depth).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn unusable_frames_are_named() {
+        let rgb = || Array3::zeros((3, 2, 4));
+        let depth = || Array2::zeros((2, 4));
+        assert!(message(Array3::zeros((4, 2, 4)), depth()).contains("4 planes"));
+        assert!(message(Array3::zeros((3, 0, 4)), Array2::zeros((0, 4))).contains("empty"));
+        assert!(message(rgb(), Array2::zeros((4, 2))).contains("4×2 and depth 2×4"));
+        for bad in [f32::NAN, f32::INFINITY, -0.1, 1.1] {
+            assert!(message(rgb(), depth() + bad).starts_with("frame: depth"));
+            assert!(message(rgb() + bad, depth()).starts_with("frame: colour"));
+        }
+    }
+
+    #[test]
+    fn network_input_is_planar_and_centred() {
+        let rgb = Array3::from_shape_fn((3, 2, 2), |(c, y, x)| (c * 4 + y * 2 + x) as f32 / 16.0);
+        let frame = RgbdFrame::new(rgb, Array2::ones((2, 2))).unwrap();
+        let mut input = vec![0.0; 16];
+        frame.network_input(&mut input);
+        assert_eq!(input[5], 5.0 / 16.0 - 0.5);
+        assert_eq!(input[12..], [0.5; 4]);
+    }
+}

@@ -1,0 +1,172 @@
+//! From the midpoint hologram to the modulator's levels: offset, phase encoding, look-up table.
+//!
+//! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
+
+use crate::display::Display;
+use crate::encode::{Encoder, EncoderScratch, Encoding, Scale};
+use crate::error::{Error, Result};
+use crate::slm::Response;
+use crate::wave::asm::{Padding, Propagator};
+use crate::wave::fft::Scratch;
+use num_complex::Complex32;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// A plan for one shape, display and encoding. Immutable; shared between threads.
+pub struct Modulator {
+    size: usize,
+    /// None where the modulator stands at the midpoint.
+    offset: Option<[Propagator; 3]>,
+    encoder: Encoder,
+    scale: Scale,
+    response: Response,
+}
+
+/// Working memory of a [`Modulator`] for one call at a time.
+pub struct ModulatorScratch {
+    propagation: Option<Scratch>,
+    encoder: EncoderScratch,
+}
+
+/// What became of a field on the modulator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Modulation {
+    /// The amplitude that full light stands for.
+    pub scale: f32,
+    /// Time from the field to levels.
+    pub encode: Duration,
+}
+
+impl Modulator {
+    /// Plans the way of (3, `height`, `width`) midpoint holograms to `display`, whose response is
+    /// `response`.
+    ///
+    /// # Errors
+    /// An offset, shape or encoding that cannot be planned, or a fixed scale that is not positive.
+    pub fn new(
+        height: usize,
+        width: usize,
+        display: &Display,
+        encoding: Encoding,
+        scale: Scale,
+        response: Response,
+    ) -> Result<Self> {
+        if let Scale::Fixed(scale) = scale
+            && !(scale > 0.0 && scale.is_finite())
+        {
+            return Err(Error::Plan(format!(
+                "a scale of {scale} cannot stand for full light; it must be above 0"
+            )));
+        }
+        let offset = match display.offset_m() {
+            0.0 => None,
+            offset_m => Some(Propagator::for_colours(
+                height,
+                width,
+                display.pitch_m(),
+                display.wavelengths_m(),
+                offset_m,
+                Padding::Reach,
+            )?),
+        };
+        Ok(Modulator {
+            size: height * width,
+            offset,
+            encoder: Encoder::new(height, width, encoding)?,
+            scale,
+            response,
+        })
+    }
+
+    /// Working memory for one call at a time.
+    pub fn scratch(&self) -> ModulatorScratch {
+        ModulatorScratch {
+            propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
+            encoder: self.encoder.scratch(),
+        }
+    }
+
+    /// Takes a midpoint hologram, (3, H, W), to the modulator: ASM(H, offset)·exp(−i2π·offset/λ), Eq. 6,
+    /// whose second factor takes back the carrier that propagation here leaves out from the start.
+    /// Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` has not 3·H·W values.
+    pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
+        if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
+            for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.size)) {
+                plan.propagate(plane, scratch);
+            }
+        }
+    }
+
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W). `field` is left as the
+    /// encoder's filter made it. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate(
+        &self,
+        field: &mut [Complex32],
+        levels: &mut [u8],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let start = Instant::now();
+        let scale = self.encoder.encode_levels(
+            field,
+            self.scale,
+            &self.response,
+            levels,
+            &mut scratch.encoder,
+        );
+        Modulation {
+            scale,
+            encode: start.elapsed(),
+        }
+    }
+}
+
+/// Turns each colour of `field`, (3, H, W), by its mean phase arg Σu, so that its phase is centred on 0:
+/// a network's constant phase is arbitrary, and double phase wraps least around 0.
+pub fn remove_mean_phase(field: &mut [Complex32]) {
+    let size = field.len() / 3;
+    if size == 0 {
+        return;
+    }
+    const PART: usize = 1 << 14;
+    for plane in field.chunks_exact_mut(size) {
+        // Sums of fixed parts in a fixed order: the same bits on any number of threads.
+        let mut sum = num_complex::Complex64::ZERO;
+        for part in plane.chunks(PART) {
+            let part: Complex32 = part.iter().sum();
+            sum += num_complex::Complex64::new(part.re.into(), part.im.into());
+        }
+        let turn = num_complex::Complex64::from_polar(1.0, -sum.arg());
+        let turn = Complex32::new(turn.re as f32, turn.im as f32);
+        plane
+            .par_chunks_mut(PART)
+            .for_each(|part| part.iter_mut().for_each(|value| *value *= turn));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_phase_is_taken_from_each_colour() {
+        let mut field: Vec<_> = (0..3 * 20_000)
+            .map(|i| {
+                Complex32::from_polar(
+                    1.0 + (i % 7) as f32,
+                    (i / 20_000) as f32 + 0.1 * (i % 3) as f32,
+                )
+            })
+            .collect();
+        remove_mean_phase(&mut field);
+        for plane in field.chunks_exact(20_000) {
+            let sum: Complex32 = plane.iter().sum();
+            assert!(sum.arg().abs() < 1e-4);
+        }
+    }
+}

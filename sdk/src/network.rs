@@ -1,0 +1,331 @@
+//! The hologram network: loaded from ONNX, checked to be the paper's residual chain, run on frames of any size.
+//!
+//! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::run`] takes
+//! the planar input to the output planes; [`Head::field`] turns these into a complex field. What the chain is, stands
+//! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
+//! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
+
+pub mod chain;
+mod fused;
+mod head;
+mod metadata;
+mod onnx;
+mod operator;
+pub mod reference;
+mod stock;
+mod tensor;
+
+pub use chain::Precision;
+pub use head::Head;
+pub use metadata::{InputKind, TrainedDisplay};
+
+use crate::{Error, Result};
+use chain::Chain;
+use fused::{FusedChain, FusedScratch};
+pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
+use stock::StockPlan;
+use tract_onnx::pb::ModelProto;
+use tract_onnx::prelude::Framework;
+
+/// Most pixels of a frame on stock tract, which holds several layers at once: some 500 bytes a pixel.
+const MAX_STOCK_PIXELS: usize = 1 << 24;
+/// Most pixels of a frame at all.
+const MAX_PIXELS: usize = 1 << 28;
+
+/// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
+#[derive(Debug)]
+pub struct Network {
+    chain: Chain,
+    input: InputKind,
+    head: Head,
+    display: TrainedDisplay,
+    proto: ModelProto,
+}
+
+impl Network {
+    /// Reads an ONNX file's bytes and checks that they hold a hologram network: the residual chain of [`chain`], in
+    /// f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata.
+    ///
+    /// # Errors
+    /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right.
+    pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
+        let proto = tract_onnx::onnx()
+            .proto_model_for_read(&mut &*bytes)
+            .map_err(|why| {
+                Error::Network(format!(
+                    "not an ONNX file, or a truncated one: {}",
+                    format!("{why:#}").replace('\n', " ")
+                ))
+            })?;
+        let graph = proto
+            .graph
+            .as_ref()
+            .ok_or_else(|| Error::Network("not an ONNX file: it holds no graph".into()))?;
+        let chain = onnx::chain(graph)?;
+        let (input, head, display) = metadata::read(&proto.metadata_props)?;
+        if chain.inputs != input.channels() {
+            return Err(Error::Network(format!(
+                "phasefront.input is '{input}' with {} channels, but the graph's input has {}",
+                input.channels(),
+                chain.inputs
+            )));
+        }
+        if chain.outputs() != 6 {
+            return Err(Error::Network(format!(
+                "{} output channels; 6 are right, two a colour",
+                chain.outputs()
+            )));
+        }
+        match (head, chain.tanh) {
+            (Head::AmplitudePhase, false) => {
+                return Err(Error::Network(
+                    "phasefront.head 'amplitude-phase' needs a Tanh as the last node".into(),
+                ));
+            }
+            (Head::RealImaginary, true) => {
+                return Err(Error::Network(
+                    "phasefront.head 'real-imaginary' takes no Tanh as the last node".into(),
+                ));
+            }
+            _ => {}
+        }
+        if input == InputKind::Field && head != Head::AmplitudePhase {
+            return Err(Error::Network(
+                "phasefront.input 'field' needs phasefront.head 'amplitude-phase'".into(),
+            ));
+        }
+        Ok(Network {
+            chain,
+            input,
+            head,
+            display,
+            proto,
+        })
+    }
+
+    /// The chain itself: layers, filters, weights, quantisation.
+    pub fn chain(&self) -> &Chain {
+        &self.chain
+    }
+
+    /// How many convolutions.
+    pub fn layers(&self) -> usize {
+        self.chain.layers.len()
+    }
+
+    /// Filters of each hidden layer.
+    pub fn filters(&self) -> usize {
+        self.chain.filters()
+    }
+
+    /// The numbers that the file's layers compute in.
+    pub fn precision(&self) -> Precision {
+        self.chain.precision
+    }
+
+    /// What the input planes are.
+    pub fn input(&self) -> InputKind {
+        self.input
+    }
+
+    /// What the output planes are.
+    pub fn head(&self) -> Head {
+        self.head
+    }
+
+    /// The display it was trained for; another needs another network.
+    pub fn display(&self) -> &TrainedDisplay {
+        &self.display
+    }
+
+    /// Prepares the network for frames of `height` × `width` pixels, on the fastest path that runs it.
+    ///
+    /// # Errors
+    /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
+    pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
+        match FusedChain::new(&self.chain, None) {
+            Ok(chain) => self.fused_plan(height, width, chain),
+            Err(why) => {
+                let mut plan = self.plan_on_stock_tract(height, width)?;
+                plan.engine.why = why;
+                Ok(plan)
+            }
+        }
+    }
+
+    /// Prepares the network on the kernels of one instruction set.
+    ///
+    /// # Errors
+    /// As [`Network::plan`]; [`Error::Plan`] where this processor or those kernels cannot.
+    pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
+        let chain = FusedChain::new(&self.chain, Some(isa));
+        self.fused_plan(
+            height,
+            width,
+            chain.map_err(|why| Error::Plan(format!("network: {why}")))?,
+        )
+    }
+
+    fn fused_plan(&self, height: usize, width: usize, chain: FusedChain) -> Result<NetworkPlan> {
+        check_size(height, width, MAX_PIXELS)?;
+        let isa = chain.isa();
+        let why = format!(
+            "{} layers of {} filters in {}: one fused chain",
+            self.layers(),
+            self.filters(),
+            self.precision()
+        );
+        Ok(NetworkPlan {
+            inputs: self.chain.inputs,
+            outputs: self.chain.outputs(),
+            height,
+            width,
+            path: Path::Fused(chain),
+            engine: Engine {
+                name: isa.name(),
+                isa: Some(isa),
+                why,
+            },
+        })
+    }
+
+    /// The network as a tract graph of any frame size, its chain one fused operator: for graphs built around it.
+    /// [`Network::plan`] runs the same kernels on the caller's memory, without tract's copies.
+    ///
+    /// # Errors
+    /// [`Error::Network`] when the kernels do not take the chain, or tract refuses the graph.
+    pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
+        let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
+        operator::model(&self.proto, chain, self.chain.inputs)
+    }
+
+    /// Prepares the network on stock tract whatever the fast path could do: the independent check of that path.
+    ///
+    /// # Errors
+    /// As [`Network::plan`].
+    pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
+        check_size(height, width, MAX_STOCK_PIXELS)?;
+        let plan = StockPlan::new(&self.proto, [1, self.chain.inputs, height, width])?;
+        Ok(NetworkPlan {
+            inputs: self.chain.inputs,
+            outputs: self.chain.outputs(),
+            height,
+            width,
+            path: Path::Stock(plan),
+            engine: Engine {
+                name: "tract",
+                isa: None,
+                why: "stock tract".into(),
+            },
+        })
+    }
+}
+
+fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
+    match height.checked_mul(width) {
+        Some(0) => Err(Error::Plan(format!(
+            "network: a frame of {width}×{height} pixels is empty"
+        ))),
+        Some(pixels) if pixels <= most => Ok(()),
+        _ => Err(Error::Plan(format!(
+            "network: a frame of {width}×{height} pixels is too large; {most} pixels are the most"
+        ))),
+    }
+}
+
+/// Which path runs a plan, and why that one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Engine {
+    /// The kernels' name, or "tract".
+    pub name: &'static str,
+    /// The instruction set; none on tract.
+    pub isa: Option<Isa>,
+    /// Why this path was taken.
+    pub why: String,
+}
+
+enum Path {
+    Fused(FusedChain),
+    Stock(StockPlan),
+}
+
+/// A network prepared for one frame size. Immutable; one plan serves many threads, each with its own scratch.
+pub struct NetworkPlan {
+    inputs: usize,
+    outputs: usize,
+    height: usize,
+    width: usize,
+    path: Path,
+    engine: Engine,
+}
+
+/// Working memory of [`NetworkPlan::run`], from [`NetworkPlan::scratch`].
+///
+/// It is filled in the first frame, a few megabytes for each thread of the pool and independent of the frame's height.
+#[derive(Debug, Default)]
+pub struct NetworkScratch {
+    fused: FusedScratch,
+}
+
+impl NetworkScratch {
+    /// Bytes held between frames.
+    pub fn bytes(&self) -> usize {
+        self.fused.bytes()
+    }
+}
+
+impl NetworkPlan {
+    /// Working memory for one run at a time.
+    pub fn scratch(&self) -> NetworkScratch {
+        NetworkScratch::default()
+    }
+
+    /// The frame's height and width in pixels.
+    pub fn size(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// Channels of the input and of the output.
+    pub fn channels(&self) -> (usize, usize) {
+        (self.inputs, self.outputs)
+    }
+
+    /// Which path runs this plan, and why.
+    pub fn engine(&self) -> &Engine {
+        &self.engine
+    }
+
+    /// Runs the network on one frame, on the current rayon pool. After the first frame the fused path allocates
+    /// nothing.
+    ///
+    /// `input` is planar (C, H, W), RGB-D minus 0.5; `output` receives (6, H, W) as [`Head::field`] reads it.
+    ///
+    /// # Errors
+    /// [`Error::Frame`] when a length is wrong.
+    pub fn run(
+        &self,
+        input: &[f32],
+        output: &mut [f32],
+        scratch: &mut NetworkScratch,
+    ) -> Result<()> {
+        let area = self.height * self.width;
+        for (what, is, channels) in [
+            ("input", input.len(), self.inputs),
+            ("output", output.len(), self.outputs),
+        ] {
+            if is != channels * area {
+                return Err(Error::Frame(format!(
+                    "network {what} has {is} values; {channels} planes of {}×{} pixels are right",
+                    self.width, self.height
+                )));
+            }
+        }
+        match &self.path {
+            Path::Fused(chain) => {
+                chain.run(input, output, self.size(), &scratch.fused);
+                Ok(())
+            }
+            Path::Stock(plan) => plan.run(input, output),
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! A chain on Phasefront's own kernels: the choice of kernels, and the step sizes that they multiply by.
+
+use super::chain::{Chain, Precision, Quantisation, Weights};
+use phasefront_kernels::{
+    F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, Quantiser, Requantise, Scratch, SkipSum,
+};
+use rayon::prelude::*;
+
+/// A chain packed for the kernels; any frame size, threads share it.
+pub(super) struct FusedChain {
+    kernels: Kernels,
+    tanh: bool,
+}
+
+enum Kernels {
+    Int8(Int8Chain),
+    F32(F32Chain),
+}
+
+/// Working memory of a run; grows in the first frame and is kept.
+#[derive(Debug, Default)]
+pub(super) struct FusedScratch {
+    int8: Scratch<u8>,
+    f32: Scratch<f32>,
+}
+
+impl FusedScratch {
+    pub(super) fn bytes(&self) -> usize {
+        self.int8.bytes() + self.f32.bytes()
+    }
+}
+
+impl FusedChain {
+    /// Packs `chain` for `isa`, or for the fastest kernels that this processor runs.
+    ///
+    /// The error says what the kernels cannot run.
+    pub(super) fn new(chain: &Chain, isa: Option<Isa>) -> Result<FusedChain, String> {
+        let fastest = |found: Vec<Isa>| isa.or(found.first().copied()).unwrap_or(Isa::Portable);
+        let kernels = match chain.precision {
+            Precision::Int8 => Kernels::Int8(int8(chain, fastest(Isa::int8()))?),
+            Precision::F32 => Kernels::F32(f32(chain, fastest(Isa::f32()))?),
+        };
+        Ok(FusedChain {
+            kernels,
+            tanh: chain.tanh,
+        })
+    }
+
+    pub(super) fn isa(&self) -> Isa {
+        match &self.kernels {
+            Kernels::Int8(chain) => chain.isa(),
+            Kernels::F32(chain) => chain.isa(),
+        }
+    }
+
+    /// Runs the chain on the current rayon pool; `input` and `output` are planes of `size` (height, width).
+    pub(super) fn run(
+        &self,
+        input: &[f32],
+        output: &mut [f32],
+        size: (usize, usize),
+        scratch: &FusedScratch,
+    ) {
+        match &self.kernels {
+            Kernels::Int8(chain) => {
+                chain.run(
+                    input,
+                    output,
+                    size,
+                    chain.tiling(size.0, size.1),
+                    &scratch.int8,
+                );
+            }
+            Kernels::F32(chain) => {
+                chain.run(
+                    input,
+                    output,
+                    size,
+                    chain.tiling(size.0, size.1),
+                    &scratch.f32,
+                );
+            }
+        }
+        if self.tanh {
+            const CHUNK: usize = 1 << 14;
+            output
+                .par_chunks_mut(CHUNK)
+                .for_each(|chunk| chunk.iter_mut().for_each(|v| *v = tanh(*v)));
+        }
+    }
+}
+
+fn f32(chain: &Chain, isa: Isa) -> Result<F32Chain, String> {
+    let layers = chain.layers.iter().map(|layer| match &layer.weights {
+        Weights::F32 { kernel, bias } => Ok(F32Layer {
+            inputs: layer.inputs,
+            outputs: layer.outputs,
+            kernel: kernel.clone(),
+            bias: bias.clone(),
+        }),
+        Weights::Int8 { .. } => Err(format!("layer '{}' is int8 in an f32 chain", layer.name)),
+    });
+    F32Chain::new(&layers.collect::<Result<Vec<_>, _>>()?, isa)
+}
+
+fn int8(chain: &Chain, isa: Isa) -> Result<Int8Chain, String> {
+    let input = |i: usize| -> Result<Quantisation, String> {
+        chain.layers[i]
+            .quantisation
+            .input
+            .ok_or_else(|| format!("layer {i}'s input is not rounded"))
+    };
+    let last = chain.layers.len() - 1;
+    let mut layers = Vec::new();
+    for (i, layer) in chain.layers.iter().enumerate() {
+        let Weights::Int8 {
+            kernel,
+            scale,
+            bias,
+        } = &layer.weights
+        else {
+            return Err(format!("layer '{}' is f32 in an int8 chain", layer.name));
+        };
+        // One step of what the sums are multiplied to, and what follows.
+        let mut requantise = Requantise {
+            skip: None,
+            rescale: None,
+        };
+        let step = if i == last {
+            1.0
+        } else {
+            let next = &chain.layers[i + 1].quantisation;
+            let end = f64::from(input(i + 1)?.scale);
+            let relu = next.relu.map(|q| f64::from(q.scale));
+            // The first rounding of what the concatenation reads, if it is rounded before.
+            let first = if Chain::has_skip(i + 1) {
+                next.sum.map(|q| f64::from(q.scale))
+            } else {
+                relu
+            };
+            let target = first.unwrap_or(end);
+            requantise.rescale = first
+                .map(|first| (first / end) as f32)
+                .filter(|_| i + 1 == last);
+            if Chain::has_skip(i + 1) {
+                requantise.skip = Some(SkipSum {
+                    relu: relu.map(|relu| (relu / target) as f32),
+                    skip: (f64::from(input(i - 1)?.scale) / target) as f32,
+                });
+                relu.unwrap_or(target)
+            } else {
+                target
+            }
+        };
+        let input = input(i)?;
+        layers.push(Int8Layer {
+            inputs: layer.inputs,
+            outputs: layer.outputs,
+            zero_point: input.zero_point,
+            kernel: kernel.clone(),
+            bias: bias.clone(),
+            multiplier: scale
+                .iter()
+                .map(|&scale| (f64::from(input.scale) * f64::from(scale) / step) as f32)
+                .collect(),
+            requantise,
+        });
+    }
+    let quantiser = |q: Quantisation| Quantiser {
+        scale: q.scale,
+        zero_point: q.zero_point,
+    };
+    Int8Chain::new(
+        &layers,
+        quantiser(input(0)?),
+        quantiser(input(last)?),
+        chain.concat_rounded_input,
+        isa,
+    )
+}
+
+/// tanh to 3e-7, without branches, so that loops over it vectorise: `1 − 2/(e^2x + 1)`.
+#[inline(always)]
+fn tanh(x: f32) -> f32 {
+    // Beyond ±10 tanh is ±1 in f32.
+    let y = x.clamp(-10.0, 10.0) * (2.0 * std::f32::consts::LOG2_E);
+    // 2^y = 2^k · 2^r with |r| ≤ ½; adding 1.5·2²³ rounds and leaves k in the low bits.
+    const ROUND: f32 = 12_582_912.0;
+    let shifted = y + ROUND;
+    let k = shifted.to_bits() << 23;
+    let r = (y - (shifted - ROUND)) * std::f32::consts::LN_2;
+    // Taylor series of e^r; the next term is below 2e-7 of the sum.
+    let e = 1.0
+        + r * (1.0
+            + r * (1.0 / 2.0 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
+    let e = f32::from_bits(e.to_bits().wrapping_add(k));
+    1.0 - 2.0 / (e + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tanh_agrees_with_f64() {
+        for k in -120_000..=120_000 {
+            let x = k as f32 / 10_000.0;
+            let worst = (f64::from(tanh(x)) - f64::from(x).tanh()).abs();
+            assert!(worst < 3e-7, "tanh {x} is off by {worst}");
+        }
+        for (x, expected) in [(1e30, 1.0), (-1e30, -1.0), (f32::INFINITY, 1.0), (0.0, 0.0)] {
+            assert!((tanh(x) - expected).abs() < 3e-7);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
+
+use super::Head;
+use crate::{Error, Result};
+use tract_onnx::pb::StringStringEntryProto;
+
+/// What a network's input planes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum InputKind {
+    /// "rgbd": red, green, blue and normalized depth, each minus 0.5.
+    Rgbd,
+    /// "ldi2" to "ldi9": that many layers front first, each as [`InputKind::Rgbd`].
+    Ldi {
+        /// How many layers.
+        layers: usize,
+    },
+    /// "field": amplitude (3) and phase (3) planes of a field; a pre-filter network.
+    Field,
+}
+
+impl InputKind {
+    /// Planes of the input.
+    pub fn channels(self) -> usize {
+        match self {
+            InputKind::Rgbd => 4,
+            InputKind::Ldi { layers } => 4 * layers,
+            InputKind::Field => 6,
+        }
+    }
+
+    fn from_name(name: &str) -> Option<InputKind> {
+        match name.as_bytes() {
+            b"rgbd" => Some(InputKind::Rgbd),
+            b"field" => Some(InputKind::Field),
+            [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
+                layers: usize::from(n - b'0'),
+            }),
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for InputKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            InputKind::Rgbd => f.write_str("rgbd"),
+            InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
+            InputKind::Field => f.write_str("field"),
+        }
+    }
+}
+
+/// The display that a network was trained for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainedDisplay {
+    /// Pixel pitch of the modulator, metres.
+    pub pitch_m: f64,
+    /// Wavelengths of red, green and blue, metres.
+    pub wavelengths_m: [f64; 3],
+    /// Depth of the volume, metres.
+    pub volume_depth_m: f64,
+    /// Distance of the hologram plane from the volume's middle, metres; 0 for a midpoint hologram.
+    pub offset_m: f64,
+}
+
+/// Reads all that the metadata must say.
+pub(super) fn read(
+    metadata: &[StringStringEntryProto],
+) -> Result<(InputKind, Head, TrainedDisplay)> {
+    let input = text(metadata, "input", "'rgbd', 'ldi5' or 'field'")?;
+    let input = InputKind::from_name(input)
+        .ok_or_else(|| wrong("input", input, "'rgbd', 'ldi2' to 'ldi9' or 'field'"))?;
+    let heads = "'amplitude-phase' or 'real-imaginary'";
+    let head = text(metadata, "head", heads)?;
+    let head = [Head::AmplitudePhase, Head::RealImaginary]
+        .into_iter()
+        .find(|known| known.name() == head)
+        .ok_or_else(|| wrong("head", head, heads))?;
+    let positive = |v: &f64| *v > 0.0;
+    let wavelengths = numbers(
+        metadata,
+        "wavelengths_nm",
+        "three numbers in nm such as '638,520,450'",
+        positive,
+    )?;
+    let display = TrainedDisplay {
+        pitch_m: number(
+            metadata,
+            "pitch_um",
+            "a number in µm such as '8.0'",
+            positive,
+        )? * 1e-6,
+        wavelengths_m: wavelengths.map(|nm: f64| nm * 1e-9),
+        volume_depth_m: number(
+            metadata,
+            "volume_depth_mm",
+            "a number in mm such as '6.0'",
+            positive,
+        )? * 1e-3,
+        offset_m: number(metadata, "offset_mm", "a number in mm such as '0'", |v| {
+            v.is_finite()
+        })? * 1e-3,
+    };
+    Ok((input, head, display))
+}
+
+fn text<'a>(metadata: &'a [StringStringEntryProto], key: &str, right: &str) -> Result<&'a str> {
+    metadata
+        .iter()
+        .find(|entry| entry.key.strip_prefix("phasefront.") == Some(key))
+        .map(|entry| entry.value.trim())
+        .ok_or_else(|| {
+            Error::Network(format!(
+                "metadata 'phasefront.{key}' is missing; {right} is right"
+            ))
+        })
+}
+
+fn number(
+    metadata: &[StringStringEntryProto],
+    key: &str,
+    right: &str,
+    valid: impl Fn(&f64) -> bool,
+) -> Result<f64> {
+    numbers::<1>(metadata, key, right, valid).map(|[one]| one)
+}
+
+fn numbers<const N: usize>(
+    metadata: &[StringStringEntryProto],
+    key: &str,
+    right: &str,
+    valid: impl Fn(&f64) -> bool,
+) -> Result<[f64; N]> {
+    let value = text(metadata, key, right)?;
+    let parsed: Option<Vec<f64>> = value.split(',').map(|n| n.trim().parse().ok()).collect();
+    parsed
+        .filter(|all| all.iter().all(|v| v.is_finite() && valid(v)))
+        .and_then(|all| all.try_into().ok())
+        .ok_or_else(|| wrong(key, value, right))
+}
+
+fn wrong(key: &str, value: &str, right: &str) -> Error {
+    Error::Network(format!(
+        "metadata 'phasefront.{key}' is '{value}'; {right} is right"
+    ))
+}

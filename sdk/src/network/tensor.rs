@@ -1,0 +1,141 @@
+//! Constant tensors of an ONNX file, checked once: as many values as the shape says, real values finite.
+
+use tract_onnx::pb::{TensorProto, tensor_proto::DataType};
+
+/// A constant and its values. Types that a chain has no use for are kept by name, for the message of whoever reads them.
+#[derive(Debug)]
+pub(super) struct Constant {
+    name: String,
+    shape: Vec<usize>,
+    values: Values,
+}
+
+#[derive(Debug)]
+enum Values {
+    F32(Vec<f32>),
+    U8(Vec<u8>),
+    I8(Vec<i8>),
+    I32(Vec<i32>),
+    Other(&'static str),
+}
+
+impl Constant {
+    pub(super) fn new(tensor: &TensorProto) -> Result<Constant, String> {
+        let name = tensor.name.clone();
+        if !tensor.external_data.is_empty() || tensor.data_location == Some(1) {
+            return Err(format!(
+                "tensor '{name}' lies in another file; store the weights inside the model"
+            ));
+        }
+        let shape: Option<Vec<usize>> = tensor
+            .dims
+            .iter()
+            .map(|&d| usize::try_from(d).ok())
+            .collect();
+        let shape = shape.ok_or_else(|| format!("tensor '{name}' has a negative dimension"))?;
+        let raw = &tensor.raw_data[..];
+        let values = match DataType::try_from(tensor.data_type) {
+            Ok(DataType::Float) if raw.is_empty() => Values::F32(tensor.float_data.clone()),
+            Ok(DataType::Float) => Values::F32(words(raw).map(f32::from_le_bytes).collect()),
+            Ok(DataType::Int32) if raw.is_empty() => Values::I32(tensor.int32_data.clone()),
+            Ok(DataType::Int32) => Values::I32(words(raw).map(i32::from_le_bytes).collect()),
+            Ok(DataType::Uint8) if raw.is_empty() => {
+                Values::U8(tensor.int32_data.iter().map(|&v| v as u8).collect())
+            }
+            Ok(DataType::Uint8) => Values::U8(raw.to_vec()),
+            Ok(DataType::Int8) if raw.is_empty() => {
+                Values::I8(tensor.int32_data.iter().map(|&v| v as i8).collect())
+            }
+            Ok(DataType::Int8) => Values::I8(raw.iter().map(|&v| v as i8).collect()),
+            Ok(other) => Values::Other(other.as_str_name()),
+            Err(_) => Values::Other("of an unknown type"),
+        };
+        let count = match &values {
+            Values::F32(v) => Some(v.len()),
+            Values::U8(v) => Some(v.len()),
+            Values::I8(v) => Some(v.len()),
+            Values::I32(v) => Some(v.len()),
+            Values::Other(_) => None,
+        };
+        let expected = shape.iter().try_fold(1usize, |n, &d| n.checked_mul(d));
+        if count.is_some() && count != expected {
+            return Err(format!(
+                "tensor '{name}' has shape {shape:?} but {} values",
+                count.unwrap_or(0)
+            ));
+        }
+        if let Values::F32(v) = &values
+            && let Some(bad) = v.iter().find(|v| !v.is_finite())
+        {
+            return Err(format!(
+                "tensor '{name}' holds {bad}; every value must be finite"
+            ));
+        }
+        Ok(Constant {
+            name,
+            shape,
+            values,
+        })
+    }
+
+    pub(super) fn shape(&self) -> &[usize] {
+        &self.shape
+    }
+
+    pub(super) fn f32s(&self) -> Result<&[f32], String> {
+        if let Values::F32(v) = &self.values {
+            Ok(v)
+        } else {
+            Err(self.wrong_type("f32"))
+        }
+    }
+
+    pub(super) fn u8s(&self) -> Result<&[u8], String> {
+        if let Values::U8(v) = &self.values {
+            Ok(v)
+        } else {
+            Err(self.wrong_type("u8"))
+        }
+    }
+
+    pub(super) fn i8s(&self) -> Result<&[i8], String> {
+        if let Values::I8(v) = &self.values {
+            Ok(v)
+        } else {
+            Err(self.wrong_type("i8"))
+        }
+    }
+
+    pub(super) fn i32s(&self) -> Result<&[i32], String> {
+        if let Values::I32(v) = &self.values {
+            Ok(v)
+        } else {
+            Err(self.wrong_type("i32"))
+        }
+    }
+
+    /// Whether all values are integer zeros.
+    pub(super) fn is_zero(&self) -> bool {
+        match &self.values {
+            Values::U8(v) => v.iter().all(|&v| v == 0),
+            Values::I8(v) => v.iter().all(|&v| v == 0),
+            Values::I32(v) => v.iter().all(|&v| v == 0),
+            Values::F32(_) | Values::Other(_) => false,
+        }
+    }
+
+    fn wrong_type(&self, right: &str) -> String {
+        let is = match self.values {
+            Values::F32(_) => "f32",
+            Values::U8(_) => "u8",
+            Values::I8(_) => "i8",
+            Values::I32(_) => "i32",
+            Values::Other(name) => name,
+        };
+        format!("tensor '{}' is {is}; {right} is right", self.name)
+    }
+}
+
+fn words(raw: &[u8]) -> impl Iterator<Item = [u8; 4]> + '_ {
+    raw.as_chunks::<4>().0.iter().copied()
+}

@@ -1,0 +1,156 @@
+//! Phase to modulator levels and back: the linear response, or a 256-entry look-up table that
+//! a calibration measured.
+
+use crate::error::{Error, Result};
+use std::f32::consts::TAU;
+
+/// What a modulator answers to a phase. Immutable; shared between threads.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Response {
+    /// Level round(φ/2π·2^bits) mod 2^bits.
+    Linear {
+        /// Bits of a level, 1 to 8.
+        bits: u32,
+    },
+    /// The phase is rounded to one of 256 steps of 2π/256, and `level[step]` shows it.
+    Lut {
+        /// The level that shows each step.
+        level: Box<[u8; 256]>,
+        /// For each level the middle of the steps that it shows; for a level that no step uses, the
+        /// phase of the nearest one that does.
+        phase: Box<[f32; 256]>,
+    },
+}
+
+impl Response {
+    /// The linear response.
+    ///
+    /// # Errors
+    /// `bits` outside 1..=8.
+    pub fn linear(bits: u32) -> Result<Self> {
+        if !(1..=8).contains(&bits) {
+            return Err(Error::Plan(format!(
+                "a modulator of {bits} bits has no 8-bit levels; bits must lie in 1..=8"
+            )));
+        }
+        Ok(Response::Linear { bits })
+    }
+
+    /// The response of a calibrated modulator: `level[i]` shows the phase 2πi/256.
+    pub fn lut(level: [u8; 256]) -> Self {
+        let mut used: [Option<f32>; 256] = [None; 256];
+        for shown in 0..=255u8 {
+            // The steps of one level may wrap around 2π, so their middle is that of unit vectors.
+            let steps = (0..256).filter(|&i| level[i] == shown);
+            let (sum, n) = steps.fold((num_complex::Complex32::ZERO, 0), |(sum, n), i| {
+                let step = num_complex::Complex32::from_polar(1.0, i as f32 / 256.0 * TAU);
+                (sum + step, n + 1)
+            });
+            if n > 0 {
+                used[shown as usize] = Some(crate::encode::double_phase::wrap(sum.arg()));
+            }
+        }
+        let phase = std::array::from_fn(|l| {
+            (0..256)
+                .flat_map(|d| [l.checked_sub(d), Some(l + d)])
+                .flatten()
+                .find_map(|near| used.get(near).copied().flatten())
+                .unwrap_or(0.0)
+        });
+        Response::Lut {
+            level: Box::new(level),
+            phase: Box::new(phase),
+        }
+    }
+
+    /// The level that shows `phase`, in \[0, 2π).
+    pub fn level(&self, phase: f32) -> u8 {
+        match self {
+            Response::Linear { bits } => step(phase, 1 << bits) as u8,
+            Response::Lut { level, .. } => level[step(phase, 256)],
+        }
+    }
+
+    /// The phase that `level` shows, in \[0, 2π).
+    pub fn phase(&self, level: u8) -> f32 {
+        match self {
+            Response::Linear { bits } => {
+                let levels = 1u32 << bits;
+                (u32::from(level) % levels) as f32 / levels as f32 * TAU
+            }
+            Response::Lut { phase, .. } => phase[level as usize],
+        }
+    }
+
+    /// [`Self::level`] of each phase. Allocates nothing.
+    ///
+    /// # Panics
+    /// If the lengths differ.
+    pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
+        assert_eq!(phases.len(), levels.len());
+        match self {
+            Response::Linear { bits } => {
+                for (level, phase) in levels.iter_mut().zip(phases) {
+                    *level = step(*phase, 1 << bits) as u8;
+                }
+            }
+            Response::Lut { level: table, .. } => {
+                for (level, phase) in levels.iter_mut().zip(phases) {
+                    *level = table[step(*phase, 256)];
+                }
+            }
+        }
+    }
+}
+
+/// round(φ/2π·n) mod n, for n a power of two up to 256.
+fn step(phase: f32, n: i32) -> usize {
+    // Phases are not negative, so the conversion's truncation is the floor.
+    ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn linear_levels_follow_the_rule_and_wrap() {
+        let r = Response::linear(8).unwrap();
+        assert_eq!(r.level(0.0), 0);
+        assert_eq!(r.level(TAU / 2.0), 128);
+        assert_eq!(r.level(TAU * 255.4 / 256.0), 255);
+        assert_eq!(r.level(TAU * 255.6 / 256.0), 0);
+        let r = Response::linear(2).unwrap();
+        assert_eq!(r.level(TAU * 0.24), 1);
+        assert_eq!(r.level(TAU * 0.9), 0);
+        assert!(Response::linear(0).is_err() && Response::linear(9).is_err());
+    }
+
+    #[test]
+    fn every_level_shows_the_phase_that_asks_for_it() {
+        let inverted = Response::lut(std::array::from_fn(|i| 255 - i as u8));
+        let shallow = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
+        for r in [Response::linear(8).unwrap(), inverted, shallow] {
+            for i in 0..256 {
+                let phase = i as f32 / 256.0 * TAU;
+                let shown = r.phase(r.level(phase));
+                let error = (shown - phase).abs();
+                assert!(error.min(TAU - error) < TAU / 256.0, "{i}: {shown}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_slice_form_agrees() {
+        let phases: Vec<f32> = (0..40_000).map(|i| i as f32 / 40_000.0 * TAU).collect();
+        let mut levels = vec![0; phases.len()];
+        for r in [
+            Response::linear(5).unwrap(),
+            Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8)),
+        ] {
+            r.levels(&phases, &mut levels);
+            assert!(phases.iter().zip(&levels).all(|(p, l)| r.level(*p) == *l));
+        }
+    }
+}

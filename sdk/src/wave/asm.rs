@@ -1,0 +1,276 @@
+//! The angular spectrum method, Eq. 2 of the paper: the field at a distance s from a plane.
+//!
+//! ASM(u, s) = F⁻¹(F(u) · exp(+i2πs·√(λ⁻² − µ² − ν²))), s positive toward the viewer; the
+//! evanescent part is zero. It is a linear convolution: the frame is padded with zeros and the
+//! result cropped to it.
+//!
+//! The carrier exp(i2πs/λ) is left out of the exponent, as
+//! √(λ⁻² − f²) − λ⁻¹ = −λf²/(1 + √(1 − λ²f²)), f² = µ² + ν². At 20 mm and 450 nm the carrier is
+//! 2.8·10⁵ rad: with it an f32 phase would be worth 0.03 rad; without it only what bends the
+//! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
+//! phase zero here, and both agree at z = 0.
+
+use super::fft::{Fft2, Scratch, smooth_size};
+use crate::error::{Error, Result};
+use num_complex::{Complex32, Complex64};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The most values a padded plane may hold: 1 GiB of complex numbers.
+pub const MAX_PADDED_VALUES: usize = 1 << 27;
+
+/// How far a frame is padded with zeros before its transform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Padding {
+    /// As far as light diffracted at the pitch can reach from the distance, see [`reach_m`].
+    Reach,
+    /// To twice the size, whatever the distance; beyond the distance that this can hold, the band
+    /// limit of Matsushima and Shimobaba keeps the kernel from wrapping around (Opt. Express 17,
+    /// 19662, 2009). The oracle of [`Padding::Reach`].
+    Double,
+    /// Not at all: the plane is periodic.
+    Circular,
+}
+
+/// How far sideways light of `wavelength_m` can travel over `distance_m` when diffracted by pixels
+/// of `pitch_m`: |s|·tan(asin(λ/2p)), metres.
+pub fn reach_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
+    distance_m.abs() * (wavelength_m / (2.0 * pitch_m)).asin().tan()
+}
+
+/// The carrier that fields here leave out: exp(i2πs/λ), its phase reduced in f64.
+pub fn carrier(distance_m: f64, wavelength_m: f64) -> Complex32 {
+    let turns = (distance_m / wavelength_m).fract();
+    let phase = Complex64::from_polar(1.0, 2.0 * PI * turns);
+    Complex32::new(phase.re as f32, phase.im as f32)
+}
+
+/// The padded shape (H', W') in which a (`height`, `width`) frame moves by up to `distance_m`.
+///
+/// # Errors
+/// A distance that is not finite, or whose padded plane would exceed [`MAX_PADDED_VALUES`].
+pub fn padded_shape(
+    height: usize,
+    width: usize,
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    padding: Padding,
+) -> Result<(usize, usize)> {
+    if height == 0 || width == 0 {
+        return Err(Error::Plan(format!(
+            "a plane of {width}×{height} is empty; each side must be at least 1"
+        )));
+    }
+    if !distance_m.is_finite() {
+        return Err(Error::Plan(format!(
+            "a distance of {distance_m} m cannot be propagated; it must be finite"
+        )));
+    }
+    let padded = |n: usize| -> f64 {
+        match padding {
+            Padding::Reach => {
+                n as f64 + (reach_m(distance_m, wavelength_m, pitch_m) / pitch_m).ceil()
+            }
+            Padding::Double => 2.0 * n as f64,
+            Padding::Circular => n as f64,
+        }
+    };
+    let (h, w) = (padded(height), padded(width));
+    if h * w > MAX_PADDED_VALUES as f64 {
+        return Err(Error::Plan(format!(
+            "a distance of {:.3} mm needs a padded plane of {w:.0}×{h:.0}, over the {} Mi values that fit; \
+             a shorter distance or a smaller frame is needed",
+            distance_m * 1e3,
+            MAX_PADDED_VALUES >> 20,
+        )));
+    }
+    Ok(match padding {
+        Padding::Circular => (height, width),
+        _ => (smooth_size(h as usize), smooth_size(w as usize)),
+    })
+}
+
+/// The transfer function of one distance on a padded plane, one quadrant of it: it is even in
+/// both frequencies.
+pub struct Transfer {
+    /// (W'/2 + 1, H'/2 + 1), scaled by 1/(H'·W') for the unnormalized transforms.
+    quadrant: Vec<Complex32>,
+    padded_height: usize,
+    padded_width: usize,
+}
+
+impl Transfer {
+    /// H(µ, ν) of `distance_m` on a padded plane (H', W'), zero where `keep` says no to |µ|, |ν| (cycles
+    /// a metre) and where the wave is evanescent.
+    pub fn new(
+        (padded_height, padded_width): (usize, usize),
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        keep: impl Fn(f64, f64) -> bool,
+    ) -> Self {
+        let (rows, columns) = (padded_height / 2 + 1, padded_width / 2 + 1);
+        let scale = 1.0 / (padded_height * padded_width) as f64;
+        let mut quadrant = Vec::with_capacity(rows * columns);
+        for kx in 0..columns {
+            let mu = kx as f64 / (padded_width as f64 * pitch_m);
+            for ky in 0..rows {
+                let nu = ky as f64 / (padded_height as f64 * pitch_m);
+                let f2 = mu * mu + nu * nu;
+                let cosine2 = 1.0 - wavelength_m * wavelength_m * f2;
+                quadrant.push(if cosine2 < 0.0 || !keep(mu, nu) {
+                    Complex32::new(0.0, 0.0)
+                } else {
+                    let phase = -2.0 * PI * distance_m * wavelength_m * f2 / (1.0 + cosine2.sqrt());
+                    let (sin, cos) = phase.sin_cos();
+                    Complex32::new((cos * scale) as f32, (sin * scale) as f32)
+                });
+            }
+        }
+        Transfer {
+            quadrant,
+            padded_height,
+            padded_width,
+        }
+    }
+
+    /// Multiplies column `x` of a spectrum by the transfer function.
+    pub fn apply(&self, x: usize, column: &mut [Complex32]) {
+        let rows = self.padded_height / 2 + 1;
+        let x = x.min(self.padded_width - x);
+        let transfer = &self.quadrant[x * rows..][..rows];
+        let (near, far) = column.split_at_mut(rows);
+        for (value, factor) in near.iter_mut().zip(transfer) {
+            *value *= factor;
+        }
+        for (value, factor) in far.iter_mut().rev().zip(&transfer[1..]) {
+            *value *= factor;
+        }
+    }
+}
+
+/// What [`Transfer::new`] is to keep under `padding`: everything, or the frequencies under the
+/// band limit where the doubled plane cannot hold the kernel.
+fn band_limit(
+    (padded_height, padded_width): (usize, usize),
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    padding: Padding,
+) -> impl Fn(f64, f64) -> bool {
+    // Matsushima's limit 1/(λ√((2s·Δf)² + 1)) with Δf the sampling of the spectrum.
+    let limit = |n: usize| match padding {
+        Padding::Double => {
+            let df = 1.0 / (n as f64 * pitch_m);
+            1.0 / (wavelength_m * ((2.0 * distance_m * df).powi(2) + 1.0).sqrt())
+        }
+        _ => f64::INFINITY,
+    };
+    let (limit_x, limit_y) = (limit(padded_width), limit(padded_height));
+    move |mu, nu| mu <= limit_x && nu <= limit_y
+}
+
+/// A plan for one shape, wavelength and distance. Immutable; shared between threads.
+///
+/// ```
+/// use num_complex::Complex32;
+/// use phasefront::wave::asm::{Padding, Propagator};
+///
+/// let plan = Propagator::new(64, 48, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
+/// let mut scratch = plan.scratch();
+/// let mut plane = vec![Complex32::new(1.0, 0.0); 64 * 48];
+/// plan.propagate(&mut plane, &mut scratch);
+/// # Ok::<(), phasefront::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Propagator {
+    shape: (usize, usize),
+    fft: Arc<Fft2>,
+    transfer: Arc<Transfer>,
+}
+
+impl Propagator {
+    /// Plans ASM(·, `distance_m`) of (`height`, `width`) planes.
+    ///
+    /// # Errors
+    /// As [`padded_shape`].
+    pub fn new(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        padding: Padding,
+    ) -> Result<Self> {
+        let padded = padded_shape(height, width, pitch_m, wavelength_m, distance_m, padding)?;
+        let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
+        Ok(Propagator {
+            shape: (height, width),
+            fft: Arc::new(Fft2::new(height, width, padded.0, padded.1)),
+            transfer: Arc::new(Transfer::new(
+                padded,
+                pitch_m,
+                wavelength_m,
+                distance_m,
+                keep,
+            )),
+        })
+    }
+
+    /// Three plans, one for each wavelength, that share one padded shape (red's, the widest) and so
+    /// one [`Scratch`].
+    ///
+    /// # Errors
+    /// As [`padded_shape`].
+    pub fn for_colours(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelengths_m: [f64; 3],
+        distance_m: f64,
+        padding: Padding,
+    ) -> Result<[Self; 3]> {
+        let longest = wavelengths_m.into_iter().fold(0.0, f64::max);
+        let padded = padded_shape(height, width, pitch_m, longest, distance_m, padding)?;
+        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        Ok(wavelengths_m.map(|wavelength_m| {
+            let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
+            Propagator {
+                shape: (height, width),
+                fft: fft.clone(),
+                transfer: Arc::new(Transfer::new(
+                    padded,
+                    pitch_m,
+                    wavelength_m,
+                    distance_m,
+                    keep,
+                )),
+            }
+        }))
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.shape
+    }
+
+    /// (H', W').
+    pub fn padded_shape(&self) -> (usize, usize) {
+        self.fft.padded_shape()
+    }
+
+    /// Working memory for one call at a time, sized for the current thread pool.
+    pub fn scratch(&self) -> Scratch {
+        self.fft.scratch()
+    }
+
+    /// Replaces `plane`, (H, W), by the field at the planned distance. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `plane` has not H·W values or `scratch` is another plan's.
+    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
+        self.fft
+            .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
+    }
+}

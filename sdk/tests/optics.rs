@@ -1,0 +1,296 @@
+//! The optics against the paper's equations in f64, and what physics demands of them.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../tests/reference.rs"]
+mod reference;
+
+use ndarray::{Array2, Array3};
+use phasefront::encode::{Encoder, Encoding, Scale};
+use phasefront::refocus::{Refocus, phase_only_field};
+use phasefront::slm::Response;
+use phasefront::wave::aperture::Aperture;
+use phasefront::wave::asm::{self, Padding, Propagator};
+use phasefront::{Display, wave};
+use reference::{relative_error, test_plane, widen};
+use rustfft::num_complex::{Complex32, Complex64};
+use std::f64::consts::PI;
+
+const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 130)];
+const RED: f64 = 638e-9;
+const PITCH: f64 = 8e-6;
+
+fn propagated(
+    plane: &[Complex32],
+    (h, w): (usize, usize),
+    s: f64,
+    padding: Padding,
+) -> Vec<Complex32> {
+    let plan = Propagator::new(h, w, PITCH, RED, s, padding).unwrap();
+    let mut out = plane.to_vec();
+    plan.propagate(&mut out, &mut plan.scratch());
+    out
+}
+
+fn energy(plane: &[Complex32]) -> f64 {
+    plane.iter().map(|v| f64::from(v.norm_sqr())).sum()
+}
+
+/// Light that stays away from the frame's edge over ±3 mm.
+fn inner_plane((h, w): (usize, usize), margin: usize) -> Vec<Complex32> {
+    let taper = |i: usize, n: usize| {
+        let edge = i.min(n - 1 - i) as f32 - margin as f32;
+        (edge / 16.0).clamp(0.0, 1.0)
+    };
+    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
+    let mut plane = test_plane((h, w), 3);
+    for (i, value) in plane.iter_mut().enumerate() {
+        *value *= smooth(taper(i / w, h)) * smooth(taper(i % w, w));
+    }
+    plane
+}
+
+#[test]
+fn propagation_agrees_with_equation_2() {
+    for shape in SIZES {
+        let plane = test_plane(shape, 1);
+        for distance in [3e-3, -1.7e-3, 0.0, 20e-3] {
+            for padding in [Padding::Reach, Padding::Double, Padding::Circular] {
+                let padded =
+                    asm::padded_shape(shape.0, shape.1, PITCH, RED, distance, padding).unwrap();
+                let wide = widen(&plane, shape);
+                let expected = reference::asm(&wide, PITCH, RED, distance, padded);
+                let carrier = asm::carrier(distance, RED);
+                let mut out = propagated(&plane, shape, distance, padding);
+                if padding == Padding::Double
+                    && asm::reach_m(distance, RED, PITCH) / PITCH > shape.0.min(shape.1) as f64
+                {
+                    continue; // the band limit binds: another equation
+                }
+                out.iter_mut().for_each(|v| *v *= carrier);
+                let error = relative_error(&widen(&out, shape), &expected);
+                assert!(error < 1e-4, "{shape:?} {distance} {padding:?}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn the_naive_oracle_agrees_too() {
+    for (shape, padded) in [((9, 14), (20, 27)), ((61, 47), (75, 64))] {
+        let wide = widen(&test_plane(shape, 2), shape);
+        let expected = reference::asm(&wide, PITCH, RED, 2e-3, padded);
+        let naive = wave::reference::propagate(&wide, PITCH, RED, 2e-3, padded);
+        assert!(relative_error(&naive, &expected) < 1e-9);
+    }
+}
+
+#[test]
+fn colours_share_a_shape_and_agree_with_equation_2() {
+    let shape = (61, 47);
+    let lambdas = Display::default().wavelengths_m();
+    let plans =
+        Propagator::for_colours(shape.0, shape.1, PITCH, lambdas, 6e-3, Padding::Reach).unwrap();
+    let mut scratch = plans[0].scratch();
+    for (plan, lambda) in plans.iter().zip(lambdas) {
+        let mut plane = test_plane(shape, 4);
+        let expected = reference::asm(
+            &widen(&plane, shape),
+            PITCH,
+            lambda,
+            6e-3,
+            plan.padded_shape(),
+        );
+        plan.propagate(&mut plane, &mut scratch);
+        plane
+            .iter_mut()
+            .for_each(|v| *v *= asm::carrier(6e-3, lambda));
+        assert!(relative_error(&widen(&plane, shape), &expected) < 1e-4);
+    }
+}
+
+#[test]
+fn padding_by_reach_holds_what_double_padding_holds() {
+    for (shape, distance) in [((256, 256), 3e-3), ((270, 480), -3e-3), ((192, 320), 6e-3)] {
+        let plane = inner_plane(shape, 4);
+        let near = widen(&propagated(&plane, shape, distance, Padding::Reach), shape);
+        let far = widen(&propagated(&plane, shape, distance, Padding::Double), shape);
+        let error = relative_error(&near, &far);
+        assert!(error < 2e-3, "{shape:?} {distance}: {error:e}");
+    }
+}
+
+#[test]
+fn energy_is_kept_and_the_way_back_returns_the_field() {
+    for shape in SIZES {
+        let plane = test_plane(shape, 5);
+        let there = propagated(&plane, shape, 2.5e-3, Padding::Circular);
+        assert!(
+            (energy(&there) / energy(&plane) - 1.0).abs() < 1e-4,
+            "{shape:?}"
+        );
+        let back = propagated(&there, shape, -2.5e-3, Padding::Circular);
+        assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 1e-4);
+    }
+    // The same where the frame is padded, for light that does not leave it.
+    let shape = (200, 240);
+    let plane = inner_plane(shape, 40);
+    let there = propagated(&plane, shape, 3e-3, Padding::Reach);
+    assert!((energy(&there) / energy(&plane) - 1.0).abs() < 1e-3);
+    let back = propagated(&there, shape, -3e-3, Padding::Reach);
+    assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 0.03);
+}
+
+#[test]
+fn a_positive_distance_converges_light_that_a_lens_sends_toward_the_viewer() {
+    // A wave that meets at z = +5 mm has the phase −πr²/(λ·z): it must grow brighter there and not at −5 mm.
+    let (h, w) = (128, 128);
+    let lens: Vec<_> = (0..h * w)
+        .map(|i| {
+            let (y, x) = ((i / w) as f64 - 64.0, (i % w) as f64 - 64.0);
+            let r2 = (x * x + y * y) * PITCH * PITCH;
+            let inside = if x.hypot(y) < 20.0 { 1.0 } else { 0.0 };
+            Complex32::from_polar(inside, (-PI * r2 / (RED * 5e-3)) as f32)
+        })
+        .collect();
+    let peak = |plane: Vec<Complex32>| plane.iter().map(Complex32::norm_sqr).fold(0.0, f32::max);
+    let toward = peak(propagated(&lens, (h, w), 5e-3, Padding::Reach));
+    let away = peak(propagated(&lens, (h, w), -5e-3, Padding::Reach));
+    assert!(toward > 10.0 * away, "{toward} {away}");
+}
+
+#[test]
+fn the_band_limit_keeps_a_far_field_from_wrapping_around() {
+    // At 2 m the kernel is far wider than the doubled plane; what comes must still be finite and no brighter.
+    let shape = (64, 64);
+    let plane = inner_plane(shape, 8);
+    let far = propagated(&plane, shape, 2.0, Padding::Double);
+    assert!(far.iter().all(|v| v.is_finite()));
+    assert!(energy(&far) < energy(&plane));
+}
+
+#[test]
+fn distances_that_cannot_be_held_are_refused() {
+    for bad in [f64::NAN, f64::INFINITY, 1e3] {
+        let e = Propagator::new(64, 64, PITCH, RED, bad, Padding::Reach)
+            .err()
+            .unwrap();
+        assert!(!e.to_string().contains('\n'), "{e}");
+    }
+    assert!(Propagator::new(0, 64, PITCH, RED, 1e-3, Padding::Reach).is_err());
+}
+
+#[test]
+fn double_phase_agrees_with_equation_7() {
+    for (h, w) in SIZES {
+        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 10 + c)).collect();
+        let wide = Array3::from_shape_vec(
+            (3, h, w),
+            field
+                .iter()
+                .map(|v| Complex64::new(v.re.into(), v.im.into()))
+                .collect(),
+        )
+        .unwrap();
+        let brightest = wide.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        for (scale, number) in [(Scale::Max, brightest), (Scale::Fixed(0.8), 0.8)] {
+            let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+            let mut phase = vec![0.0; 3 * h * w];
+            let used = encoder.encode(&mut field, scale, &mut phase, &mut encoder.scratch());
+            assert!((f64::from(used) - number).abs() < 1e-6);
+            let expected = reference::double_phase(&wide, number);
+            for (got, want) in phase.iter().zip(&expected) {
+                // acos is infinitely steep at the brightest pixels: compare the phasors.
+                let apart = (Complex64::from_polar(1.0, f64::from(*got))
+                    - Complex64::from_polar(1.0, *want))
+                .norm();
+                assert!(apart < 1.5e-3, "{got} {want}");
+            }
+            let error: f64 = phase
+                .iter()
+                .zip(&expected)
+                .map(|(a, b)| {
+                    (Complex64::from_polar(1.0, f64::from(*a)) - Complex64::from_polar(1.0, *b))
+                        .norm_sqr()
+                })
+                .sum();
+            assert!((error / phase.len() as f64).sqrt() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
+    let (h, w) = (96, 120);
+    let smooth = |c: usize, y: usize, x: usize| {
+        let (y, x) = (y as f32 / h as f32, x as f32 / w as f32);
+        let turn = std::f32::consts::TAU;
+        let amplitude = 0.5 + 0.2 * (turn * x).sin() + 0.2 * (turn * y + c as f32).cos();
+        Complex32::from_polar(amplitude, 0.4 * (turn * (x + y)).sin())
+    };
+    let field = Array3::from_shape_fn((3, h, w), |(c, y, x)| smooth(c, y, x));
+    for encoding in [
+        Encoding::DoublePhase,
+        Encoding::ANTI_ALIAS,
+        Encoding::BAND_LIMIT,
+    ] {
+        let encoder = Encoder::new(h, w, encoding).unwrap();
+        let mut phase = vec![0.0; 3 * h * w];
+        let mut given = field.clone().into_raw_vec_and_offset().0;
+        let scale = encoder.encode(&mut given, Scale::Max, &mut phase, &mut encoder.scratch());
+        assert!(
+            phase
+                .iter()
+                .all(|p| (0.0..std::f32::consts::TAU).contains(p))
+        );
+        let response = Response::linear(8).unwrap();
+        let mut levels = vec![0; phase.len()];
+        response.levels(&phase, &mut levels);
+        let mut shown = vec![Complex32::ZERO; phase.len()];
+        phase_only_field(&levels, &response, scale, &mut shown);
+        let aperture = Aperture::new(h, w, 0.7).unwrap();
+        for (shown, wanted) in shown.chunks_exact_mut(h * w).zip(field.outer_iter()) {
+            aperture.filter(shown, &mut aperture.scratch());
+            let wanted: Vec<_> = wanted.iter().copied().collect();
+            let error = relative_error(&widen(shown, (h, w)), &widen(&wanted, (h, w)));
+            assert!(error < 0.02, "{encoding:?}: {error}");
+        }
+    }
+}
+
+#[test]
+fn refocus_agrees_with_equation_2_from_any_offset() {
+    for (offset_m, shape) in [(0.0, (64, 64)), (6e-3, (61, 47)), (-4e-3, (270, 480))] {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let hologram: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 20 + c)).collect();
+        let z = [3e-3, 0.0, -2.2e-3];
+        let plan = Refocus::new(shape.0, shape.1, &display, &z, None).unwrap();
+        let padded = asm::padded_shape(
+            shape.0,
+            shape.1,
+            PITCH,
+            RED,
+            z.iter().map(|z| (z - offset_m).abs()).fold(0.0, f64::max),
+            Padding::Reach,
+        )
+        .unwrap();
+        let views = plan.focal_stack(&hologram, &z).unwrap();
+        for (view, z) in views.iter().zip(z) {
+            for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
+                let size = shape.0 * shape.1;
+                let plane = widen(&hologram[c * size..][..size], shape);
+                let expected = reference::asm(&plane, PITCH, lambda, z - offset_m, padded);
+                let seen = Array2::from_shape_vec(
+                    shape,
+                    view[c * size..][..size]
+                        .iter()
+                        .map(|v| Complex64::from(f64::from(*v)))
+                        .collect(),
+                )
+                .unwrap();
+                let error = relative_error(&seen, &expected.mapv(|v| Complex64::from(v.norm())));
+                assert!(error < 1e-4, "{offset_m} {z}: {error:e}");
+            }
+        }
+        assert!(plan.focal_stack(&hologram, &[0.5]).is_err());
+    }
+}

@@ -1,0 +1,1 @@
+"""Training of the networks of Phasefront: data, two stages, quantization, export, evaluation."""

@@ -1,0 +1,298 @@
+"""The command: `python -m phasefront_training COMMAND`. Flags are defined here, once; the work is elsewhere."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import torch
+
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
+from .checkpoint import Checkpoint
+from .encode import DeepDoublePhase
+from .stage1 import Stage1
+from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
+
+FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
+VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
+
+
+def parser():
+    top = argparse.ArgumentParser(prog="phasefront_training", description="Train hologram networks for a display.")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name, run, text):
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(run=run)
+        return sub
+
+    p = add("data", run_data, "Make a data set by the lab's command; what follows -- goes to `phasefront dataset`.")
+    p.add_argument("-o", "--output", required=True, help="folder of the data set")
+    p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --scenes 1000 --size 384 --planes 200")
+
+    p = add("stage1", run_stage1, "Train a hologram network on scenes and their holograms.")
+    training_flags(p)
+    resume_flag(p)
+    p.add_argument("--layers", type=int, default=15, help="convolution layers (default 15)")
+    p.add_argument("--filters", type=int, default=24, help="filters a layer (default 24)")
+    p.add_argument("--input", default="rgbd", help="rgbd or ldiN, N layers of a layered depth image (default rgbd)")
+    p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
+    p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
+
+    p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
+    training_flags(p, crop=384, rate=2e-4)
+    resume_flag(p)
+    p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
+    p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
+    p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter the identity first, as in the paper (default 0: it begins as the blur of AA-DPM)")
+
+    p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
+    p.add_argument("network", help="a checkpoint or a float32 .onnx")
+    p.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
+    training_flags(p, output="the .onnx file; training goes on in FILE.qat", rate=1e-4)
+
+    p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
+    p.add_argument("checkpoint")
+    p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="which, of a stage 2 checkpoint (default %(default)s)")
+    p.add_argument("-o", "--output", required=True, help="the .onnx file")
+
+    p = add("evaluate", run_evaluate, "PSNR and SSIM of networks on scenes not trained on, beside the RGB as the field.")
+    p.add_argument("networks", nargs="*", metavar="NETWORK", help="checkpoints or .onnx files, all for the same input")
+    p.add_argument("--clean-only", action="store_true", help="leave degraded depth out")
+    evaluation_flags(p)
+
+    p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
+    p.add_argument("checkpoint")
+    evaluation_flags(p)
+
+    p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
+    p.add_argument("checkpoint")
+    p.add_argument("figures", nargs="+", help="files that evaluate --json and evaluate-encoding --json wrote")
+    p.add_argument("-o", "--output", required=True, help="the card, NAME.md beside NAME.onnx")
+
+    p = add("plot", run_plot, "Plot the curves of trainings.")
+    p.add_argument("folders", nargs="+", help="output folders of trainings")
+    p.add_argument("-o", "--output", required=True, help="a .png or .svg file")
+    return top
+
+
+def machine_flags(p):
+    p.add_argument("--device", default="cpu", help="cpu or cuda (default cpu)")
+    p.add_argument("--threads", type=int, default=1, help="CPU threads; one network a process, one thread each, uses cores best (default 1)")
+
+
+def evaluation_flags(p):
+    p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("--split", choices=data.SPLITS, default="test")
+    p.add_argument("--scenes", type=int, help="only the first so many")
+    p.add_argument("--json", metavar="FILE", help="write the figures there too")
+    machine_flags(p)
+
+
+def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
+    p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("-o", "--output", required=True, help=output)
+    budget = p.add_mutually_exclusive_group()
+    budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
+    budget.add_argument("--steps", type=int, help="budget in steps")
+    p.add_argument("--batch", type=int, default=1, help="samples a step and process (default 1)")
+    p.add_argument("--crop", type=int, default=crop, help="pixels a side of a sample (default %(default)s)")
+    p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
+    p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
+    p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
+    p.add_argument("--scenes", type=int, help="only the first so many training scenes")
+    p.add_argument("--seed", type=int, default=0)
+    p.add_argument("--f32", action="store_true", help="float32 throughout; bf16 is 3 to 4 times faster where the CPU has it")
+    p.add_argument("--loaders", type=int, help="threads that draw samples ahead (default 0 on a CPU, 8 on a GPU)")
+    machine_flags(p)
+
+
+def resume_flag(p):
+    p.add_argument("--resume", action="store_true", help="go on from the checkpoint in the output folder, with its flags where none are given")
+
+
+def run_data(args):
+    arguments = args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
+    data.make(args.output, arguments, args.phasefront)
+
+
+def run_stage1(args):
+    resume = resumed(args)
+    workers = loop.Workers.start(args.device)
+    if resume is not None:
+        network = resume.network()
+        train, validation = load(args, network.architecture.ldi_layers)
+    else:
+        wanted = networks.Architecture(args.layers, args.filters, args.input, args.head)
+        train, validation = load(args, wanted.ldi_layers)
+        network = begun(args, wanted, train)
+    task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
+    go(task, args, workers, resume)
+
+
+def begun(args, wanted, train):
+    """A fresh network, or the one of --init, grown where it has fewer layers."""
+    if not args.init:
+        return networks.Chain(wanted)
+    network, _ = checkpoint.load_network(args.init)
+    found = network.architecture
+    if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
+        raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
+    return grow.grow(network, args.layers, quantize.examples(train))
+
+
+def run_stage2(args):
+    resume = resumed(args)
+    if resume is not None:
+        hologram, prefilter = resume.network("hologram"), resume.network("prefilter")
+        offset_m = resume.extra["offset_m"]
+    else:
+        if not args.init:
+            raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
+        hologram, _ = checkpoint.load_network(args.init)
+        prefilter = prefilter_network()
+        offset_m = args.offset_mm * 1e-3
+    workers = loop.Workers.start(args.device)
+    train, validation = load(args, hologram.architecture.ldi_layers)
+    model = DeepDoublePhase(hologram, prefilter, offset_m, train.display, bf16=not args.f32)
+    options = sampling(args)
+    if resume is None and args.identity_steps:
+        identity = Identity(model, train, validation, workers, **{k: v for k, v in options.items() if k != "planes"})
+        loop.fit(identity, loop.Budget(steps=args.identity_steps), 10 * args.rate, Path(args.output) / "identity", workers)
+    go(Stage2(model, train, validation, workers, **options), args, workers, resume)
+
+
+def sampling(args):
+    """What a step takes, as the tasks name it."""
+    return {name: getattr(args, name) for name in ("batch", "crop", "planes", "degraded", "seed")}
+
+
+def load(args, ldi_layers):
+    """The training scenes, and a few for the curve's validation."""
+    manifest = data.Manifest.read(args.data)
+    train = data.Scenes(manifest, "train", ldi_layers, args.scenes)
+    return train, data.Scenes(manifest, "validation", ldi_layers, VALIDATION_SCENES)
+
+
+def resumed(args):
+    """The checkpoint to go on from, or None."""
+    if not args.resume:
+        if args.minutes is None and args.steps is None:
+            raise ValueError("a training needs a budget: --minutes or --steps")
+        return None
+    return Checkpoint.load(Path(args.output) / "checkpoint.pt")
+
+
+def go(task, args, workers, resume, folder=None):
+    """Trains, and says where the result lies."""
+    folder = folder or args.output
+    options = {k: v for k, v in vars(args).items() if k not in ("run", "command", "resume", "output")}
+    loaders = args.loaders if args.loaders is not None else (8 if workers.device.type == "cuda" else 0)
+    budget = loop.Budget(args.steps, args.minutes)
+    last = loop.fit(task, budget, args.rate, folder, workers, resume, options, loaders=loaders)
+    if workers.rank == 0:
+        print(f"{last.step} steps in {last.elapsed_s / 60:.1f} minutes: {Path(folder) / 'checkpoint.pt'}", file=sys.stderr)
+
+
+def run_quantize(args):
+    network, display = checkpoint.load_network(args.network)
+    train, validation = load(args, network.architecture.ldi_layers)
+    ranges = quantize.calibrate(network, quantize.examples(train))
+    exact, rounded = quantize.figures(network, ranges, validation)
+    quantize.report("after training", exact, rounded)
+    quantized = quantize.Quantized(network, ranges)
+    if args.always_train or exact - rounded > quantize.ALLOWED_LOSS_DB:
+        if args.minutes is None and args.steps is None:
+            raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps")
+        workers = loop.Workers.start(args.device)
+        task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
+        go(task, args, workers, None, folder=f"{args.output}.qat")
+        quantize.report("trained through the rounding", exact, quantize.figures(network.cpu(), ranges, validation)[1])
+    export.write(export_int8.int8_model(quantized.cpu(), display), args.output)
+
+
+def run_export(args):
+    last = Checkpoint.load(args.checkpoint)
+    if args.network not in last.networks:
+        raise ValueError(f"{args.checkpoint}: no {args.network}, only {', '.join(last.networks)}")
+    model = export.float_model(last.network(args.network), last.display, last.extra.get("offset_m", 0.0))
+    export.write(model, args.output)
+
+
+def run_evaluate(args):
+    predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
+    layers = {architecture.ldi_layers for _, architecture in predictors.values()} or {1}
+    if len(layers) > 1:
+        raise ValueError("networks for different inputs are evaluated one call each")
+    scenes = data.Scenes(data.Manifest.read(args.data), args.split, layers.pop(), args.scenes)
+    methods = {"RGB as the field": evaluate.rgb_as_field} | {name: predict for name, (predict, _) in predictors.items()}
+    conditions = {"clean": False} if args.clean_only or scenes.ldi_layers > 1 else {"clean": False, "degraded": True}
+    results = {
+        name: {c: evaluate.evaluate(predict, scenes, degraded, progress=True) for c, degraded in conditions.items()}
+        for name, predict in methods.items()
+    }
+    print(evaluate.table(results))
+    if args.json:
+        evaluate.save({"data": scenes_of(args, scenes), "results": results}, args.json)
+
+
+def scenes_of(args, scenes):
+    """What figures were measured on."""
+    manifest = data.Manifest.read(args.data).table
+    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display")}
+
+
+def run_evaluate_encoding(args):
+    last = Checkpoint.load(args.checkpoint)
+    if "prefilter" not in last.networks:
+        raise ValueError(f"{args.checkpoint}: no checkpoint of stage 2")
+    hologram, prefilter = last.network("hologram"), last.network("prefilter")
+    scenes = data.Scenes(data.Manifest.read(args.data), args.split, hologram.architecture.ldi_layers, args.scenes)
+    model = DeepDoublePhase(hologram, prefilter, last.extra["offset_m"], scenes.display).to(args.device)
+    results = encoding_figures(model, scenes)
+    columns = list(next(iter(results.values())))
+    print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
+    for name, figures in results.items():
+        print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
+    if args.json:
+        evaluate.save({"data": scenes_of(args, scenes), "offset_mm": last.extra["offset_m"] * 1e3, "results": results}, args.json)
+
+
+def run_card(args):
+    card.write(args.output, Checkpoint.load(args.checkpoint), args.figures)
+
+
+def run_plot(args):
+    plot.plot(args.folders, args.output)
+
+
+def parse(arguments):
+    """Arguments; where a training is resumed, flags that are not given are those it was begun with."""
+    top = parser()
+    args = top.parse_args(arguments)
+    if not getattr(args, "resume", False):
+        return args
+    kept = Checkpoint.load(Path(args.output) / "checkpoint.pt").options
+    if args.minutes is not None or args.steps is not None:
+        kept = {k: v for k, v in kept.items() if k not in ("minutes", "steps")}
+    sub = next(a for a in top._actions if isinstance(a, argparse._SubParsersAction)).choices[args.command]
+    sub.set_defaults(**kept)
+    return top.parse_args(arguments)
+
+
+def main(arguments=None):
+    try:
+        args = parse(arguments)
+        if hasattr(args, "threads"):
+            torch.set_num_threads(args.threads)
+        if hasattr(args, "seed"):
+            torch.manual_seed(args.seed)
+        args.run(args)
+    except FAILURES as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

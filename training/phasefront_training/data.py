@@ -1,0 +1,248 @@
+"""Pairs of scene and hologram, as `phasefront dataset` writes them, held in memory; and samples drawn from them.
+
+A data set is a folder with `manifest.json` and one `pair_000123.npz` a scene:
+`rgb` uint8 (L, H, W, 4), front layer first, alpha 0 where the layer has no hit; `depth` uint16 (L, H, W),
+normalized depth times 65535; `hologram` complex64 (3, H, W), the midpoint hologram without the carrier.
+
+In memory a scene takes colour as uint8, depth and field as float16. The holograms are linear convolutions with
+black surroundings, so samples are crops, flips and transposes, never rolls.
+"""
+
+import io
+import json
+import os
+import subprocess
+import sys
+import threading
+import zipfile
+import zlib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from .degrade import degrade_depth
+from .optics import Display
+
+FORMAT = "phasefront-dataset-1"
+_HEADER = threading.Lock()
+SPLITS = ("train", "validation", "test")
+
+
+class DataError(Exception):
+    """Something about a data set that keeps it from being used; the message says what and where."""
+
+
+def make(output, arguments, command="phasefront"):
+    """Calls the lab's `phasefront dataset` to make or complete a data set; raises DataError where it fails."""
+    call = [command, "dataset", *arguments, "-o", str(output)]
+    try:
+        status = subprocess.run(call, check=False).returncode
+    except FileNotFoundError:
+        raise DataError(f"no command '{command}': build the lab (cargo build --release) and name it by --command") from None
+    if status != 0:
+        raise DataError(f"'{' '.join(call)}' ended with status {status}")
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a data set says of itself."""
+
+    folder: Path
+    table: dict
+
+    @classmethod
+    def read(cls, folder):
+        path = Path(folder) / "manifest.json"
+        try:
+            table = json.loads(path.read_text())
+        except FileNotFoundError:
+            raise DataError(f"{path}: not there; make the data set first (python -m phasefront_training data)") from None
+        except json.JSONDecodeError as error:
+            raise DataError(f"{path}: not JSON ({error})") from None
+        if table.get("format") != FORMAT:
+            raise DataError(f"{path}: the format is '{table.get('format')}', expected '{FORMAT}'")
+        missing = [key for key in ("size", "planes", "ldi_layers", "seed", "display", "splits") if key not in table]
+        if missing:
+            raise DataError(f"{path}: no {', '.join(missing)}")
+        return cls(Path(folder), table)
+
+    @property
+    def display(self):
+        return Display.from_manifest(self.table["display"])
+
+    def indices(self, split):
+        """The scene numbers of a split."""
+        if split not in self.table["splits"]:
+            raise DataError(f"{self.folder}: no split '{split}' in the manifest")
+        return range(*self.table["splits"][split])
+
+    def pair(self, index):
+        return self.folder / f"pair_{index:06d}.npz"
+
+
+def read_pair(path, ldi_layers):
+    """One pair as colour uint8 (3·L, H, W), depth float16 (L, H, W), field float16 (6, H, W).
+
+    A pixel without a hit gets colour 0 and depth 1. The field is three real parts, then three imaginary parts.
+    Raises DataError where the file is damaged or holds fewer than `ldi_layers` layers.
+    """
+    try:
+        rgba, depth, hologram = _read_arrays(path, ("rgb", "depth", "hologram"))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
+        raise DataError(f"{path}: damaged ({error})") from None
+    layers, height, width = depth.shape if depth.ndim == 3 else (0, 0, 0)
+    if rgba.shape != (layers, height, width, 4) or hologram.shape != (3, height, width):
+        raise DataError(f"{path}: shapes {rgba.shape}, {depth.shape}, {hologram.shape} do not belong together")
+    if layers < ldi_layers:
+        raise DataError(f"{path}: {layers} layers, the network's input takes {ldi_layers}")
+    if not np.isfinite(hologram).all():
+        raise DataError(f"{path}: the hologram holds values that are not finite")
+    hit = rgba[:ldi_layers, ..., 3] > 0
+    colour = np.where(hit[..., None], rgba[:ldi_layers, ..., :3], 0).astype(np.uint8)
+    depth = np.where(hit, depth[:ldi_layers] / np.float32(65535), 1).astype(np.float16)
+    field = np.concatenate([hologram.real, hologram.imag]).astype(np.float16)
+    return colour.transpose(0, 3, 1, 2).reshape(3 * ldi_layers, height, width), depth, field
+
+
+class Scenes:
+    """A split in memory. Damaged files are named on stderr and left out."""
+
+    def __init__(self, manifest, split, ldi_layers=1, limit=None, device="cpu"):
+        self.display = manifest.display
+        self.ldi_layers = ldi_layers
+        self.damaged = []
+        self.origin = {key: manifest.table[key] for key in ("seed", "planes")}
+        numbers = list(manifest.indices(split))[:limit]
+        present = [n for n in numbers if manifest.pair(n).exists()]
+        if len(present) < len(numbers):
+            print(f"{manifest.folder}: {len(numbers) - len(present)} of {len(numbers)} {split} pairs are not there", file=sys.stderr)
+        self.numbers, parts = [], []
+        with ThreadPoolExecutor(min(8, os.cpu_count() or 1)) as pool:
+            for number, read in zip(present, pool.map(lambda n: _try_read(manifest.pair(n), ldi_layers), present)):
+                if isinstance(read, DataError):
+                    self.damaged.append(manifest.pair(number))
+                    print(f"{read}; skipped", file=sys.stderr)
+                elif parts and read[1].shape != parts[0][1].shape:
+                    self.damaged.append(manifest.pair(number))
+                    print(f"{manifest.pair(number)}: {read[1].shape[1:]} pixels, others {parts[0][1].shape[1:]}; skipped", file=sys.stderr)
+                else:
+                    self.numbers.append(number)
+                    parts.append(tuple(map(torch.from_numpy, read)))
+        if not parts:
+            raise DataError(f"{manifest.folder}: no readable pair in the split '{split}'")
+        self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
+
+    def __len__(self):
+        return len(self.numbers)
+
+    @property
+    def shape(self):
+        return tuple(self.depth.shape[-2:])
+
+    @property
+    def facts(self):
+        """What a checkpoint keeps about the data it was trained on."""
+        return {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
+
+    def scene(self, i):
+        """Colour (3·L, H, W) in [0, 1], normalized depth (L, H, W) and the true field (3, H, W) of scene i."""
+        target = self.target[i].float()
+        return self.colour[i].float() / 255, self.depth[i].float(), torch.complex(target[:3], target[3:])
+
+
+def _read_arrays(path, names):
+    """Arrays of an .npz. Unpacking runs beside other threads; headers one at a time, for `ast`, which numpy parses
+    them by, fails in CPython 3.11 when two threads use it at once."""
+    with zipfile.ZipFile(path) as archive:
+        packed = [archive.read(f"{name}.npy") for name in names]
+    with _HEADER:
+        return [np.lib.format.read_array(io.BytesIO(each)) for each in packed]
+
+
+def _try_read(path, ldi_layers):
+    try:
+        return read_pair(path, ldi_layers)
+    except DataError as error:
+        return error
+
+
+def _gather(parts, k, device):
+    """Stacks member k of all parts, releasing each as it goes, so that memory does not double."""
+    whole = torch.empty((len(parts), *parts[0][k].shape), dtype=parts[0][k].dtype, device=device)
+    for i, part in enumerate(parts):
+        whole[i] = part[k].to(device)
+        parts[i] = tuple(None if j == k else member for j, member in enumerate(part))
+    return whole
+
+
+def network_input(colour, depth):
+    """The network's input (..., 4·L, H, W): colour and depth of each layer in turn, each minus 0.5."""
+    colour = colour.unflatten(-3, (-1, 3))
+    return torch.cat([colour, depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Samples for one step.
+
+    input: (N, C, H, W) as the network takes it. target: complex (N, 3, H, W). depth: clean normalized depth of the
+    front layer (N, H, W). valid: (N, 1, H, W), 1 where the network's view is not cut by the crop.
+    """
+
+    input: torch.Tensor
+    target: torch.Tensor
+    depth: torch.Tensor
+    valid: torch.Tensor
+
+
+class Sampler:
+    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before."""
+
+    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0):
+        if degraded and scenes.ldi_layers > 1:
+            raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
+        height, width = scenes.shape
+        self.scenes, self.batch, self.degraded = scenes, batch, degraded
+        self.crop = (min(crop, height), min(crop, width))
+        if self.crop[0] != self.crop[1]:
+            raise ValueError(f"scenes of {width}x{height} hold no square crop of {crop}")
+        if 4 * margin > self.crop[0] and self.crop != scenes.shape:
+            raise ValueError(f"a margin of {margin} px leaves too little of crops of {crop} px")
+        self.margin, self.seed, self.rank = margin, seed, rank
+
+    def draw(self, step):
+        rng = np.random.default_rng([self.seed, self.rank, step])
+        samples = [self._sample(rng) for _ in range(self.batch)]
+        return Batch(*(torch.stack(members) for members in zip(*samples)))
+
+    def _sample(self, rng):
+        scenes, (h, w), margin = self.scenes, self.crop, self.margin
+        height, width = scenes.shape
+        i = int(rng.integers(len(scenes)))
+        # Corners are drawn beyond the frame and clamped, so that the frame's borders are seen often enough.
+        y = int(np.clip(rng.integers(-margin, height - h + margin + 1), 0, height - h))
+        x = int(np.clip(rng.integers(-margin, width - w + margin + 1), 0, width - w))
+        window = (..., slice(y, y + h), slice(x, x + w))
+        colour = scenes.colour[i][window].float() / 255
+        depth = scenes.depth[i][window].float()
+        target = scenes.target[i][window].float()
+        valid = torch.zeros(1, h, w, device=depth.device)
+        # At the frame's border the network sees zeros in use as well; only cut sides are left out of the loss.
+        valid[
+            :,
+            margin if y > 0 else 0 : h - margin if y + h < height else h,
+            margin if x > 0 else 0 : w - margin if x + w < width else w,
+        ] = 1
+        seen = degrade_depth(colour, depth[0], rng)[None] if rng.random() < self.degraded else depth
+        members = [network_input(colour, seen), target, depth[:1], valid]
+        flip_y, flip_x, transpose = rng.random(3) < 0.5
+        axes = [axis for axis, flip in ((-2, flip_y), (-1, flip_x)) if flip]
+        if axes:
+            members = [member.flip(axes) for member in members]
+        if transpose:
+            members = [member.transpose(-1, -2) for member in members]
+        given, target, depth, valid = members
+        return given, torch.complex(target[:3].contiguous(), target[3:].contiguous()), depth[0], valid

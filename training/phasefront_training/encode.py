@@ -1,0 +1,119 @@
+"""From a complex field to a phase-only hologram and to what it shows, differentiably: Eq. 6 to 11.
+
+Fields are complex64 (N, 3, H, W). Offsets are signed distances in metres from the midpoint hologram to the modulator's
+plane (positive: toward the viewer).
+"""
+
+import math
+
+import torch
+from torch.nn import functional as F
+
+from .networks import head_field
+from .optics import padded_shape, propagate, transfer
+
+LARGEST = 1 - 1e-6  # of the normalized amplitude, so that the slope of acos stays finite
+BLUR_SIGMA = 0.7  # pixels, of AA-DPM
+DARK = 1e-3  # of the scale: below this amplitude the phase's gradient fades instead of growing without bound
+
+
+def channels(field):
+    """A field as the six real channels of a network: three real parts, three imaginary parts."""
+    return torch.cat([field.real, field.imag], 1)
+
+
+def scale_of(field):
+    """The largest amplitude over all colours of each image, (N, 1, 1, 1), plus 1e-6."""
+    return field.abs().amax((1, 2, 3), keepdim=True) + 1e-6
+
+
+def phase_of(field, scale):
+    """The phase in (−π, π], with a gradient that fades where the field is dark."""
+    phase = field.angle()
+    power = field.detach().abs().square()
+    weight = power / (power + (DARK * scale.detach()) ** 2)
+    return phase.detach() + weight * (phase - phase.detach())
+
+
+def double_phase(field, scale):
+    """Eq. 7: the phase map φ ± acos(|u|/scale), + where x + y is even; (N, 3, H, W), not wrapped."""
+    height, width = field.shape[-2:]
+    y = torch.arange(height, device=field.device)[:, None]
+    x = torch.arange(width, device=field.device)
+    sign = 1 - 2 * ((x + y) % 2)
+    return phase_of(field, scale) + sign * torch.acos((field.abs() / scale).clamp(max=LARGEST))
+
+
+def aperture(height, width, radius=1.0, device="cpu"):
+    """Eq. 9: 1 inside the circle of `radius` times the Nyquist frequency, in the order of fft2; (height, width)."""
+    y = torch.fft.fftfreq(height, 0.5, dtype=torch.float64, device=device)
+    x = torch.fft.fftfreq(width, 0.5, dtype=torch.float64, device=device)
+    return (y[:, None] ** 2 + x**2 <= radius**2).float()
+
+
+def reconstruct(phase, scale, offset_m, display, radius=1.0):
+    """Eq. 8 and 10: the midpoint hologram that a phase map at the offset shows behind the aperture.
+
+    A modulator of unit amplitude under light of amplitude `scale`; Eq. 7's 0.5 is left out, since the aperture's mean
+    of neighbours gives scale·cos(acos A) = the encoded amplitude without it. Black surroundings, cropped.
+    """
+    height, width = phase.shape[-2:]
+    shape = padded_shape(display, offset_m, height, width)
+    field = scale * torch.polar(torch.ones_like(phase), phase)
+    spectrum = torch.fft.fft2(field, s=shape) * aperture(*shape, radius, phase.device)
+    return torch.fft.ifft2(spectrum * transfer(display, -offset_m, *shape, phase.device))[..., :height, :width]
+
+
+class DeepDoublePhase(torch.nn.Module):
+    """The chain of stage 2: hologram network, offset, pre-filter network, double phase, aperture, back."""
+
+    def __init__(self, hologram, prefilter, offset_m, display, bf16=False):
+        super().__init__()
+        self.hologram, self.prefilter = hologram, prefilter
+        self.offset_m, self.display, self.bf16 = offset_m, display, bf16
+
+    def filtered(self, midpoint):
+        """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""
+        there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
+        x = channels(there).contiguous(memory_format=torch.channels_last)
+        with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
+            output = self.prefilter(x)
+        return head_field(self.prefilter.architecture, output, x)
+
+    def forward(self, x):
+        """(pre-encoding field at the modulator, post-encoding midpoint hologram) of network inputs."""
+        with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
+            output = self.hologram(x)
+        before = self.filtered(head_field(self.hologram.architecture, output, x))
+        scale = scale_of(before)
+        return before, reconstruct(double_phase(before, scale), scale, self.offset_m, self.display)
+
+
+def phase_regulariser(field):
+    """Eq. 11: standard deviation plus |mean| of the pre-encoding phase, a colour and image, then averaged.
+
+    The mean's sign is of no interest, so its modulus is taken.
+    """
+    phase = phase_of(field, scale_of(field)).flatten(2)
+    mean = phase.mean(-1, keepdim=True)
+    deviation = ((phase - mean).square().mean(-1) + 1e-12).sqrt()
+    return (deviation + mean[..., 0].abs()).mean()
+
+
+def wraps(phase):
+    """The share of values of a phase map outside (−π, π]: each is a jump of 2π on the modulator."""
+    return float(((phase > math.pi) | (phase <= -math.pi)).float().mean())
+
+
+def blur_kernel():
+    """The 3x3 Gaussian of AA-DPM, σ = 0.7 pixels."""
+    weights = torch.exp(-torch.tensor([1.0, 0.0, 1.0]) / (2 * BLUR_SIGMA**2))
+    weights = weights / weights.sum()
+    return weights[:, None] * weights
+
+
+def anti_alias(field):
+    """AA-DPM's filter: real and imaginary parts blurred; surroundings are black."""
+    kernel = blur_kernel().to(field.device).expand(6, 1, 3, 3)
+    blurred = F.conv2d(channels(field), kernel, padding=1, groups=6)
+    return torch.complex(blurred[:, :3].contiguous(), blurred[:, 3:].contiguous())

@@ -1,0 +1,127 @@
+"""How good a network's holograms are on scenes not trained on.
+
+Amplitude PSNR and SSIM (peak 1) of the midpoint hologram, and the same as the mean over a focal stack of five planes
+inside the volume; means over scenes. Beside the network stands 'the RGB as the field': the front layer's image with
+phase 0. With degraded depth, each scene's degradation is fixed by its number, so figures compare.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import torch
+from tqdm import tqdm
+
+from .checkpoint import load_network
+from .data import network_input
+from .degrade import degrade_depth
+from .files import replacing
+from .metrics import psnr, ssim
+from .networks import Architecture, head_field
+from .optics import propagate
+
+STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
+FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
+
+
+def rgb_as_field(colour, depth):
+    """The front layer's image as amplitude, with phase 0."""
+    return torch.complex(colour[:3], torch.zeros_like(colour[:3]))
+
+
+def torch_predictor(network, autocast=False):
+    """colour, depth -> field (3, H, W) by a network in memory."""
+    device = next(network.parameters()).device
+
+    def predict(colour, depth):
+        x = network_input(colour, depth)[None].to(device).contiguous(memory_format=torch.channels_last)
+        with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=autocast):
+            output = network(x)
+        return head_field(network.architecture, output, x)[0]
+
+    return predict
+
+
+def onnx_predictor(path, threads=None):
+    """(predict, architecture's input and head) by ONNX Runtime, float32 or int8."""
+    import onnxruntime
+
+    from .export import read_description
+
+    description = read_description(path)
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads or torch.get_num_threads()
+    session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    name = session.get_inputs()[0].name
+    meaning = Architecture(layers=3, input=description["input"], head=description["head"])
+
+    def predict(colour, depth):
+        x = network_input(colour.cpu(), depth.cpu())[None]
+        output = torch.from_numpy(session.run(None, {name: x.numpy()})[0])
+        return head_field(meaning, output, x)[0]
+
+    return predict, meaning
+
+
+def predictor(path, device="cpu"):
+    """(predict, architecture) of a checkpoint or an .onnx."""
+    if Path(path).suffix == ".onnx":
+        return onnx_predictor(path)
+    network, _ = load_network(path)
+    return torch_predictor(network.to(device).eval()), network.architecture
+
+
+def compare(field, truth, display, full=True):
+    """{figure: value} of a field against the true one, both (3, H, W); `full` adds all that takes long."""
+    truth = truth.to(field.device)
+    figures = {"amplitude_psnr": psnr(field.abs(), truth.abs())}
+    if full:
+        figures["amplitude_ssim"] = ssim(field.abs(), truth.abs())
+        pairs = []
+        for part in STACK:
+            z = part * display.volume_depth_m
+            pairs.append([propagate(f, z, display).abs() for f in (field, truth)])
+        figures["focal_psnr"] = float(np.mean([psnr(a, b) for a, b in pairs]))
+        figures["focal_ssim"] = float(np.mean([ssim(a, b) for a, b in pairs]))
+    return figures
+
+
+def scene_depth(scenes, i, degraded):
+    """Colour, depth (degraded or clean) and truth of a scene."""
+    colour, depth, truth = scenes.scene(i)
+    if degraded:
+        rng = np.random.default_rng([7, scenes.numbers[i]])
+        depth = torch.cat([degrade_depth(colour[:3], depth[0], rng)[None], depth[1:]])
+    return colour, depth, truth
+
+
+def evaluate(predict, scenes, degraded=False, full=True, progress=False):
+    """{figure: mean, 'worst': …} of a predictor over scenes."""
+    rows = []
+    for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
+        colour, depth, truth = scene_depth(scenes, i, degraded)
+        rows.append(compare(predict(colour, depth), truth, scenes.display, full))
+    means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
+    worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
+    return means | {
+        "scenes": len(rows),
+        "worst_scene": scenes.numbers[worst],
+        "worst_amplitude_psnr": round(rows[worst]["amplitude_psnr"], 4),
+    }
+
+
+def table(results):
+    """Markdown table of {method: {condition: figures}}."""
+    lines = ["| method | depth | amplitude PSNR / SSIM | focal stack PSNR / SSIM | worst scene |", "|---|---|---|---|---|"]
+    for method, conditions in results.items():
+        for condition, f in conditions.items():
+            amplitude = f"{f['amplitude_psnr']:.2f} / {f['amplitude_ssim']:.3f}"
+            focal = f"{f['focal_psnr']:.2f} / {f['focal_ssim']:.3f}"
+            lines.append(f"| {method} | {condition} | {amplitude} | {focal} | {f['worst_amplitude_psnr']:.2f} (scene {f['worst_scene']}) |")
+    return "\n".join(lines)
+
+
+def save(results, path):
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(results, indent=1) + "\n")

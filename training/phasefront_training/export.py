@@ -1,0 +1,156 @@
+"""Networks as ONNX files, and back.
+
+The graph is written node by node, so that its names are stable and a network's file is the same to the byte each time:
+input `rgbd` (1, 4, H, W) (`ldi` or `field` for the other kinds), nodes `conv_0`, `relu_0`, …, `add_3` before each
+layer that has a skip, `concat_L` before the last convolution, `tanh` behind it for the amplitude-phase head, output
+`field` (1, 6, H, W) (`filtered` where the input is `field`), the six channels of the last layer as networks.py gives them. H and W are dynamic. What the
+network is stands in `metadata_props`, keys `phasefront.*`. The int8 form is written by export_int8.py.
+"""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from onnx import TensorProto, helper, numpy_helper
+
+from .files import replacing
+from .networks import Architecture, Chain
+from .optics import Display
+
+OPSET = 17
+IR_VERSION = 8
+
+
+class ExportError(Exception):
+    """An .onnx that is not one of this package's networks; the message says what is missing."""
+
+
+def input_name(architecture):
+    """The name of the graph's input."""
+    return "ldi" if architecture.input.startswith("ldi") else architecture.input
+
+
+def output_name(architecture):
+    """The name of the graph's output; a graph cannot use one name twice."""
+    return "filtered" if architecture.input == "field" else "field"
+
+
+def metadata(architecture, display, offset_m=0.0):
+    """The key-value pairs that say what a network is and which display it was trained for."""
+    return {
+        "phasefront.input": architecture.input,
+        "phasefront.head": architecture.head,
+        "phasefront.pitch_um": _number(display.pitch_m * 1e6),
+        "phasefront.wavelengths_nm": ",".join(_number(w * 1e9) for w in display.wavelengths_m),
+        "phasefront.volume_depth_mm": _number(display.volume_depth_m * 1e3),
+        "phasefront.offset_mm": _number(offset_m * 1e3),
+    }
+
+
+def _number(value):
+    return f"{value:.9g}"
+
+
+def build(architecture, nodes, initializers, properties):
+    """A checked model of nodes from the network's input to its output."""
+    shape = [1, architecture.input_channels, "H", "W"]
+    graph = helper.make_graph(
+        nodes,
+        "phasefront",
+        [helper.make_tensor_value_info(input_name(architecture), TensorProto.FLOAT, shape)],
+        [helper.make_tensor_value_info(output_name(architecture), TensorProto.FLOAT, [1, 6, "H", "W"])],
+        initializers,
+    )
+    model = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION, producer_name="phasefront-training"
+    )
+    helper.set_model_props(model, properties)
+    onnx.checker.check_model(model, full_check=True)
+    return model
+
+
+def conv_node(i, inputs, output):
+    """The convolution of layer i."""
+    return helper.make_node("Conv", inputs, [output], f"conv_{i}", kernel_shape=[3, 3], pads=[1, 1, 1, 1], strides=[1, 1])
+
+
+def float_model(network, display, offset_m=0.0):
+    """The float32 model of a Chain."""
+    a = network.architecture
+    nodes, initializers, inputs = [], [], []
+    h = input_name(a)
+    for i, conv in enumerate(network.convs):
+        if a.has_skip(i):
+            nodes.append(helper.make_node("Add", [h, inputs[i - 2]], [f"add_{i}_out"], f"add_{i}"))
+            h = f"add_{i}_out"
+        inputs.append(h)
+        last = i == a.layers - 1
+        if last:
+            nodes.append(helper.make_node("Concat", [h, input_name(a)], [f"concat_{i}_out"], f"concat_{i}", axis=1))
+            h = f"concat_{i}_out"
+        for part in ("weight", "bias"):
+            values = getattr(conv, part).detach().cpu().float().contiguous().numpy()
+            initializers.append(numpy_helper.from_array(values, f"conv_{i}.{part}"))
+        tanh = a.head == "amplitude-phase"
+        out = f"conv_{i}_out" if not last or tanh else output_name(a)
+        nodes.append(conv_node(i, [h, f"conv_{i}.weight", f"conv_{i}.bias"], out))
+        h = out
+        if not last:
+            nodes.append(helper.make_node("Relu", [h], [f"relu_{i}_out"], f"relu_{i}"))
+            h = f"relu_{i}_out"
+        elif tanh:
+            nodes.append(helper.make_node("Tanh", [h], [output_name(a)], "tanh"))
+    return build(a, nodes, initializers, metadata(a, display, offset_m))
+
+
+def write(model, path):
+    """Writes a model; the same model gives the same bytes."""
+    with replacing(path) as temporary:
+        Path(temporary).write_bytes(model.SerializeToString(deterministic=True))
+
+
+def load_model(path):
+    try:
+        return onnx.load(os.fspath(path))
+    except FileNotFoundError:
+        raise ExportError(f"{path}: not there") from None
+    except Exception as error:  # protobuf raises its own kinds for a damaged file
+        raise ExportError(f"{path}: no readable ONNX file ({str(error).splitlines()[0]})") from None
+
+
+def read_description(path):
+    """{'input', 'head', 'pitch_um', …} from a model's metadata_props."""
+    return _description(load_model(path), path)
+
+
+def _description(model, path):
+    properties = {p.key: p.value for p in model.metadata_props}
+    found = {k.removeprefix("phasefront."): v for k, v in properties.items() if k.startswith("phasefront.")}
+    missing = [k for k in ("input", "head", "pitch_um", "wavelengths_nm", "volume_depth_mm", "offset_mm") if k not in found]
+    if missing:
+        raise ExportError(f"{path}: metadata has no {', '.join('phasefront.' + k for k in missing)}")
+    return found
+
+
+def read_onnx(path):
+    """(Chain, Display) of a float32 file of this package, to go on training from."""
+    model = load_model(path)
+    found = _description(model, path)
+    weights = {t.name: numpy_helper.to_array(t) for t in model.graph.initializer}
+    layers = sum(node.op_type == "Conv" for node in model.graph.node)
+    if f"conv_{layers - 1}.weight" not in weights or weights["conv_0.weight"].dtype != np.float32:
+        raise ExportError(f"{path}: weights are not float32 constants conv_i.weight; take the float32 file, not the int8 one")
+    architecture = Architecture(layers, weights["conv_0.weight"].shape[0], found["input"], found["head"])
+    network = Chain(architecture)
+    try:
+        network.load_state_dict({f"convs.{n[5:]}": torch.from_numpy(w.copy()) for n, w in weights.items()})
+    except RuntimeError as error:
+        raise ExportError(f"{path}: the weights are not those of a chain ({str(error).splitlines()[-1].strip()})") from None
+    display = Display(
+        pitch_m=float(found["pitch_um"]) * 1e-6,
+        wavelengths_m=tuple(float(w) * 1e-9 for w in found["wavelengths_nm"].split(",")),
+        volume_depth_m=float(found["volume_depth_mm"]) * 1e-3,
+    )
+    return network, display

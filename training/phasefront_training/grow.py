@@ -1,0 +1,93 @@
+"""A deeper network from a trained one, that begins by giving what the trained one gives.
+
+A chain of an even number of layers is a first layer, residual pairs and the last layer; one of an odd number has one
+more layer without a skip before the last. New residual pairs begin as the identity. From even to odd, the new single layer is
+a kernel that copies. From odd to even the single layer must become a pair, whose skip adds what the old network did not
+have: its partner copies four times over, so that this
+weighs little, and the last layer is fitted anew to the old output by least squares over examples.
+"""
+
+import torch
+from torch.nn import functional as F
+
+from .networks import Architecture, Chain
+
+WAKE = 1e-6  # bias of a new pair's second layer: nothing to the output, but behind a ReLU a gradient needs more than 0
+GAIN = 4.0  # of the copy that a skip's sum must not drown
+RIDGE = 1e-6  # of the mean diagonal, in the fit of the last layer
+
+
+def grow(network, layers, examples=()):
+    """A Chain of `layers` layers that gives what `network` gives, to about 1e-5 where it can be exact.
+
+    examples: network inputs (C, H, W); needed from an odd to an even number of layers. Raises ValueError where the
+    network cannot grow so.
+    """
+    old = network.architecture
+    if layers < old.layers:
+        raise ValueError(f"a network of {old.layers} layers does not grow to {layers}")
+    if (layers - old.layers) % 2 == 0:
+        return _insert_pairs(network, layers)
+    if old.layers % 2 == 0:
+        return _append_copy(_insert_pairs(network, layers - 1))
+    return _insert_pairs(_refit(network, _append_copy(network, GAIN), examples), layers)
+
+
+def _chain(old, layers):
+    return Chain(Architecture(layers, old.filters, old.input, old.head))
+
+
+def _insert_pairs(network, layers):
+    old = network.architecture
+    grown = _chain(old, layers)
+    tail = 1 if old.layers % 2 == 0 else 2  # the layers behind the last residual pair
+    with torch.no_grad():
+        for i, conv in enumerate(network.convs):
+            j = i if i < old.layers - tail else i + layers - old.layers
+            grown.convs[j].load_state_dict(conv.state_dict())
+        for j in range(old.layers - tail + 1, layers - tail, 2):
+            grown.convs[j].weight.zero_()
+            grown.convs[j].bias.fill_(WAKE)
+    return grown
+
+
+def _append_copy(network, gain=1.0):
+    """One more layer before the last, whose kernel copies, `gain` times; features are never negative, so its ReLU does nothing."""
+    old = network.architecture
+    grown = _chain(old, old.layers + 1)
+    with torch.no_grad():
+        for i, conv in enumerate(network.convs[:-1]):
+            grown.convs[i].load_state_dict(conv.state_dict())
+        torch.nn.init.dirac_(grown.convs[-2].weight)
+        grown.convs[-2].weight *= gain
+        grown.convs[-2].bias.zero_()
+        grown.convs[-1].load_state_dict(network.convs[-1].state_dict())
+    return grown
+
+
+def _refit(network, grown, examples):
+    """Fits the last layer of `grown` to the last layer's output of `network`, before the tanh if there is one."""
+    seen = []
+    hooks = [
+        grown.convs[-1].register_forward_pre_hook(lambda _, given: seen.append(given[0])),
+        network.convs[-1].register_forward_hook(lambda _, __, output: seen.append(output)),
+    ]
+    gram, moment = 0, 0
+    with torch.no_grad():
+        for x in examples:
+            seen.clear()
+            grown(x[None])
+            network(x[None])
+            windows = F.unfold(seen[0], 3, padding=1)[0].double()
+            windows = torch.cat([windows, torch.ones_like(windows[:1])])
+            gram = gram + windows @ windows.T
+            moment = moment + windows @ seen[1][0].flatten(1).T.double()
+        if not isinstance(gram, torch.Tensor):
+            raise ValueError(f"from {network.architecture.layers} layers to an even number, growing needs examples")
+        gram += RIDGE * gram.diagonal().mean() * torch.eye(len(gram), dtype=gram.dtype)
+        fitted = torch.linalg.solve(gram, moment).T.float()
+        grown.convs[-1].weight.copy_(fitted[:, :-1].reshape_as(grown.convs[-1].weight))
+        grown.convs[-1].bias.copy_(fitted[:, -1])
+    for hook in hooks:
+        hook.remove()
+    return grown

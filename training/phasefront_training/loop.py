@@ -1,0 +1,287 @@
+"""The training loop that all stages share: schedule, budget, log, checkpoints, stopping, several processes.
+
+A stage gives a `Task`; nothing here knows what is trained. Adam (0.9, 0.99), gradients clipped to norm 1, 50 steps
+of warm-up, then a cosine down to 2 % of the rate. The budget is a number of steps, or minutes of wall clock that
+count across resumptions. With steps, a stopped and resumed training repeats the uninterrupted one exactly.
+"""
+
+import json
+import math
+import os
+import signal
+import sys
+import time
+from collections import deque
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from torch import distributed
+
+from .checkpoint import Checkpoint
+from .files import replacing
+
+WARM_UP = 50
+LOGS = 200  # lines of the curve in a whole budget
+VALIDATIONS = 25  # of them with a validation
+CHECKPOINT_S = 60.0
+
+
+class LossNotFinite(Exception):
+    """The loss became NaN or infinite; the last checkpoint holds the last good weights."""
+
+
+class Task:
+    """What a stage trains. `networks` is {name: Chain}; `modules` are the trained modules (usually the same)."""
+
+    kind = ""
+    networks = {}
+    display = None
+
+    def module(self):
+        """The trained nn.Module."""
+        raise NotImplementedError
+
+    def sample(self, step):
+        """The batch of a step, on the CPU or the device; called from a thread where a GPU trains."""
+        raise NotImplementedError
+
+    def loss(self, module, batch, step):
+        """(loss, {name: tensor of a term}) for a batch; `module` is `module()`, perhaps wrapped."""
+        raise NotImplementedError
+
+    def validate(self):
+        """{name: figure} on scenes not trained on."""
+        raise NotImplementedError
+
+    def extra(self):
+        """What else belongs in a checkpoint."""
+        return {}
+
+
+@dataclass
+class Budget:
+    """Steps or minutes; exactly one is given."""
+
+    steps: int | None = None
+    minutes: float | None = None
+
+    def __post_init__(self):
+        if (self.steps is None) == (self.minutes is None):
+            raise ValueError("a budget is either steps or minutes")
+
+    def progress(self, step, elapsed_s):
+        return step / self.steps if self.steps else elapsed_s / (60 * self.minutes)
+
+
+@dataclass
+class Workers:
+    """This process among those of torchrun (one process, where torchrun did not start it)."""
+
+    rank: int
+    count: int
+    device: torch.device
+
+    @classmethod
+    def start(cls, device):
+        count = int(os.environ.get("WORLD_SIZE", "1"))
+        rank = int(os.environ.get("RANK", "0"))
+        device = torch.device(device)
+        if device.type == "cuda":
+            device = torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0")))
+            torch.cuda.set_device(device)
+        if count > 1 and not distributed.is_initialized():
+            distributed.init_process_group("nccl" if device.type == "cuda" else "gloo")
+        return cls(rank, count, device)
+
+    def agree(self, *values):
+        """The sums of the values over all processes."""
+        if self.count == 1:
+            return values
+        together = torch.tensor(values, dtype=torch.float64, device=self.device)
+        distributed.all_reduce(together)
+        return together.tolist()
+
+
+class Prefetch:
+    """Batches of the coming steps, drawn ahead by threads where a GPU would wait for them."""
+
+    def __init__(self, sample, first, workers):
+        self.sample, self.next = sample, first
+        self.pool = ThreadPoolExecutor(workers) if workers else None
+        self.queue = deque()
+        self.ahead = 2 * workers
+
+    def take(self):
+        if self.pool is None:
+            batch = self.sample(self.next)
+            self.next += 1
+            return batch
+        while len(self.queue) <= self.ahead:
+            self.queue.append(self.pool.submit(self.sample, self.next))
+            self.next += 1
+        return self.queue.popleft().result()
+
+    def close(self):
+        if self.pool:
+            self.pool.shutdown(cancel_futures=True)
+
+
+def rate(base, step, progress):
+    """The learning rate of a step."""
+    cosine = 0.5 * (1 + math.cos(math.pi * min(progress, 1)))
+    return base * min(1, (step + 1) / WARM_UP) * (0.98 * cosine + 0.02)
+
+
+def to_device(batch, device):
+    """A dataclass of tensors, moved."""
+    if device.type == "cpu":
+        return batch
+    return type(batch)(**{k: v.to(device, non_blocking=True) for k, v in batch.__dict__.items()})
+
+
+def fit(task, budget, learning_rate, output, workers, resume=None, options=None, stop_at=None, loaders=0):
+    """Trains until the budget is spent or a signal asks to stop; returns the last checkpoint.
+
+    output: folder for `checkpoint.pt` and `curve.jsonl`. resume: a Checkpoint to go on from. stop_at: stop (and save)
+    after this step though the budget is not spent. loaders: threads that draw batches ahead.
+    """
+    output = Path(output)
+    module = task.module()
+    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99), fused=True)
+    step, before = 0, 0.0
+    if resume is not None:
+        optimiser.load_state_dict(resume.optimiser)
+        step, before = resume.step, resume.elapsed_s
+    trained = module
+    if workers.count > 1:
+        ids = [workers.device.index] if workers.device.type == "cuda" else None
+        trained = torch.nn.parallel.DistributedDataParallel(module, device_ids=ids)
+    curve = Curve(output / "curve.jsonl", step) if workers.rank == 0 else None
+    begin = time.monotonic()
+
+    def elapsed():
+        return before + time.monotonic() - begin
+
+    def save():
+        checkpoint = Checkpoint(
+            kind=task.kind,
+            networks={n: (net.architecture, _on_cpu(net.state_dict())) for n, net in task.networks.items()},
+            display=task.display,
+            step=step,
+            elapsed_s=elapsed(),
+            optimiser=_on_cpu(optimiser.state_dict()),
+            options=options or {},
+            extra=task.extra(),
+        )
+        if workers.rank == 0:
+            checkpoint.save(output / "checkpoint.pt")
+        return checkpoint
+
+    checkpoint, saved = save(), time.monotonic()
+    last_log = int(LOGS * budget.progress(step, before))
+    last_validation = int(VALIDATIONS * budget.progress(step, before))
+    batches = Prefetch(task.sample, step, loaders)
+    sums, summed = {}, 0
+    try:
+        with _Signals() as signals:
+            while True:
+                own = budget.progress(step, elapsed()) if workers.rank == 0 else 0.0
+                progress, asked = workers.agree(own, float(signals.asked))
+                if progress >= 1 or asked or step == stop_at:
+                    break
+                for group in optimiser.param_groups:
+                    group["lr"] = rate(learning_rate, step, progress)
+                batch = to_device(batches.take(), workers.device)
+                loss, terms = task.loss(trained, batch, step)
+                optimiser.zero_grad(set_to_none=True)
+                loss.backward()
+                norm = torch.nn.utils.clip_grad_norm_(module.parameters(), 1.0)
+                (bad,) = workers.agree(float(not (torch.isfinite(loss) and torch.isfinite(norm))))
+                if bad:
+                    raise LossNotFinite(
+                        f"the loss is not finite at step {step}; the weights of step {checkpoint.step} are kept in {output / 'checkpoint.pt'}"
+                    )
+                optimiser.step()
+                step += 1
+                for name, value in (("loss", loss), *terms.items()):
+                    sums[name] = sums.get(name, 0) + value.detach()
+                summed += 1
+                if workers.rank == 0:
+                    progress = budget.progress(step, elapsed())
+                    if int(LOGS * progress) > last_log:
+                        last_log = int(LOGS * progress)
+                        line = {"step": step, "elapsed_s": round(elapsed(), 1), "lr": optimiser.param_groups[0]["lr"]}
+                        line |= {name: float(f"{float(value) / summed:.6g}") for name, value in sums.items()}
+                        sums, summed = {}, 0
+                        if int(VALIDATIONS * progress) > last_validation:
+                            last_validation = int(VALIDATIONS * progress)
+                            line |= task.validate()
+                        curve.add(line)
+                    if time.monotonic() - saved > CHECKPOINT_S and _finite(module):
+                        checkpoint, saved = save(), time.monotonic()
+    finally:
+        batches.close()
+    return save()
+
+
+def _finite(module):
+    return all(bool(torch.isfinite(p).all()) for p in module.parameters())
+
+
+def _on_cpu(value):
+    if isinstance(value, torch.Tensor):
+        return value.detach().to("cpu", copy=True)
+    if isinstance(value, dict):
+        return {k: _on_cpu(v) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_on_cpu(v) for v in value]
+    return value
+
+
+class Curve:
+    """The log of a training, one JSON object a line; on resuming, lines after the checkpoint's step are dropped."""
+
+    def __init__(self, path, step):
+        self.path = Path(path)
+        kept = [line for line in read_curve(self.path) if line["step"] <= step] if step and self.path.exists() else []
+        with replacing(self.path) as temporary:
+            temporary.write_text("".join(json.dumps(line) + "\n" for line in kept))
+
+    def add(self, line):
+        with self.path.open("a") as file:
+            file.write(json.dumps(line) + "\n")
+        print("  ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in line.items()), file=sys.stderr, flush=True)
+
+
+def read_curve(path):
+    """The lines of a curve; a last line that was cut off is left out."""
+    lines = []
+    for text in Path(path).read_text().splitlines():
+        try:
+            lines.append(json.loads(text))
+        except json.JSONDecodeError:
+            break
+    return lines
+
+
+class _Signals:
+    """Takes note of SIGINT and SIGTERM, so that a step ends and a checkpoint is written first."""
+
+    def __enter__(self):
+        self.asked = False
+        self.previous = {}
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self.previous[number] = signal.signal(number, self._ask)
+        except ValueError:  # not the main thread: nobody can signal us here
+            pass
+        return self
+
+    def _ask(self, number, frame):
+        self.asked = True
+
+    def __exit__(self, *_):
+        for number, handler in self.previous.items():
+            signal.signal(number, handler)

@@ -1,0 +1,129 @@
+"""The networks: a plain chain of 3x3 convolutions with skips, and what its output means.
+
+Layers are counted from 0. Layer i is a convolution (3x3, stride 1, zero padding) and, but for the last,
+a ReLU. For odd i >= 3 the input is input[i] = output[i-1] + input[i-2], so layers (1, 2), (3, 4), ... are
+residual pairs. The last layer also reads the network's input, concatenated behind the features.
+
+Two heads turn the last layer's six channels into a field :
+
+* ``amplitude-phase`` (the paper's): t = tanh(o); amplitude = (t[0:3] + 1)·√½, phase = π·t[3:6].
+* ``real-imaginary``: real = base[0:3] + o[0:3], imaginary = base[3:6] + o[3:6], where the base is the front
+  layer's image (imaginary part 0) or, for the pre-filter, the field that came in.
+
+Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``ldiN`` (4·N channels: rgb0, depth0, rgb1, ...,
+each minus 0.5; a pixel without a hit has colour 0 and depth 1) and ``field`` (6 channels: the real parts of the
+three colours, then the imaginary ones; this is the pre-filter of the deep double phase method).
+"""
+
+import math
+from dataclasses import asdict, dataclass
+
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+HEADS = ("real-imaginary", "amplitude-phase")
+
+
+@dataclass(frozen=True)
+class Architecture:
+    """Everything that fixes a network's graph."""
+
+    layers: int
+    filters: int = 24
+    input: str = "rgbd"
+    head: str = "real-imaginary"
+
+    def __post_init__(self):
+        if self.layers < 3:
+            raise ValueError(f"a network has at least 3 layers, not {self.layers}")
+        if self.filters < 1:
+            raise ValueError(f"a network has at least 1 filter, not {self.filters}")
+        if self.head not in HEADS:
+            raise ValueError(f"the head is one of {', '.join(HEADS)}, not '{self.head}'")
+        self.input_channels  # raises where the input is unknown
+
+    @property
+    def ldi_layers(self):
+        """How many layers of a layered depth image the input takes; rgbd takes one."""
+        if self.input == "rgbd":
+            return 1
+        count = self.input.removeprefix("ldi")
+        if self.input.startswith("ldi") and count.isdigit() and int(count) > 0:
+            return int(count)
+        raise ValueError(f"the input is rgbd, ldiN (N = 1, 2, ...) or field, not '{self.input}'")
+
+    @property
+    def input_channels(self):
+        return 6 if self.input == "field" else 4 * self.ldi_layers
+
+    def channels(self, i):
+        """(input, output) channels of layer i."""
+        last = i == self.layers - 1
+        inputs = self.input_channels if i == 0 else self.filters
+        return inputs + (self.input_channels if last else 0), 6 if last else self.filters
+
+    def has_skip(self, i):
+        """Whether the input of layer i is output[i-1] + input[i-2]."""
+        return i >= 3 and i % 2 == 1
+
+    def as_dict(self):
+        return asdict(self)
+
+
+class Chain(nn.Module):
+    """The chain; `forward` gives the six channels of the last layer (after tanh for `amplitude-phase`)."""
+
+    def __init__(self, architecture):
+        super().__init__()
+        self.architecture = architecture
+        self.convs = nn.ModuleList(
+            nn.Conv2d(*architecture.channels(i), 3, padding=1) for i in range(architecture.layers)
+        )
+        self.reset()
+
+    def reset(self):
+        """He initialisation; residual branches and the last layer begin small, so that depth does not amplify."""
+        layers = self.architecture.layers
+        with torch.no_grad():
+            for i, conv in enumerate(self.convs):
+                nn.init.kaiming_normal_(conv.weight, nonlinearity="relu")
+                nn.init.zeros_(conv.bias)
+                if i % 2 == 0 and 2 <= i < layers - 1:
+                    conv.weight *= math.sqrt(2 / layers)
+            self.convs[-1].weight *= 0.1
+
+    def forward(self, x):
+        last = self.architecture.layers - 1
+        inputs, h = [], x
+        for i, conv in enumerate(self.convs):
+            if self.architecture.has_skip(i):
+                h = h + inputs[i - 2]
+            inputs.append(h)
+            if i == last:
+                h = torch.cat([h, x.to(h.dtype)], 1)
+            h = conv(h)
+            if i < last:
+                h = F.relu(h)
+        return torch.tanh(h.float()) if self.architecture.head == "amplitude-phase" else h.float()
+
+    def field(self, x):
+        """The complex field (N, 3, H, W) for network inputs (N, C, H, W)."""
+        return head_field(self.architecture, self(x), x)
+
+
+def head_field(architecture, output, x):
+    """The complex field (N, 3, H, W) that the output (N, 6, H, W) means for the input x."""
+    output = output.float()
+    if architecture.head == "amplitude-phase":
+        amplitude = (output[:, :3] + 1) * math.sqrt(0.5)
+        return torch.polar(amplitude, math.pi * output[:, 3:])
+    base = x.float()
+    if architecture.input == "field":
+        return torch.complex(base[:, :3] + output[:, :3], base[:, 3:] + output[:, 3:])
+    return torch.complex(base[:, :3] + 0.5 + output[:, :3], output[:, 3:].contiguous())
+
+
+def multiplies_per_pixel(architecture):
+    """Multiply-accumulates per pixel of the whole chain."""
+    return sum(9 * a * b for a, b in map(architecture.channels, range(architecture.layers)))

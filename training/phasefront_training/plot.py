@@ -1,0 +1,35 @@
+"""Curves of trainings as a picture: the loss, and the figures on validation scenes, over minutes."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+from matplotlib import pyplot  # noqa: E402  the backend comes first
+
+from .loop import read_curve  # noqa: E402
+
+FIGURES = {"validation_psnr": "-", "validation_degraded_psnr": "--"}
+
+
+def plot(folders, output):
+    """Plots `curve.jsonl` of each folder into one picture (.png or .svg)."""
+    figure, (left, right) = pyplot.subplots(1, 2, figsize=(11, 4.2), layout="constrained")
+    for k, folder in enumerate(folders):
+        curve = read_curve(Path(folder) / "curve.jsonl")
+        if not curve:
+            raise ValueError(f"{folder}: the curve is empty")
+        name, colour = Path(folder).name, f"C{k}"
+        left.plot([line["elapsed_s"] / 60 for line in curve], [line["loss"] for line in curve], color=colour, label=name)
+        for key, style in FIGURES.items():
+            points = [(line["elapsed_s"] / 60, line[key]) for line in curve if key in line]
+            if points:
+                label = f"{name}, degraded depth" if "degraded" in key else name
+                right.plot(*zip(*points), style, color=colour, label=label)
+    left.set(xlabel="minutes", ylabel="loss", yscale="log")
+    right.set(xlabel="minutes", ylabel="amplitude PSNR (dB), validation")
+    for axes in (left, right):
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=8)
+    figure.savefig(output, dpi=120)
+    pyplot.close(figure)

@@ -1,0 +1,166 @@
+"""int8 networks: what is quantized how, calibration, and a Chain that quantizes as it goes (for evaluation and QAT).
+
+Weights are int8, one scale an output channel, symmetric: scale = max|w| / 127. Biases are int32 with the scale
+s_input · s_weight[c]. Activations are u8 with one scale and zero point a tensor, from ranges seen on training scenes:
+
+* behind a ReLU, and sums of two such: zero point 0, scale = max / 255;
+* the network's input, and what the last convolution reads (features and the network's input, concatenated):
+  scale = (max − min) / 254, zero point = round(−min / scale), so that 0 is exact.
+
+Each tensor that a convolution or a skip reads is quantized once: `input`; `relu_i`, the output of layer i; `add_i`,
+the sum before layer i, of the dequantized terms, rounded again; and `concat`, the one scale and zero point of
+the last layer's input: its features are quantized to it directly (never by a scale of their own first), and so is the
+network's input a second time. The last convolution's output is float. Rounding is half to even.
+"""
+
+import copy
+import sys
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+from .data import network_input
+from .evaluate import evaluate, torch_predictor
+from .stage1 import Stage1
+
+ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
+CALIBRATION_SCENES = 16
+
+
+def tensors(architecture):
+    """The names of the quantized tensors, in the order of the graph."""
+    last = architecture.layers - 1
+    names = ["input"]
+    for i in range(last):
+        if architecture.has_skip(i):
+            names.append(f"add_{i}")
+        if i < last - 1 or architecture.has_skip(last):
+            names.append(f"relu_{i}")
+    return [*names, "concat"]
+
+
+def weight_scale(weight, bias, input_scale):
+    """Scales (O,) of a layer's weights (O, I, 3, 3); an empty channel gets one that its bias still fits by."""
+    largest = weight.detach().abs().amax((1, 2, 3)) / 127
+    return torch.maximum(largest, bias.detach().abs() / (input_scale * 2**30)).clamp(min=1e-12)
+
+
+def _through(exact, rounded):
+    """The rounded value, with the gradient of the exact one."""
+    return exact + (rounded - exact).detach()
+
+
+class Quantized(nn.Module):
+    """A Chain whose forward pass rounds weights and activations as its int8 file does.
+
+    ranges: {tensor: (min, max)} for the names of `tensors`.
+    """
+
+    def __init__(self, chain, ranges):
+        super().__init__()
+        self.chain = chain
+        self.architecture = chain.architecture
+        self.ranges = {name: tuple(map(float, ranges[name])) for name in tensors(self.architecture)}
+
+    def parameters_of(self, name):
+        """(scale, zero point) of a tensor; the scale is a float32 value."""
+        low, high = self.ranges[name]
+        if name in ("input", "concat"):
+            low, high = min(low, 0.0), max(high, 0.0)
+            scale = float(np.float32(max(high - low, 1e-6) / 254))
+            return scale, round(-low / scale)
+        return float(np.float32(max(high, 1e-6) / 255)), 0
+
+    def activation(self, name, x):
+        scale, zero = self.parameters_of(name)
+        x = x.clamp(-zero * scale, (255 - zero) * scale)
+        return _through(x, torch.round(x / scale) * scale)
+
+    def layer(self, i, input_name):
+        """Rounded (weight, bias) of layer i."""
+        conv = self.chain.convs[i]
+        scale = weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0])
+        wide = scale[:, None, None, None]
+        weight = _through(conv.weight, torch.round(conv.weight / wide).clamp(-127, 127) * wide)
+        unit = scale * self.parameters_of(input_name)[0]
+        return weight, _through(conv.bias, torch.round(conv.bias / unit) * unit)
+
+    def forward(self, x):
+        a = self.architecture
+        last = a.layers - 1
+        inputs, name = [], "input"
+        h = self.activation(name, x)
+        for i in range(a.layers):
+            if a.has_skip(i):
+                name = f"add_{i}" if i < last else "concat"
+                h = self.activation(name, h + inputs[i - 2])
+            inputs.append(h)
+            if i == last:
+                h, name = torch.cat([h, self.activation("concat", x)], 1), "concat"
+            h = F.conv2d(h, *self.layer(i, name), padding=1)
+            if i < last:
+                name = f"relu_{i}" if i < last - 1 or a.has_skip(last) else "concat"
+                h = self.activation(name, F.relu(h))
+        return torch.tanh(h) if a.head == "amplitude-phase" else h
+
+
+def calibrate(chain, examples):
+    """{tensor: (min, max)} of a Chain over inputs (N, C, H, W), one at a time."""
+    a = chain.architecture
+    last = a.layers - 1
+    ranges = {}
+
+    def see(name, *seen):
+        low, high = ranges.get(name, (0.0, 0.0))
+        ranges[name] = min([low, *(float(t.min()) for t in seen)]), max([high, *(float(t.max()) for t in seen)])
+
+    with torch.no_grad():
+        for x in examples:
+            x = x[None]
+            see("input", x)
+            inputs, h = [], x
+            for i, conv in enumerate(chain.convs[:-1]):
+                if a.has_skip(i):
+                    h = h + inputs[i - 2]
+                    see(f"add_{i}", h)
+                inputs.append(h)
+                h = F.relu(conv(h))
+                if i < last - 1 or a.has_skip(last):
+                    see(f"relu_{i}", h)
+            see("concat", h + inputs[last - 2] if a.has_skip(last) else h, x)
+    if a.input != "field":  # colours and depths have a range of their own, whatever the scenes hold
+        ranges["input"] = (-0.5, 0.5)
+        ranges["concat"] = (min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5))
+    return ranges
+
+
+def examples(scenes):
+    """Network inputs of the first scenes, for calibration."""
+    for i in range(min(len(scenes), CALIBRATION_SCENES)):
+        colour, depth, _ = scenes.scene(i)
+        yield network_input(colour, depth)
+
+
+class QuantizationAware(Stage1):
+    """Stage 1 once more, through the rounding; ranges stay as calibrated."""
+
+    kind = "qat"
+
+    def __init__(self, network, *args, **options):
+        super().__init__(network, *args, bf16=False, **options)
+        self.networks = {"hologram": network.chain}
+
+    def extra(self):
+        return super().extra() | {"ranges": self.network.ranges}
+
+
+def figures(chain, ranges, scenes):
+    """Amplitude PSNR (float32, int8) on scenes."""
+    quantized = Quantized(copy.deepcopy(chain), ranges)
+    return tuple(evaluate(torch_predictor(n), scenes, full=False)["amplitude_psnr"] for n in (chain, quantized))
+
+
+def report(name, exact, rounded):
+    print(f"{name}: float32 {exact:.2f} dB, int8 {rounded:.2f} dB on the validation scenes", file=sys.stderr)

@@ -1,0 +1,75 @@
+"""Stage 1: the hologram network learns the midpoint hologram, supervised.
+
+Loss: field + amplitude + 2·focal stack + total variation (losses.py). The focal stack takes all 20 planes where the
+machine allows, or a few of them at random in each step, which has the same mean.
+"""
+
+import numpy as np
+import torch
+
+from .data import Sampler
+from .evaluate import evaluate, torch_predictor
+from .loop import Task
+from .losses import field_terms, fill_invalid, focal_stack_terms
+from .networks import head_field
+
+FOCAL_WEIGHT = 2.0
+VARIATION_WEIGHT = 1.0
+PLANES_ON_CPU = 1
+PLANES_ON_GPU = 20
+LIGHT_REACH_PX = 16
+
+
+def margin(network_layers):
+    """Pixels of a cut side left out of the loss: what the network cannot see there, at most the light's reach."""
+    return min(network_layers, LIGHT_REACH_PX)
+
+
+class Stage1(Task):
+    """Trains `network` (a Chain, or one that quantizes as it goes) on the scenes of one data set."""
+
+    kind = "stage1"
+
+    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, degraded=0.0, bf16=True, seed=0):
+        self.network = network.to(workers.device, memory_format=torch.channels_last)
+        self.networks = {"hologram": network}
+        self.display = scenes.display
+        self.validation = validation
+        self.device = workers.device
+        self.bf16 = bf16
+        self.degraded = degraded
+        self.seed, self.rank = seed, workers.rank
+        self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
+        self.facts = scenes.facts
+        self.sampler = Sampler(scenes, batch, crop, margin(network.architecture.layers), degraded, seed, workers.rank)
+
+    def module(self):
+        return self.network
+
+    def sample(self, step):
+        return self.sampler.draw(step)
+
+    def loss(self, module, batch, step):
+        x = batch.input.contiguous(memory_format=torch.channels_last)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.bf16):
+            output = module(x)
+        field = head_field(self.network.architecture, output, x)
+        field = fill_invalid(field, batch.target, batch.valid)
+        share = batch.valid.mean()
+        terms = dict(zip(("field", "amplitude"), field_terms(field, batch.target)))
+        if self.planes:
+            rng = np.random.default_rng([self.seed, self.rank, step, 1])
+            terms |= zip(("focal", "variation"), focal_stack_terms(field, batch.target, batch.depth, self.display, self.planes, rng))
+        terms = {name: value / share for name, value in terms.items()}
+        weights = {"focal": FOCAL_WEIGHT, "variation": VARIATION_WEIGHT}
+        return sum(weights.get(name, 1.0) * value for name, value in terms.items()), terms
+
+    def extra(self):
+        return {"data": self.facts}
+
+    def validate(self):
+        predict = torch_predictor(self.network, self.bf16)
+        line = {"validation_psnr": evaluate(predict, self.validation, full=False)["amplitude_psnr"]}
+        if self.degraded:
+            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, full=False)["amplitude_psnr"]
+        return line

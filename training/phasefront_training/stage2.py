@@ -1,0 +1,131 @@
+"""Stage 2, the deep double phase method: hologram network and pre-filter learn together what survives encoding.
+
+The pre-filter begins as AA-DPM's blur, which its last layer holds exactly, for it reads the field itself as well; so
+training starts from that method's quality. (The paper's start, the pre-filter alone learning to be the identity on true
+holograms at the modulator's plane, is there too, by a number of steps.) Then both are trained
+through encoding, aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07
+times the phase regulariser; the truth of the field itself is left out on purpose.
+"""
+
+import numpy as np
+import torch
+
+from .data import Sampler, network_input
+from .encode import (
+    DeepDoublePhase, anti_alias, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+)
+from .evaluate import compare, scene_depth
+from .loop import Task
+from .losses import fill_invalid, focal_stack_terms
+from .networks import Architecture, Chain, head_field
+from .optics import propagate
+from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
+
+PREFILTER_LAYERS, PREFILTER_FILTERS = 8, 8
+STACK_WEIGHT = 20.0
+PHASE_WEIGHT = 0.07
+
+
+def prefilter_network():
+    """A pre-filter that is AA-DPM's blur so far."""
+    network = Chain(Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+    last = network.convs[-1].weight
+    with torch.no_grad():
+        last.zero_()
+        for c in range(6):
+            last[c, PREFILTER_FILTERS + c] = blur_kernel()
+            last[c, PREFILTER_FILTERS + c, 1, 1] -= 1  # the head adds the field itself
+    return network
+
+
+class _OnHolograms(Task):
+    """What both parts share: samples whose cut sides are farther in than light comes from beyond them."""
+
+    def __init__(self, model, scenes, validation, workers, batch=1, crop=384, degraded=0.0, seed=0):
+        self.model = model.to(workers.device, memory_format=torch.channels_last)
+        self.display, self.validation, self.device = scenes.display, validation, workers.device
+        self.networks = {"hologram": model.hologram, "prefilter": model.prefilter}
+        self.seed, self.rank = seed, workers.rank
+        cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
+        self.facts = scenes.facts
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank)
+
+    def sample(self, step):
+        return self.sampler.draw(step)
+
+    def extra(self):
+        return {"data": self.facts, "offset_m": self.model.offset_m}
+
+
+class Identity(_OnHolograms):
+    """The pre-filter learns to give what it is given."""
+
+    kind = "identity"
+
+    def module(self):
+        return self.model.prefilter
+
+    def loss(self, module, batch, step):
+        there = propagate(batch.target, self.model.offset_m, self.display)
+        x = channels(there).contiguous(memory_format=torch.channels_last)
+        with torch.autocast(self.device.type, torch.bfloat16, enabled=self.model.bf16):
+            output = module(x)
+        error = (head_field(self.model.prefilter.architecture, output, x) - there).abs().mean()
+        return error, {}
+
+    def validate(self):
+        return {}
+
+
+class Stage2(_OnHolograms):
+    """Both networks, by what the encoded hologram shows."""
+
+    kind = "stage2"
+
+    def __init__(self, *args, planes=None, **options):
+        super().__init__(*args, **options)
+        self.planes = planes or (PLANES_ON_GPU if self.device.type == "cuda" else PLANES_ON_CPU)
+
+    def module(self):
+        return self.model
+
+    def loss(self, module, batch, step):
+        before, after = module(batch.input.contiguous(memory_format=torch.channels_last))
+        after = fill_invalid(after, batch.target, batch.valid)
+        rng = np.random.default_rng([self.seed, self.rank, step, 1])
+        focal, variation = focal_stack_terms(after, batch.target, batch.depth, self.display, self.planes, rng)
+        share = batch.valid.mean()
+        terms = {"focal": focal / share, "variation": variation / share, "phase": phase_regulariser(before)}
+        return STACK_WEIGHT * (terms["focal"] + terms["variation"]) + PHASE_WEIGHT * terms["phase"], terms
+
+    def validate(self):
+        figures = encoding_figures(self.model, self.validation, full=False)["deep double phase"]
+        return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
+
+
+def encoding_figures(model, scenes, degraded=False, full=True):
+    """{method: mean figures} of what an encoded hologram shows: DDPM, and AA-DPM and plain double phase after the same
+    hologram network; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
+    rows = {}
+    device = next(model.parameters()).device
+    with torch.no_grad():
+        for i in range(len(scenes)):
+            colour, depth, truth = scene_depth(scenes, i, degraded)
+            x = network_input(colour, depth)[None].to(device)
+            midpoint = model.hologram.field(x)
+            there = propagate(midpoint, model.offset_m, model.display)
+            methods = {
+                "deep double phase": model.filtered(midpoint),
+                "anti-aliased double phase": anti_alias(there),
+                "double phase": there,
+            }
+            for name, field in methods.items():
+                centred = field * torch.exp(-1j * field.angle().mean((-1, -2), keepdim=True)) if "deep" not in name else field
+                scale = scale_of(centred)
+                phase = double_phase(centred, scale)
+                shown = reconstruct(phase, scale, model.offset_m, model.display)
+                # The taken-out mean phase does not change amplitudes, so they compare as they are.
+                row = compare(shown[0], truth, model.display, full)
+                row |= {"wraps": wraps(phase), "brightness": float(shown.abs().mean() / truth.abs().mean())}
+                rows.setdefault(name, []).append(row)
+    return {name: {k: round(float(np.mean([r[k] for r in each])), 4) for k in each[0]} for name, each in rows.items()}

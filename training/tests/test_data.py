@@ -1,0 +1,106 @@
+import shutil
+
+import numpy as np
+import pytest
+import torch
+
+from phasefront_training import data
+from phasefront_training.data import Manifest, Sampler, Scenes, network_input, read_pair
+from phasefront_training.degrade import degrade_depth, fill_nearest
+
+
+def test_reading_follows_the_contract(data_folder):
+    manifest = Manifest.read(data_folder)
+    scenes = Scenes(manifest, "train", ldi_layers=2)
+    assert len(scenes) == 5 and scenes.shape == (64, 64)
+    raw = np.load(manifest.pair(0))
+    colour, depth, truth = scenes.scene(0)
+    assert np.abs(truth.numpy() - raw["hologram"]).max() < 2e-3
+    assert np.allclose(colour[:3].numpy(), raw["rgb"][0, ..., :3].transpose(2, 0, 1) / 255)
+    miss = raw["rgb"][1, ..., 3] == 0
+    assert miss.any() and (depth[1].numpy()[miss] == 1).all() and (colour[3:].numpy()[:, miss] == 0).all()
+    x = network_input(colour, depth)
+    assert torch.equal(x[3], depth[0] - 0.5) and torch.equal(x[4], colour[3] - 0.5) and x.shape == (8, 64, 64)
+
+
+def test_damaged_shards_are_named_and_skipped(data_folder, tmp_path, capsys):
+    folder = shutil.copytree(data_folder, tmp_path / "set")
+    damaged = folder / "pair_000001.npz"
+    damaged.write_bytes(damaged.read_bytes()[:2000])
+    (folder / "pair_000002.npz").write_bytes(b"no zip at all")
+    bytes_ = bytearray((folder / "pair_000003.npz").read_bytes())
+    bytes_[len(bytes_) // 2] ^= 0xFF
+    (folder / "pair_000003.npz").write_bytes(bytes(bytes_))
+    scenes = Scenes(Manifest.read(folder), "train")
+    assert scenes.numbers == [0, 4]
+    told = capsys.readouterr().err
+    assert all(f"pair_00000{n}.npz" in told for n in (1, 2, 3))
+    for n in (0, 4):
+        (folder / f"pair_00000{n}.npz").unlink()
+    with pytest.raises(data.DataError, match="no readable pair"):
+        Scenes(Manifest.read(folder), "train")
+
+
+def test_pairs_of_too_few_layers_are_refused(data_folder):
+    with pytest.raises(data.DataError, match="3 layers"):
+        read_pair(Manifest.read(data_folder).pair(0), 5)
+
+
+def found(scene, batch, n, turn):
+    """Whether sample n of a batch, turned, is a window of the scene."""
+    colour, depth, truth = scene
+    views = torch.cat([network_input(colour, depth), truth.real, truth.imag]).unfold(-2, 48, 1).unfold(-2, 48, 1)
+    window = torch.cat([batch.input[n], batch.target[n].real, batch.target[n].imag])
+    window = window.transpose(-1, -2) if turn & 4 else window
+    window = window.flip([axis for axis, bit in ((-2, 1), (-1, 2)) if turn & bit])
+    corners = (views[..., 0, 0] == window[:, None, None, 0, 0]).all(0).nonzero()
+    return any(torch.equal(views[:, y, x], window) for y, x in corners)
+
+
+def test_samples_are_cut_from_scenes_and_repeat(data_folder):
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    sampler = Sampler(scenes, batch=3, crop=48, margin=8, seed=5)
+    one, again, other = sampler.draw(11), sampler.draw(11), sampler.draw(12)
+    assert torch.equal(one.input, again.input) and torch.equal(one.target, again.target)
+    assert not torch.equal(one.input, other.input)
+    assert one.input.shape == (3, 4, 48, 48) and one.target.shape == (3, 3, 48, 48) and one.valid.shape == (3, 1, 48, 48)
+    # Each sample, its flips and transposes undone, is a window of one scene: input and target at the same place.
+    for n in range(3):
+        assert any(found(scenes.scene(k), one, n, turn) for k in range(len(scenes)) for turn in range(8))
+
+
+def test_valid_marks_cut_sides_only(data_folder):
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    whole = Sampler(scenes, 1, 64, 8).draw(0)
+    assert whole.valid.all()
+    for step in range(20):
+        valid = Sampler(scenes, 1, 48, 8).draw(step).valid[0, 0]
+        rows, columns = valid.amax(1), valid.amax(0)
+        assert torch.equal(valid, rows[:, None] * columns[None])
+        assert rows.sum() in (32, 40) and columns.sum() in (32, 40)
+
+
+def test_degradations_keep_shape_and_range_and_change_depth(data_folder):
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    colour, depth, _ = scenes.scene(0)
+    changed = 0
+    for seed in range(60):
+        bad = degrade_depth(colour[:, :, :51], depth[0, :, :51], np.random.default_rng(seed))
+        assert bad.shape == (64, 51) and torch.isfinite(bad).all() and 0 <= bad.min() and bad.max() <= 1
+        changed += not torch.equal(bad, depth[0, :, :51])
+        assert (bad - depth[0, :, :51]).abs().median() < 0.05
+    assert changed > 50
+    again = [degrade_depth(colour, depth[0], np.random.default_rng(9)) for _ in range(2)]
+    assert torch.equal(*again)
+
+
+def test_holes_take_the_nearest_valid_depth():
+    depth = torch.arange(7.0)[None, None, None].repeat(1, 1, 5, 1)
+    holes = torch.zeros_like(depth, dtype=torch.bool)
+    holes[..., 1:5] = True
+    assert torch.equal(fill_nearest(depth, holes)[0, 0, 2], torch.tensor([0.0, 0, 0, 5, 5, 5, 6]))
+
+
+def test_degraded_layered_inputs_are_refused(data_folder):
+    with pytest.raises(ValueError, match="rgbd"):
+        Sampler(Scenes(Manifest.read(data_folder), "train", 2), 1, 48, 8, degraded=0.5)

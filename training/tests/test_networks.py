@@ -1,0 +1,64 @@
+import pytest
+import torch
+
+from phasefront_training.grow import grow
+from phasefront_training.networks import Architecture, Chain, multiplies_per_pixel
+
+
+def test_sizes_are_the_papers():
+    counts = [multiplies_per_pixel(Architecture(layers)) for layers in (30, 15, 8)]
+    assert counts == [147528, 69768, 33480]
+    assert sum(p.numel() for p in Chain(Architecture(30)).parameters()) == 148230
+    prefilter = Architecture(8, 8, "field")
+    assert multiplies_per_pixel(prefilter) == 9 * (6 * 8 + 6 * 64 + 14 * 6)
+
+
+@pytest.mark.parametrize(("layers", "to"), [(4, 8), (5, 9), (8, 15), (8, 30), (15, 31)])
+def test_growing_is_the_identity_and_learns(layers, to):
+    small = Chain(Architecture(layers))
+    for conv in small.convs:
+        torch.nn.init.normal_(conv.bias, std=0.1)
+    x = torch.rand(1, 4, 20, 24) - 0.5
+    big = grow(small, to)
+    assert torch.allclose(big(x), small(x), atol=1e-4)
+    big(x).square().mean().backward()
+    assert all(conv.weight.grad.abs().max() > 0 for conv in big.convs[2::2])
+
+
+def test_growing_from_odd_to_even_is_near_the_old_network():
+    small = Chain(Architecture(5))
+    with torch.no_grad():
+        small.convs[-1].weight *= 10
+    examples = [torch.rand(4, 40, 40) - 0.5 for _ in range(3)]
+    big = grow(small, 10, examples)
+    x = torch.rand(1, 4, 32, 32) - 0.5
+    error = (big(x) - small(x)).square().mean() / small(x).var()
+    assert error < 0.03
+    with pytest.raises(ValueError, match="examples"):
+        grow(small, 10)
+
+
+def test_networks_do_not_shrink():
+    with pytest.raises(ValueError, match="8 layers does not grow to 4"):
+        grow(Chain(Architecture(8)), 4)
+
+
+def test_heads_mean_what_the_contract_says():
+    x = torch.rand(1, 4, 16, 16) - 0.5
+    residual = Chain(Architecture(4))
+    out = residual(x)
+    field = residual.field(x)
+    assert torch.allclose(field.real, x[:, :3] + 0.5 + out[:, :3]) and torch.equal(field.imag, out[:, 3:])
+    paper = Chain(Architecture(4, head="amplitude-phase"))
+    out, field = paper(x), paper.field(x)
+    assert torch.allclose(field.abs(), (out[:, :3] + 1) * 0.5**0.5, atol=1e-6)
+    assert torch.allclose(field.angle(), torch.pi * out[:, 3:], atol=1e-5)
+    prefilter = Chain(Architecture(4, 8, "field"))
+    h = torch.randn(1, 6, 16, 16)
+    assert torch.allclose(prefilter.field(h).imag, h[:, 3:] + prefilter(h)[:, 3:])
+
+
+@pytest.mark.parametrize("wrong", [{"layers": 2}, {"layers": 8, "head": "x"}, {"layers": 8, "input": "ldi"}, {"layers": 8, "input": "rgb"}])
+def test_wrong_architectures_are_refused(wrong):
+    with pytest.raises(ValueError):
+        Architecture(**wrong)

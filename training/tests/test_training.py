@@ -1,0 +1,124 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from phasefront_training.__main__ import main
+from phasefront_training.checkpoint import Checkpoint
+from phasefront_training.data import Manifest, Scenes
+from phasefront_training.evaluate import evaluate, rgb_as_field, torch_predictor
+from phasefront_training.loop import Budget, LossNotFinite, Workers, fit, read_curve
+from phasefront_training.losses import field_terms, fill_invalid, focal_stack_terms
+from phasefront_training.networks import Architecture, Chain
+from phasefront_training.stage1 import Stage1
+
+HERE = Workers(0, 1, torch.device("cpu"))
+
+
+def task(folder, **options):
+    manifest = Manifest.read(folder)
+    torch.manual_seed(1)
+    network = Chain(Architecture(4, 8))
+    settings = {"crop": 48, "batch": 2, "planes": 2, "bf16": False} | options
+    return Stage1(network, Scenes(manifest, "train"), Scenes(manifest, "validation"), HERE, **settings)
+
+
+def without_time(curve):
+    return [{k: v for k, v in line.items() if k != "elapsed_s"} for line in curve]
+
+
+@pytest.mark.parametrize("degraded", [0.0, 0.5])
+def test_a_resumed_training_gives_the_same_curve_and_weights(data_folder, tmp_path, degraded):
+    budget = Budget(steps=12)
+    whole = fit(task(data_folder, degraded=degraded), budget, 2e-3, tmp_path / "whole", HERE)
+    fit(task(data_folder, degraded=degraded), budget, 2e-3, tmp_path / "parts", HERE, stop_at=5)
+    half = Checkpoint.load(tmp_path / "parts" / "checkpoint.pt")
+    assert half.step == 5
+    second = task(data_folder, degraded=degraded)
+    second.network.load_state_dict(half.network().state_dict())
+    resumed = fit(second, budget, 2e-3, tmp_path / "parts", HERE, resume=half)
+    curves = [read_curve(tmp_path / name / "curve.jsonl") for name in ("whole", "parts")]
+    assert len(curves[0]) == 12 and without_time(curves[0]) == without_time(curves[1])
+    for a, b in zip(whole.network().parameters(), resumed.network().parameters()):
+        assert torch.equal(a, b)
+
+
+def test_training_lowers_the_loss_and_beats_the_rgb(data_folder, tmp_path):
+    t = task(data_folder)
+    fit(t, Budget(steps=150), 4e-3, tmp_path, HERE)
+    scenes = t.validation
+    before, after = evaluate(rgb_as_field, scenes), evaluate(torch_predictor(t.network), scenes)
+    assert after["amplitude_psnr"] > before["amplitude_psnr"] + 0.5
+    assert after["focal_psnr"] > before["focal_psnr"]
+
+
+def test_nan_stops_with_the_last_good_weights(data_folder, tmp_path):
+    t = task(data_folder)
+    healthy = t.loss
+
+    def poisoned(module, batch, step):
+        loss, terms = healthy(module, batch, step)
+        return (loss * float("nan") if step == 6 else loss), terms
+
+    fit(t, Budget(steps=20), 2e-3, tmp_path, HERE, stop_at=4)
+    kept = Checkpoint.load(tmp_path / "checkpoint.pt")
+    t.loss = poisoned
+    with pytest.raises(LossNotFinite, match="step 6.*step 4 are kept"):
+        fit(t, Budget(steps=20), 2e-3, tmp_path, HERE, resume=kept)
+    after = Checkpoint.load(tmp_path / "checkpoint.pt")
+    assert after.step == 4
+    assert all(torch.equal(a, b) and torch.isfinite(a).all() for a, b in zip(kept.network().parameters(), after.network().parameters()))
+
+
+def test_losses_vanish_at_the_truth_and_only_there(data_folder):
+    batch = task(data_folder).sample(0)
+    display = task(data_folder).display
+    for planes in (3, 20):
+        focal, variation = focal_stack_terms(batch.target, batch.target, batch.depth, display, planes, np.random.default_rng(0))
+        assert focal < 1e-6 and variation < 1e-6
+        worse = focal_stack_terms(batch.target * 0.9, batch.target, batch.depth, display, planes, np.random.default_rng(0))
+        assert worse[0] > 1e-3 and worse[1] > 1e-3
+    assert field_terms(batch.target, batch.target)[1] < 1e-6
+    wrong = fill_invalid(torch.zeros_like(batch.target), batch.target, batch.valid)
+    assert torch.equal(wrong[batch.valid.expand_as(wrong) == 0], batch.target[batch.valid.expand_as(wrong) == 0])
+    assert (wrong[batch.valid.expand_as(wrong) == 1] == 0).all()
+
+
+def test_commands_train_resume_export_and_evaluate(data_folder, tmp_path, capsys):
+    out = tmp_path / "run"
+    base = ["stage1", "--data", str(data_folder), "-o", str(out)]
+    assert main([*base, "--layers", "4", "--filters", "8", "--crop", "48", "--steps", "4", "--degraded", "0.5"]) == 0
+    assert main([*base, "--resume", "--steps", "8"]) == 0
+    last = Checkpoint.load(out / "checkpoint.pt")
+    assert last.step == 8 and last.options["crop"] == 48 and last.options["degraded"] == 0.5
+    onnx = tmp_path / "n.onnx"
+    assert main(["export", str(out / "checkpoint.pt"), "-o", str(onnx)]) == 0
+    grown = ["stage1", "--data", str(data_folder), "-o", str(tmp_path / "grown"), "--layers", "6", "--filters", "8"]
+    assert main([*grown, "--init", str(onnx), "--steps", "2", "--crop", "48"]) == 0
+    figures = tmp_path / "figures.json"
+    call = ["evaluate", str(onnx), str(out / "checkpoint.pt"), "--data", str(data_folder), "--json", str(figures)]
+    assert main(call) == 0
+    results = json.loads(figures.read_text())["results"]
+    assert results[str(onnx)]["clean"]["amplitude_psnr"] == pytest.approx(results[str(out / "checkpoint.pt")]["clean"]["amplitude_psnr"], abs=1e-3)
+    assert "RGB as the field" in capsys.readouterr().out
+    text = tmp_path / "small.md"
+    assert main(["card", str(out / "checkpoint.pt"), str(figures), "-o", str(text)]) == 0
+    told = text.read_text()
+    assert "4 layers of 8 filters" in told and "| n.onnx | degraded |" in told and "--layers 4" in told and "50%" in told
+    assert main(["plot", str(out), "-o", str(tmp_path / "curves.png")]) == 0 and (tmp_path / "curves.png").stat().st_size > 5000
+
+
+def test_wrong_use_is_one_line(data_folder, tmp_path, capsys):
+    assert main(["stage1", "--data", str(tmp_path), "-o", str(tmp_path / "o"), "--steps", "1"]) == 1
+    told = capsys.readouterr().err
+    assert told.startswith("error: ") and told.count("\n") == 1 and "manifest.json" in told
+    assert main(["stage1", "--data", str(data_folder), "-o", str(tmp_path / "o")]) == 1
+    assert "--minutes or --steps" in capsys.readouterr().err
+
+
+def test_layered_input_trains(data_folder, tmp_path):
+    out = tmp_path / "ldi"
+    call = ["stage1", "--data", str(data_folder), "-o", str(out), "--input", "ldi3", "--layers", "4", "--filters", "8", "--crop", "48", "--steps", "2"]
+    assert main(call) == 0
+    assert Checkpoint.load(out / "checkpoint.pt").network().architecture.input_channels == 12
