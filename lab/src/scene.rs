@@ -2,7 +2,8 @@
 //!
 //! * [`Scene`], [`Mesh`] and [`Texture`] describe what is there.
 //! * [`random_scene`] makes the scenes that data sets consist of.
-//! * [`render_ldi_reference`] renders on the CPU, exactly.
+//! * [`read_model`] reads glTF, GLB and OBJ files.
+//! * [`render_ldi_reference`] renders on the CPU, exactly; [`DepthPeeler`] the same on a GPU.
 //!
 //! # Coordinates
 //! The camera is orthographic, as the illumination is collimated: it looks along −z and has no position. A vertex
@@ -11,7 +12,11 @@
 //! +½ (nearest) to −½ (farthest). Normalized depth is d = ½ − z. A scene so described fits any display.
 
 pub mod dice;
+mod gltf_file;
+mod model;
+mod obj_file;
 pub mod pattern;
+mod peel;
 mod random;
 mod raster;
 pub mod shapes;
@@ -19,6 +24,8 @@ mod texture;
 
 use std::sync::Arc;
 
+pub use model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, read_model};
+pub use peel::DepthPeeler;
 pub use random::random_scene;
 pub use raster::render_ldi_reference;
 pub use texture::Texture;

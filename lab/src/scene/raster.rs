@@ -36,14 +36,7 @@ pub fn render_ldi_reference(
     layers: usize,
 ) -> Result<Ldi> {
     scene.check()?;
-    let count = height
-        .checked_mul(width)
-        .and_then(|pixels| pixels.checked_mul(layers));
-    if !count.is_some_and(|count| (1..=MAX_HITS).contains(&count)) {
-        return Err(Error::Input(format!(
-            "cannot render {layers} layers of {width}x{height} pixels: at least one of each, and {MAX_HITS} pixels in all at most"
-        )));
-    }
+    check_size(height, width, layers)?;
     let nothing = Hit {
         depth: f32::INFINITY,
         rgb: [0.0; 3],
@@ -60,6 +53,19 @@ pub fn render_ldi_reference(
         }
     }
     Ldi::new(frame.into_layers())
+}
+
+/// An error if a rendering of that size has nothing in it or too much.
+pub(super) fn check_size(height: usize, width: usize, layers: usize) -> Result<()> {
+    let count = height
+        .checked_mul(width)
+        .and_then(|pixels| pixels.checked_mul(layers));
+    if !count.is_some_and(|count| (1..=MAX_HITS).contains(&count)) {
+        return Err(Error::Input(format!(
+            "cannot render {layers} layers of {width}x{height} pixels: at least one of each, and {MAX_HITS} pixels in all at most"
+        )));
+    }
+    Ok(())
 }
 
 /// The hits found so far: `layers` a pixel, by rising depth.

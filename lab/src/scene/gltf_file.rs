@@ -1,0 +1,447 @@
+//! glTF 2.0 and GLB files as [`Part`]s. The crate trusts what a file says of its own buffers in places; what could
+//! lead it astray is checked here first.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use gltf::accessor::{DataType, Dimensions};
+use gltf::image::{Format, Source};
+use gltf::material::AlphaMode;
+use gltf::mesh::Mode;
+use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
+
+use super::model::{MAX_MODEL_TRIANGLES, Part, check_count};
+use super::{Texture, texture};
+
+type Result<T> = std::result::Result<T, String>;
+
+/// A matrix of columns, as glTF has it.
+type Matrix = [[f32; 4]; 4];
+
+/// glTF's colour factors are linear, its pictures and our amplitudes coded for the eye.
+const GAMMA: f64 = 2.2;
+
+/// The parts of the file's default scene, or of its first.
+pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    let unchecked = Gltf::from_slice_without_validation(&bytes).map_err(|e| one_line(&e))?;
+    check_names(unchecked.as_json())?;
+    let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|e| one_line(&e))?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for buffer in document.buffers() {
+        if let buffer::Source::Uri(uri) = buffer.source() {
+            check_uri(uri)?;
+        }
+    }
+    let buffers = gltf::import_buffers(&document, Some(folder), blob)
+        .map_err(|e| format!("its buffers: {}", one_line(&e)))?;
+    let scene = document
+        .default_scene()
+        .or_else(|| document.scenes().next())
+        .ok_or("no scene")?;
+    let nodes = document.nodes().len();
+    let mut reader = Reader {
+        folder,
+        buffers,
+        textures: Vec::new(),
+        triangles: 0,
+        parts: Vec::new(),
+    };
+    let identity = std::array::from_fn(|i| std::array::from_fn(|j| f32::from(u8::from(i == j))));
+    for node in scene.nodes() {
+        reader.node(&node, identity, nodes)?;
+    }
+    Ok(reader.parts)
+}
+
+struct Reader<'a> {
+    folder: &'a Path,
+    buffers: Vec<buffer::Data>,
+    /// What has been made of images: their index, what was asked of them, the texture.
+    textures: Vec<(TextureKey, Arc<Texture>)>,
+    triangles: usize,
+    parts: Vec<Part>,
+}
+
+/// An image and how a material colours and cuts it.
+#[derive(PartialEq, Clone)]
+struct TextureKey {
+    image: Option<usize>,
+    factor: [f32; 4],
+    /// The alpha at which a surface begins; none where all of it is there.
+    cut: Option<f32>,
+}
+
+impl Reader<'_> {
+    /// The node and those below it, `budget` generations at most: more than there are nodes would be a circle.
+    fn node(&mut self, node: &Node, parent: Matrix, budget: usize) -> Result<()> {
+        let budget = budget.checked_sub(1).ok_or("its nodes form a circle")?;
+        let matrix = product(parent, node.transform().matrix());
+        if let Some(mesh) = node.mesh() {
+            for primitive in mesh.primitives() {
+                self.primitive(&primitive, matrix)?;
+            }
+        }
+        node.children()
+            .try_for_each(|child| self.node(&child, matrix, budget))
+    }
+
+    fn primitive(&mut self, primitive: &Primitive, matrix: Matrix) -> Result<()> {
+        let mode = primitive.mode();
+        if !matches!(
+            mode,
+            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
+        ) {
+            log::warn!("points and lines of a model are left out");
+            return Ok(());
+        }
+        let positions = primitive
+            .get(&Semantic::Positions)
+            .ok_or("a surface without positions")?;
+        let count = positions.count();
+        check(&positions, &[DataType::F32], &[Dimensions::Vec3])?;
+        let corners = primitive.indices().map_or(count, |indices| indices.count());
+        self.triangles = self.triangles.saturating_add(if mode == Mode::Triangles {
+            corners / 3
+        } else {
+            corners
+        });
+        check_count(self.triangles.max(count / 3))?;
+
+        let buffers = &self.buffers;
+        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
+        let missing = |what: &str| format!("{what} lie outside their buffer");
+        let mut part = Part {
+            positions: reader
+                .read_positions()
+                .ok_or_else(|| missing("positions"))?
+                .collect(),
+            ..Part::default()
+        };
+        let indices: Vec<u32> = match primitive.indices() {
+            None => (0..count as u32).collect(),
+            Some(indices) => {
+                check(
+                    &indices,
+                    &[DataType::U8, DataType::U16, DataType::U32],
+                    &[Dimensions::Scalar],
+                )?;
+                reader
+                    .read_indices()
+                    .ok_or_else(|| missing("indices"))?
+                    .into_u32()
+                    .collect()
+            }
+        };
+        if let Some(index) = indices
+            .iter()
+            .find(|&&index| index as usize >= part.positions.len())
+        {
+            return Err(format!(
+                "a triangle names vertex {index}, but there are {}",
+                part.positions.len()
+            ));
+        }
+        part.triangles = triangles(&indices, mode);
+        if let Some(normals) = primitive.get(&Semantic::Normals) {
+            check(&normals, &[DataType::F32], &[Dimensions::Vec3])?;
+            part.normals = reader
+                .read_normals()
+                .ok_or_else(|| missing("normals"))?
+                .collect();
+        }
+        if let Some(colours) = primitive.get(&Semantic::Colors(0)) {
+            check(
+                &colours,
+                &[DataType::F32, DataType::U8, DataType::U16],
+                &[Dimensions::Vec3, Dimensions::Vec4],
+            )?;
+            let colours = reader
+                .read_colors(0)
+                .ok_or_else(|| missing("colours"))?
+                .into_rgb_f32();
+            part.colour = colours.map(|rgb| rgb.map(coded)).collect();
+        }
+        self.material(primitive, &mut part)?;
+        let same = |length: usize| length == 0 || length == part.positions.len();
+        if ![part.normals.len(), part.uv.len(), part.colour.len()]
+            .into_iter()
+            .all(same)
+        {
+            return Err("a surface whose vertices and their normals, colours or texture coordinates differ in number".into());
+        }
+        transform(&mut part, matrix);
+        self.parts.push(part);
+        Ok(())
+    }
+
+    /// Gives the part its texture and where on it its vertices lie.
+    fn material(&mut self, primitive: &Primitive, part: &mut Part) -> Result<()> {
+        let material = primitive.material();
+        let base = material.pbr_metallic_roughness();
+        part.two_sided = material.double_sided();
+        let mut image = None;
+        if let Some(info) = base.base_color_texture() {
+            let set = info.tex_coord();
+            if let Some(uv) = primitive.get(&Semantic::TexCoords(set)) {
+                check(
+                    &uv,
+                    &[DataType::F32, DataType::U8, DataType::U16],
+                    &[Dimensions::Vec2],
+                )?;
+                let buffers = &self.buffers;
+                let reader =
+                    primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
+                let uv = reader
+                    .read_tex_coords(set)
+                    .ok_or("texture coordinates lie outside their buffer")?;
+                part.uv = uv.into_f32().collect();
+                image = Some(info.texture().source());
+            } else {
+                log::warn!(
+                    "a surface of a model has a texture but no texture coordinates: its plain colour is used"
+                );
+            }
+        }
+        let cut = match material.alpha_mode() {
+            AlphaMode::Opaque => None,
+            AlphaMode::Mask => Some(material.alpha_cutoff().unwrap_or(0.5)),
+            AlphaMode::Blend => Some(0.5),
+        };
+        let key = TextureKey {
+            image: image.as_ref().map(gltf::Image::index),
+            factor: base.base_color_factor(),
+            cut,
+        };
+        if let Some((_, texture)) = self.textures.iter().find(|(known, _)| *known == key) {
+            part.texture = Some(texture.clone());
+            return Ok(());
+        }
+        let (width, height, texels) = match image {
+            Some(image) => self.image(&image)?,
+            None => (1, 1, vec![[255; 4]]),
+        };
+        let factor = [0, 1, 2].map(|c| coded(key.factor[c]));
+        let texels = texels.into_iter().map(|[r, g, b, a]| {
+            let [r, g, b] =
+                [(r, 0), (g, 1), (b, 2)].map(|(v, c)| (f32::from(v) * factor[c]).round() as u8);
+            // Where the file's surface begins ours must, at one half.
+            let alpha = f32::from(a) / 255.0 * key.factor[3];
+            let alpha = key.cut.map_or(1.0, |cut| {
+                if cut > 0.0 {
+                    alpha * texture::ALPHA_CUT / cut
+                } else {
+                    1.0
+                }
+            });
+            [r, g, b, (alpha * 255.0).round() as u8]
+        });
+        let texture =
+            Arc::new(Texture::new(width, height, texels.collect()).map_err(|e| e.to_string())?);
+        self.textures.push((key, texture.clone()));
+        part.texture = Some(texture);
+        Ok(())
+    }
+
+    /// Width, height and RGBA texels of an image in the file or beside it.
+    fn image(&self, image: &gltf::Image) -> Result<(usize, usize, Vec<[u8; 4]>)> {
+        let source = image.source();
+        match &source {
+            Source::Uri { uri, .. } => check_uri(uri)?,
+            Source::View { view, .. } => {
+                let end = view.offset().checked_add(view.length());
+                let held = self
+                    .buffers
+                    .get(view.buffer().index())
+                    .map_or(0, |data| data.len());
+                if end.is_none_or(|end| end > held) {
+                    return Err(format!("picture {} lies outside its buffer", image.index()));
+                }
+            }
+        }
+        let data = gltf::image::Data::from_source(source, Some(self.folder), &self.buffers)
+            .map_err(|e| format!("picture {}: {}", image.index(), one_line(&e)))?;
+        let (channels, bytes) = match data.format {
+            Format::R8 => (1, 1),
+            Format::R8G8 => (2, 1),
+            Format::R8G8B8 => (3, 1),
+            Format::R8G8B8A8 => (4, 1),
+            Format::R16 => (1, 2),
+            Format::R16G16 => (2, 2),
+            Format::R16G16B16 => (3, 2),
+            Format::R16G16B16A16 => (4, 2),
+            Format::R32G32B32FLOAT | Format::R32G32B32A32FLOAT => {
+                return Err(format!(
+                    "picture {} holds floats; 8 and 16 bits are read",
+                    image.index()
+                ));
+            }
+        };
+        // Of 16 bits, in this machine's order, the upper 8 are enough.
+        let upper = if cfg!(target_endian = "little") {
+            bytes - 1
+        } else {
+            0
+        };
+        let texel = |pixel: &[u8]| {
+            let at = |c: usize| pixel[c * bytes + upper];
+            match channels {
+                1 => [at(0), at(0), at(0), 255],
+                2 => [at(0), at(0), at(0), at(1)],
+                3 => [at(0), at(1), at(2), 255],
+                _ => [at(0), at(1), at(2), at(3)],
+            }
+        };
+        let texels = data
+            .pixels
+            .chunks_exact(channels * bytes)
+            .map(texel)
+            .collect();
+        Ok((data.width as usize, data.height as usize, texels))
+    }
+}
+
+/// The corners of each triangle. Strips turn every second one, so that all fronts face one way.
+fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+    match mode {
+        Mode::TriangleStrip => {
+            let turned = |(index, t): (usize, &[u32])| {
+                if index % 2 == 0 {
+                    [t[0], t[1], t[2]]
+                } else {
+                    [t[1], t[0], t[2]]
+                }
+            };
+            indices.windows(3).enumerate().map(turned).collect()
+        }
+        Mode::TriangleFan => {
+            let rim = indices.get(1..).unwrap_or_default();
+            rim.windows(2)
+                .map(|pair| [indices[0], pair[0], pair[1]])
+                .collect()
+        }
+        _ => indices
+            .chunks_exact(3)
+            .map(|t| [t[0], t[1], t[2]])
+            .collect(),
+    }
+}
+
+/// Moves the part to where its node stands.
+fn transform(part: &mut Part, m: Matrix) {
+    for p in &mut part.positions {
+        *p = std::array::from_fn(|i| m[0][i] * p[0] + m[1][i] * p[1] + m[2][i] * p[2] + m[3][i]);
+    }
+    // Normals go by the matrix of cofactors: the inverse transposed, but for its length.
+    let minor = |r: usize, c: usize| {
+        let (r1, r2, c1, c2) = ((r + 1) % 3, (r + 2) % 3, (c + 1) % 3, (c + 2) % 3);
+        m[c1][r1] * m[c2][r2] - m[c2][r1] * m[c1][r2]
+    };
+    for n in &mut part.normals {
+        *n = std::array::from_fn(|i| (0..3).map(|j| minor(i, j) * n[j]).sum());
+    }
+    let determinant: f32 = (0..3).map(|j| m[j][0] * minor(0, j)).sum();
+    if determinant < 0.0 {
+        // A mirrored node keeps its fronts in front.
+        part.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        part.normals.iter_mut().for_each(|n| *n = n.map(|v| -v));
+    }
+}
+
+fn product(a: Matrix, b: Matrix) -> Matrix {
+    std::array::from_fn(|j| std::array::from_fn(|i| (0..4).map(|k| a[k][i] * b[j][k]).sum()))
+}
+
+/// A linear colour factor for values coded for the eye.
+fn coded(factor: f32) -> f32 {
+    libm::pow(f64::from(factor.clamp(0.0, 1.0)), 1.0 / GAMMA) as f32
+}
+
+/// What the crate's own validation and reading take for granted: attributes name accessors that are there, images say
+/// where they are and, in the file itself, of which kind.
+fn check_names(root: &gltf::json::Root) -> Result<()> {
+    let mut attributes = root
+        .meshes
+        .iter()
+        .flat_map(|mesh| &mesh.primitives)
+        .flat_map(|part| part.attributes.values());
+    if let Some(index) = attributes.find(|index| index.value() >= root.accessors.len()) {
+        return Err(format!(
+            "a surface names accessor {}, but there are {}",
+            index.value(),
+            root.accessors.len()
+        ));
+    }
+    let placed = |image: &gltf::json::Image| match image.buffer_view {
+        Some(_) => image.mime_type.is_some(),
+        None => image.uri.is_some(),
+    };
+    match root.images.iter().position(|image| !placed(image)) {
+        Some(index) => Err(format!(
+            "picture {index} does not say where it is, or of which kind"
+        )),
+        None => Ok(()),
+    }
+}
+
+/// The accessor is of one of these types and shapes and its items do not overlap.
+fn check(accessor: &Accessor, types: &[DataType], shapes: &[Dimensions]) -> Result<()> {
+    let bad = |reason: &str| Err(format!("accessor {}: {reason}", accessor.index()));
+    if !types.contains(&accessor.data_type()) || !shapes.contains(&accessor.dimensions()) {
+        return bad("not of a type that glTF allows for its use");
+    }
+    if accessor.count() == 0 || accessor.count() > 3 * MAX_MODEL_TRIANGLES {
+        return bad(&format!(
+            "{} items; 1 to {} are read",
+            accessor.count(),
+            3 * MAX_MODEL_TRIANGLES
+        ));
+    }
+    let overlaps = |view: Option<buffer::View>, size: usize| {
+        view.and_then(|v| v.stride()).is_some_and(|s| s < size)
+    };
+    let sparse_overlaps = accessor.sparse().is_some_and(|sparse| {
+        sparse.count() == 0
+            || overlaps(Some(sparse.values().view()), accessor.size())
+            || overlaps(
+                Some(sparse.indices().view()),
+                sparse.indices().index_type().size(),
+            )
+    });
+    if overlaps(accessor.view(), accessor.size()) || sparse_overlaps {
+        return bad("its items overlap");
+    }
+    Ok(())
+}
+
+/// A name that, its percent signs decoded, is text.
+fn check_uri(uri: &str) -> Result<()> {
+    let bytes = uri.as_bytes();
+    let digit = |index: usize| bytes.get(index).and_then(|&b| char::from(b).to_digit(16));
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut index = 0;
+    while index < bytes.len() {
+        if bytes[index] == b'%'
+            && let (Some(high), Some(low)) = (digit(index + 1), digit(index + 2))
+        {
+            decoded.push((16 * high + low) as u8);
+            index += 3;
+        } else {
+            decoded.push(bytes[index]);
+            index += 1;
+        }
+    }
+    if uri.starts_with("data:") || std::str::from_utf8(&decoded).is_ok() {
+        return Ok(());
+    }
+    Err(format!("{uri} is not the name of a file"))
+}
+
+/// The crate's message, on one line.
+fn one_line(error: &gltf::Error) -> String {
+    error
+        .to_string()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}

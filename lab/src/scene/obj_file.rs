@@ -1,0 +1,126 @@
+//! Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use tobj::{LoadOptions, Material};
+
+use super::Texture;
+use super::model::{Part, check_count};
+
+type Result<T> = std::result::Result<T, String>;
+
+pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
+    let options = LoadOptions {
+        triangulate: true,
+        single_index: true,
+        ignore_points: true,
+        ignore_lines: true,
+    };
+    let (models, materials) = tobj::load_obj(path, &options).map_err(|e| e.to_string())?;
+    let materials = materials.unwrap_or_else(|e| {
+        log::warn!(
+            "{}: its materials are not read ({e}); its surfaces are white",
+            path.display()
+        );
+        Vec::new()
+    });
+    check_count(
+        models
+            .iter()
+            .map(|model| model.mesh.indices.len() / 3)
+            .sum(),
+    )?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let textures = materials
+        .iter()
+        .map(|material| texture(folder, material))
+        .collect::<Result<Vec<_>>>()?;
+    let part = |model: tobj::Model| {
+        let mesh = model.mesh;
+        let mut part = Part {
+            positions: triples(&mesh.positions),
+            triangles: triples(&mesh.indices),
+            normals: triples(&mesh.normals),
+            colour: triples(&mesh.vertex_color),
+            // OBJ counts from the picture's bottom.
+            uv: mesh
+                .texcoords
+                .chunks_exact(2)
+                .map(|t| [t[0], 1.0 - t[1]])
+                .collect(),
+            ..Part::default()
+        };
+        let count = part.positions.len();
+        if [part.normals.len(), part.colour.len()]
+            .iter()
+            .any(|&length| length != 0 && length != count)
+        {
+            return Err(format!(
+                "object {}: its vertices and their normals or colours differ in number",
+                model.name
+            ));
+        }
+        if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= count) {
+            return Err(format!(
+                "object {}: a face names vertex {index}, but there are {count}",
+                model.name
+            ));
+        }
+        if let Some((material, texture)) = mesh
+            .material_id
+            .and_then(|id| Some((materials.get(id)?, textures.get(id)?)))
+        {
+            let pictured = texture.is_some() && part.uv.len() == count;
+            if texture.is_some() && !pictured {
+                log::warn!(
+                    "object {} has a texture but no texture coordinates: its plain colour is used",
+                    model.name
+                );
+            }
+            part.texture = texture.clone().filter(|_| pictured);
+            let diffuse = material
+                .diffuse
+                .unwrap_or([1.0; 3])
+                .map(|v| v.clamp(0.0, 1.0));
+            // A picture stands for the diffuse colour, which many files leave black beside one.
+            if !pictured {
+                part.texture = Some(Arc::new(Texture::plain(diffuse)));
+            }
+        }
+        if part.uv.len() != count {
+            part.uv.clear();
+        }
+        Ok(part)
+    };
+    models.into_iter().map(part).collect()
+}
+
+/// The picture of a material's diffuse colour, if it names one that is there.
+fn texture(folder: &Path, material: &Material) -> Result<Option<Arc<Texture>>> {
+    let Some(name) = &material.diffuse_texture else {
+        return Ok(None);
+    };
+    // Some programs write their own separators.
+    let path = folder.join(name.trim().replace('\\', "/"));
+    if !path.is_file() {
+        log::warn!(
+            "{}: no such picture; the plain colour of material {} is used",
+            path.display(),
+            material.name
+        );
+        return Ok(None);
+    }
+    let image = image::open(&path)
+        .map_err(|e| format!("picture {}: {e}", path.display()))?
+        .to_rgba8();
+    let (width, height) = image.dimensions();
+    let texels = image.pixels().map(|pixel| pixel.0).collect();
+    let texture =
+        Texture::new(width as usize, height as usize, texels).map_err(|e| e.to_string())?;
+    Ok(Some(Arc::new(texture)))
+}
+
+fn triples<T: Copy>(flat: &[T]) -> Vec<[T; 3]> {
+    flat.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect()
+}

@@ -1,0 +1,46 @@
+//! The networks that come along: they load, and the fast path gives what tract gives.
+#![allow(clippy::unwrap_used)]
+
+use phasefront::network::Precision;
+use phasefront_lab::models::{self, BUILT_IN};
+use phasefront_lab::scene;
+
+/// A rendered frame as network input, (4, H, W).
+fn input(height: usize, width: usize) -> Vec<f32> {
+    let scene = scene::random_scene(11, height, width);
+    let ldi = scene::render_ldi_reference(&scene, height, width, 1).unwrap();
+    let layer = &ldi.layers[0];
+    let depth = layer.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
+    layer.rgb.iter().chain(&depth).map(|v| v - 0.5).collect()
+}
+
+#[test]
+fn the_fast_path_agrees_with_tract() {
+    for built in BUILT_IN {
+        let network = models::built_in(built).unwrap();
+        assert_eq!(network.layers(), built.layers);
+        assert_eq!(network.precision() == Precision::Int8, built.int8);
+        for (height, width) in [(61, 47), (40, 64)] {
+            let input = input(height, width);
+            let outputs = [
+                network.plan(height, width).unwrap(),
+                network.plan_on_stock_tract(height, width).unwrap(),
+            ]
+            .map(|plan| {
+                let mut output = vec![0.0; 6 * height * width];
+                plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
+                output
+            });
+            let [ours, tracts] = &outputs;
+            let mean_square = |values: &mut dyn Iterator<Item = f32>| {
+                values.map(|v| f64::from(v * v)).sum::<f64>() / ours.len() as f64
+            };
+            let error = mean_square(&mut ours.iter().zip(tracts).map(|(a, b)| a - b));
+            let signal = mean_square(&mut tracts.iter().copied());
+            let decibels = 10.0 * (signal / error).log10();
+            // Engines round int8 differently by one step at times; f32 differs by its last bits.
+            let least = if built.int8 { 30.0 } else { 90.0 };
+            assert!(decibels > least, "{built:?}: {decibels} dB");
+        }
+    }
+}
