@@ -5,6 +5,7 @@ mod compare;
 mod dataset;
 mod flags;
 mod hologram;
+mod occlusion;
 mod refocus;
 mod scene;
 
@@ -32,6 +33,7 @@ enum Command {
     Compare(compare::Compare),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
+    Occlusion(occlusion::Occlusion),
 }
 
 impl Phasefront {
@@ -50,6 +52,7 @@ impl Phasefront {
             Command::Compare(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
+            Command::Occlusion(command) => command.run(json),
         })
     }
 }
