@@ -123,8 +123,8 @@ pub struct Study {
 /// hiding the lower half of the rear one, as an LDI of two layers of 320×256 that holds all of it.
 pub fn two_bars() -> Ldi {
     const SHAPE: (usize, usize) = (256, 320);
-    const FRONT_AMPLITUDE: f32 = 0.5;
-    const REAR_AMPLITUDE: f32 = 1.0;
+    const FRONT_AMPLITUDE: f32 = 0.3;
+    const REAR_AMPLITUDE: f32 = 0.6;
     let empty = || LdiLayer {
         rgb: Array3::zeros((3, SHAPE.0, SHAPE.1)),
         depth: Array2::from_elem(SHAPE, f32::NAN),

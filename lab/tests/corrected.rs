@@ -146,7 +146,9 @@ fn a_shift_moves_the_hologram() {
     };
     let correction = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, shift).unwrap();
     let ours = hologram(&ldi, 30, &correction);
-    let plain = sm_lbm::hologram(&ldi, &display, 30, &|_, _| {}).unwrap();
+    let one = |_: f64, _: f64, _: f64, _: f64| Complex64::ONE;
+    let still = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, one).unwrap();
+    let plain = hologram(&ldi, 30, &still);
     for colour in 0..3 {
         let moved = plane_of(&ours, colour).slice(s![3.., 2..]).to_owned();
         let still = plane_of(&plain, colour).slice(s![..61, ..70]).to_owned();

