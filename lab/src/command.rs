@@ -6,6 +6,7 @@ mod compare;
 mod dataset;
 mod flags;
 mod hologram;
+mod occlusion;
 mod refocus;
 mod scene;
 
@@ -34,6 +35,7 @@ enum Command {
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
     Bench(bench::Bench),
+    Occlusion(occlusion::Occlusion),
 }
 
 impl Phasefront {
@@ -53,6 +55,7 @@ impl Phasefront {
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
             Command::Bench(command) => command.run(self.threads.map(usize::from), json),
+            Command::Occlusion(command) => command.run(json),
         })
     }
 }

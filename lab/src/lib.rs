@@ -1,12 +1,15 @@
 //! Ground truth, data sets, evaluation: what prepares a display or a network for the phone.
 
 pub mod bench;
+pub mod corrected;
 pub mod dataset;
 pub mod error;
 pub mod files;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
+pub mod occlusion;
+pub mod point_based;
 pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;

@@ -23,16 +23,16 @@ use phasefront::wave::fft::Fft2;
 
 /// One point of a scene, on its plane.
 #[derive(Clone, Copy)]
-struct Point {
-    y: u32,
-    x: u32,
-    rgb: [f32; 3],
+pub(crate) struct Point {
+    pub(crate) y: u32,
+    pub(crate) x: u32,
+    pub(crate) rgb: [f32; 3],
 }
 
 /// A scene cut into planes.
-struct Planes {
+pub(crate) struct Planes {
     /// For each plane that holds points: its index k, back first, and its points, by rows.
-    occupied: Vec<(usize, Vec<Point>)>,
+    pub(crate) occupied: Vec<(usize, Vec<Point>)>,
 }
 
 /// The plane of a point of depth `d` among `planes`.
@@ -46,7 +46,7 @@ pub fn plane_z_m(k: usize, planes: usize, display: &Display) -> f64 {
 }
 
 impl Planes {
-    fn of(ldi: &Ldi, planes: usize) -> Self {
+    pub(crate) fn of(ldi: &Ldi, planes: usize) -> Self {
         let mut points: Vec<(usize, usize, Point)> = Vec::new();
         for (layer, content) in ldi.layers.iter().enumerate() {
             for ((y, x), &d) in content.depth.indexed_iter() {
@@ -79,7 +79,7 @@ impl Planes {
 }
 
 /// The points of row `y` among the `points` of a plane.
-fn row_of(points: &[Point], y: usize) -> &[Point] {
+pub(crate) fn row_of(points: &[Point], y: usize) -> &[Point] {
     let start = points.partition_point(|p| (p.y as usize) < y);
     let length = points[start..].partition_point(|p| p.y as usize == y);
     &points[start..start + length]

@@ -120,7 +120,7 @@ fn a_hologram_travels_with_all_that_refocus_needs() {
     .unwrap();
     let lut: String = (0..256).map(|i| format!("{}\n", 255 - i)).collect();
     fs::write(folder.path("lut.txt"), lut).unwrap();
-    for method in ["network", "layers"] {
+    for method in ["network", "layers", "points"] {
         folder.succeeds(&with(&[
             "--method",
             method,
@@ -252,7 +252,7 @@ fn real_captures_are_filled_and_shown() {
     }
     let folder = Folder::new();
     let (rgb, depth) = (tum.join("color.png"), tum.join("depth.png"));
-    for method in ["network", "layers"] {
+    for method in ["network", "layers", "points"] {
         folder.succeeds(&[
             "hologram",
             "--rgb",
@@ -523,5 +523,71 @@ fn a_data_set_resumed_or_sharded_is_the_one_made_in_one_go() {
         &["dataset", "--scenes", "7", "--shard", "4/4", "-o", "x"],
         2,
         &["i/n"],
+    );
+}
+
+#[test]
+fn the_occlusion_study_writes_its_pictures_and_figures() {
+    let folder = Folder::new();
+    let small = ["scene", "--seed", "5", "--size", "48x40", "--layers", "3"];
+    folder.succeeds(&[&small[..], &["-o", "scene"]].concat());
+    for mode in ["none", "input", "geometric"] {
+        folder.succeeds(&[
+            "hologram",
+            "--ldi",
+            "scene",
+            "--method",
+            "points",
+            "--occlusion",
+            mode,
+            "-o",
+            "h.png",
+        ]);
+    }
+    let study = [
+        "occlusion",
+        "--ldi",
+        "scene",
+        "--planes",
+        "32",
+        "-o",
+        "study",
+    ];
+    let figures: serde_json::Value =
+        serde_json::from_str(&folder.succeeds(&[&study[..], &["--json"]].concat())).unwrap();
+    let settings = figures["settings"].as_array().unwrap();
+    assert_eq!(settings.len(), 6);
+    assert_eq!(settings[5]["front"]["ssim_overall"], 1.0);
+    assert!(settings[2]["artefacts"]["geometric_inaccuracy"].is_number());
+    let picture = files::read_rgb(&folder.path("study/comparison.png")).unwrap();
+    assert_eq!(picture.dim(), (3, 2 * 40 + 4, 6 * 48 + 5 * 4));
+    for setting in 1..=6 {
+        for focus in ["front", "rear"] {
+            let view = folder.path(&format!("study/setting_{setting}_{focus}.png"));
+            assert_eq!(files::read_rgb(&view).unwrap().dim(), (3, 40, 48));
+        }
+    }
+    let text = folder.succeeds(&study);
+    assert!(
+        text.contains("waves (computation)") && text.contains("study/comparison.png"),
+        "{text}"
+    );
+    folder.refuses(
+        &["occlusion", "--ldi", "nowhere", "-o", "other"],
+        1,
+        &["nowhere"],
+    );
+    folder.refuses(
+        &[
+            "occlusion",
+            "--ldi",
+            "scene",
+            "--planes",
+            "0",
+            "-o",
+            "other",
+        ],
+        1,
+        &["planes"],
     );
 }

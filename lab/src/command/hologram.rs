@@ -10,6 +10,7 @@ use phasefront::slm::Response;
 use phasefront::{Pipeline, RgbdFrame};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
+use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
@@ -20,7 +21,7 @@ use std::time::{Duration, Instant};
 pub(crate) struct Hologram {
     #[command(flatten)]
     frame: FrameFlags,
-    /// Folder of a layered depth image, for --method layers
+    /// Folder of a layered depth image, for --method layers and points
     #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
     ldi: Option<PathBuf>,
     /// How the midpoint hologram is made [default: network; layers with --ldi]
@@ -32,9 +33,12 @@ pub(crate) struct Hologram {
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
-    /// Planes of --method layers
+    /// Planes of --method layers and points
     #[arg(long, value_name = "N", default_value_t = 256)]
     planes: usize,
+    /// What keeps light from where it should not go, for --method points
+    #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
+    occlusion: OcclusionName,
     /// How the field becomes phases
     #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
     encoder: EncoderName,
@@ -57,6 +61,28 @@ enum Method {
     Network,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
+    /// A sub-hologram for each point (Maimone et al.)
+    Points,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum OcclusionName {
+    /// Nothing: every point of every layer lights its whole sub-hologram
+    None,
+    /// The image: only points of the front layer shine
+    Input,
+    /// Rays: every point shines where no nearer surface is in the way
+    Geometric,
+}
+
+impl OcclusionName {
+    fn occlusion(self) -> Occlusion {
+        match self {
+            OcclusionName::None => Occlusion::None,
+            OcclusionName::Input => Occlusion::Input,
+            OcclusionName::Geometric => Occlusion::Geometric,
+        }
+    }
 }
 
 /// The numbers of a network.
@@ -139,16 +165,15 @@ impl Hologram {
             (Method::Network, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network takes --rgb and --depth; for a layered depth image use --method layers",
+                    "--method network takes --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
-            (Method::Layers, None) => self.by_layers(
-                &single_layer(&self.frame.read()?)?,
-                &display.display,
-                response,
-            )?,
-            (Method::Layers, Some(dir)) => {
-                self.by_layers(&Ldi::read(dir)?, &display.display, response)?
+            (Method::Layers | Method::Points, source) => {
+                let ldi = match source {
+                    None => single_layer(&self.frame.read()?)?,
+                    Some(dir) => Ldi::read(dir)?,
+                };
+                self.by_physics(method, &ldi, &display.display, response)?
             }
         };
         let info = HologramInfo {
@@ -210,8 +235,10 @@ impl Hologram {
         })
     }
 
-    fn by_layers(
+    /// The methods that need no network, on a layered depth image.
+    fn by_physics(
         &self,
+        method: Method,
         ldi: &Ldi,
         display: &phasefront::Display,
         response: Response,
@@ -227,11 +254,24 @@ impl Hologram {
         )?;
         let mut scratch = modulator.scratch();
         let start = Instant::now();
-        let bar = progress_bar(0, "planes");
-        let mut field = sm_lbm::hologram(ldi, display, self.planes, &|done, total| {
+        let bar = progress_bar(0, "");
+        let progress = |done: usize, total: usize| {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
-        })?;
+        };
+        let (stage, mut field) = match method {
+            Method::Points => {
+                bar.set_message("rows");
+                let occlusion = self.occlusion.occlusion();
+                let field = point_based::hologram(ldi, display, self.planes, occlusion, &progress)?;
+                ("points", field)
+            }
+            _ => {
+                bar.set_message("planes");
+                let field = sm_lbm::hologram(ldi, display, self.planes, &progress)?;
+                ("layers", field)
+            }
+        };
         bar.finish_and_clear();
         let waved = Instant::now();
         let mut levels = Array3::zeros((3, height, width));
@@ -245,7 +285,7 @@ impl Hologram {
             levels,
             scale: modulation.scale,
             stages: vec![
-                ("layers", waved - start),
+                (stage, waved - start),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],

@@ -1,0 +1,288 @@
+//! SM-LBM with aberration correction, Eq. 5: the content of each plane goes through the silhouettes of
+//! all planes before it, back to where it started, through a correction kernel Φ of its depth in
+//! the Fourier domain, and on to z = 0.
+//!
+//! # Cost
+//! Taken literally that is a sweep for each plane, N²/2 propagations. But Φ is interpolated piecewise
+//! linearly between M calibrated distances, Φ(z) = Σ wᵢ(z)·Φᵢ, and everything else is linear in the content:
+//! so one sweep for each calibrated distance, its contents weighted by wᵢ, gives the same sum with
+//! N·M propagations at most, and N²/2 only where every plane has a kernel of its own. The way back
+//! to the start and on to z = 0 is one propagation, from the front plane to z = 0.
+//!
+//! Where kernels come from is not said here: they are taken as they are.
+
+use crate::error::{Error, Result};
+use crate::ldi::Ldi;
+use crate::sm_lbm::{Planes, plane_z_m, row_of};
+use ndarray::{Array3, ArrayView1, Axis};
+use num_complex::{Complex32, Complex64};
+use phasefront::Display;
+use phasefront::wave::asm::{self, Padding, Transfer};
+use phasefront::wave::fft::Fft2;
+use rayon::prelude::*;
+
+/// The most propagations of one colour: those of 512 planes with a kernel each.
+pub const MAX_PROPAGATIONS: usize = 512 * 512 / 2;
+
+/// Correction kernels at calibrated distances; between two they are interpolated linearly, beyond the
+/// ends the last one holds.
+pub struct Correction {
+    z_m: Vec<f64>,
+    /// For each distance (3, W', H'): transposed, as spectra are kept.
+    kernels: Vec<Array3<Complex32>>,
+}
+
+impl Correction {
+    /// Takes, for each of `z_m` (ascending, metres against z = 0, positive toward the viewer), the kernels of the
+    /// three colours, (3, H', W'): a factor for each frequency of the padded plane in the order of the
+    /// discrete Fourier transform, zero first; 1 leaves it as it is.
+    ///
+    /// The padded plane of a scene must be at least [`padded_shape`]; a kernel that moves light by more pixels
+    /// than it spreads over the volume needs as many more.
+    ///
+    /// # Errors
+    /// No distances, or ones that do not ascend; kernels of different shapes or with values that are not
+    /// finite.
+    pub fn new(z_m: Vec<f64>, kernels: Vec<Array3<Complex32>>) -> Result<Self> {
+        let refuse = |reason: String| Err(Error::Input(format!("correction: {reason}")));
+        if z_m.is_empty() || z_m.len() != kernels.len() {
+            return refuse(format!(
+                "{} distances and {} kernels; there must be one kernel a distance and at least one",
+                z_m.len(),
+                kernels.len()
+            ));
+        }
+        if !z_m.iter().all(|z| z.is_finite()) || !z_m.is_sorted_by(|a, b| a < b) {
+            return refuse(format!("distances {z_m:?} m; they must ascend"));
+        }
+        let shape = kernels[0].dim();
+        for (kernel, z) in kernels.iter().zip(&z_m) {
+            if kernel.dim() != shape || shape.0 != 3 || kernel.is_empty() {
+                return refuse(format!(
+                    "the kernel of z = {z} m has shape {:?}; all must have one shape (3, H, W)",
+                    kernel.dim()
+                ));
+            }
+            if !kernel.iter().all(|v| v.is_finite()) {
+                return refuse(format!(
+                    "the kernel of z = {z} m has values that are no numbers"
+                ));
+            }
+        }
+        let transposed = |kernel: Array3<Complex32>| {
+            let view = kernel.permuted_axes([0, 2, 1]);
+            view.as_standard_layout().into_owned()
+        };
+        Ok(Correction {
+            z_m,
+            kernels: kernels.into_iter().map(transposed).collect(),
+        })
+    }
+
+    /// The same from a function of z, wavelength and the frequencies µ and ν (cycles a metre, along x and y),
+    /// sampled for a padded plane of `shape`, (H', W').
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn sampled(
+        z_m: Vec<f64>,
+        shape: (usize, usize),
+        display: &Display,
+        kernel: impl Fn(f64, f64, f64, f64) -> Complex64,
+    ) -> Result<Self> {
+        let frequency = |k: usize, n: usize| {
+            let signed = if 2 * k < n {
+                k as f64
+            } else {
+                k as f64 - n as f64
+            };
+            signed / (n as f64 * display.pitch_m())
+        };
+        let kernels = (z_m.iter())
+            .map(|&z| {
+                Array3::from_shape_fn((3, shape.0, shape.1), |(c, ky, kx)| {
+                    let lambda = display.wavelengths_m()[c];
+                    let v = kernel(z, lambda, frequency(kx, shape.1), frequency(ky, shape.0));
+                    Complex32::new(v.re as f32, v.im as f32)
+                })
+            })
+            .collect();
+        Self::new(z_m, kernels)
+    }
+
+    /// (H', W').
+    pub fn shape(&self) -> (usize, usize) {
+        let (_, width, height) = self.kernels[0].dim();
+        (height, width)
+    }
+
+    /// How much of the kernel of distance `i` is in Φ(z).
+    fn weight(&self, i: usize, z_m: f64) -> f32 {
+        let at = |j: usize| self.z_m[j];
+        let last = self.z_m.len() - 1;
+        let weight = match z_m <= at(i) {
+            true if i == 0 => 1.0,
+            true => 1.0 - (at(i) - z_m) / (at(i) - at(i - 1)),
+            false if i == last => 1.0,
+            false => 1.0 - (z_m - at(i)) / (at(i + 1) - at(i)),
+        };
+        weight.max(0.0) as f32
+    }
+}
+
+/// The least padded plane, (H', W'), for scenes of (`height`, `width`): that of the plain SM-LBM.
+///
+/// # Errors
+/// A volume whose reach cannot be padded.
+pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(usize, usize)> {
+    let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
+    Ok(asm::padded_shape(
+        height,
+        width,
+        display.pitch_m(),
+        longest,
+        display.volume_depth_m(),
+        Padding::Reach,
+    )?)
+}
+
+/// The corrected complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
+/// the propagations done, of all.
+///
+/// Memory: five buffers of (H', W') complex numbers beside the kernels, and 20 bytes a point.
+///
+/// # Errors
+/// No planes, a padded plane too small for the scene, or more propagations than [`MAX_PROPAGATIONS`] a colour.
+pub fn hologram(
+    ldi: &Ldi,
+    display: &Display,
+    planes: usize,
+    correction: &Correction,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Array3<Complex32>> {
+    if planes == 0 {
+        return Err(Error::Input(
+            "no planes to cut the scene into; at least 1 is needed".into(),
+        ));
+    }
+    let (height, width) = ldi.shape();
+    let shape @ (padded_height, padded_width) = correction.shape();
+    let (least_height, least_width) = padded_shape(height, width, display)?;
+    if padded_height < least_height || padded_width < least_width {
+        return Err(Error::Input(format!(
+            "correction: kernels of {padded_width}×{padded_height}; a scene of {width}×{height} needs at least {least_width}×{least_height}"
+        )));
+    }
+    let scene = Planes::of(ldi, planes);
+    let z = |k: usize| plane_z_m(k, planes, display);
+    let Some(front) = scene.occupied.last().map(|(k, _)| *k) else {
+        return Ok(Array3::zeros((3, height, width)));
+    };
+    // For each distance with content: its kernel, and the planes from its first content to the front.
+    let sweeps: Vec<_> = (0..correction.z_m.len())
+        .filter_map(|i| {
+            let lit = |(k, _): &(usize, _)| correction.weight(i, z(*k)) > 0.0;
+            let first = scene.occupied.iter().position(lit)?;
+            Some((i, &scene.occupied[first..]))
+        })
+        .collect();
+    let propagations: usize = sweeps.iter().map(|(_, swept)| swept.len()).sum();
+    if propagations > MAX_PROPAGATIONS {
+        return Err(Error::Input(format!(
+            "{propagations} propagations a colour for {planes} planes and {} calibrated distances; at most {MAX_PROPAGATIONS} are done: fewer of either are needed",
+            correction.z_m.len()
+        )));
+    }
+    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let mut scratch = fft.scratch();
+    let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
+    let mut sum = vec![Complex32::ZERO; padded_height * padded_width];
+    let mut hologram = Array3::zeros((3, height, width));
+    let step_m = display.volume_depth_m() / planes as f64;
+    let mut done = 0;
+    for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
+        let transfer = |distance_m| {
+            Transfer::new(
+                shape,
+                display.pitch_m(),
+                wavelength_m,
+                distance_m,
+                |_, _| true,
+            )
+        };
+        let neighbour = transfer(step_m);
+        let home = transfer(-z(front));
+        sum.fill(Complex32::ZERO);
+        for (i, swept) in &sweeps {
+            let content = |k: usize, rgb: &[f32; 3]| {
+                Complex32::from(correction.weight(*i, z(k)) * rgb[colour])
+            };
+            let (back, points) = &swept[0];
+            plane.fill(Complex32::ZERO);
+            for point in points {
+                plane[point.y as usize * padded_width + point.x as usize] =
+                    content(*back, &point.rgb);
+            }
+            fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+            let mut at = *back;
+            for (k, points) in &swept[1..] {
+                let across;
+                let transfer = match at - k {
+                    1 => &neighbour,
+                    steps => {
+                        across = transfer(steps as f64 * step_m);
+                        &across
+                    }
+                };
+                fft.columns(
+                    &scratch.rows,
+                    &mut scratch.columns,
+                    |x, column| transfer.apply(x, column),
+                    &mut scratch.work,
+                );
+                // The silhouette takes what comes from behind; the plane's content is weighted, none included.
+                fft.rows_there_and_back(
+                    &scratch.columns,
+                    &mut scratch.rows,
+                    &mut scratch.work,
+                    |y| !row_of(points, y).is_empty(),
+                    |y, row| {
+                        for point in row_of(points, y) {
+                            row[point.x as usize] = content(*k, &point.rgb);
+                        }
+                    },
+                );
+                at = *k;
+                done += 1;
+                progress(done, 3 * propagations);
+            }
+            // To the start of each content and on to z = 0 is −z of the front plane for all; Φ on the way.
+            fft.spectrum(
+                &scratch.rows,
+                &mut scratch.columns,
+                |x, column, _| home.apply(x, column),
+                &mut scratch.work,
+            );
+            let kernel = correction.kernels[*i].index_axis(Axis(0), colour);
+            let kernel = kernel.to_slice().expect("standard layout");
+            (sum.par_chunks_exact_mut(padded_height))
+                .zip(scratch.columns.par_chunks_exact(padded_height))
+                .zip(kernel.par_chunks_exact(padded_height))
+                .for_each(|((sum, column), kernel)| {
+                    for ((sum, value), factor) in sum.iter_mut().zip(column).zip(kernel) {
+                        *sum += value * factor;
+                    }
+                });
+            done += 1;
+            progress(done, 3 * propagations);
+        }
+        fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
+        fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work, |_, _| {});
+        let rows = scratch.rows.chunks_exact(padded_width);
+        let mut out = hologram.index_axis_mut(Axis(0), colour);
+        for (mut out, row) in out.rows_mut().into_iter().zip(rows) {
+            out.assign(&ArrayView1::from(&row[..width]));
+        }
+    }
+    Ok(hologram)
+}
