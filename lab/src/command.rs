@@ -3,10 +3,12 @@
 
 mod compare;
 mod dataset;
+mod evaluate;
 mod flags;
 mod hologram;
 mod refocus;
 mod scene;
+mod study;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
@@ -32,6 +34,8 @@ enum Command {
     Compare(compare::Compare),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
+    Evaluate(evaluate::Evaluate),
+    Study(study::Study),
 }
 
 impl Phasefront {
@@ -50,6 +54,8 @@ impl Phasefront {
             Command::Compare(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
+            Command::Evaluate(command) => command.run(json),
+            Command::Study(command) => command.run(json),
         })
     }
 }

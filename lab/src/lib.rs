@@ -2,13 +2,16 @@
 
 pub mod dataset;
 pub mod error;
+pub mod evaluate;
 pub mod files;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
+pub mod plot;
 pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;
 pub mod sm_lbm;
+pub mod study;
 
 pub use error::{Error, Result};
