@@ -4,11 +4,13 @@
 mod bench;
 mod compare;
 mod dataset;
+mod evaluate;
 mod flags;
 mod hologram;
 mod occlusion;
 mod refocus;
 mod scene;
+mod study;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
@@ -36,6 +38,8 @@ enum Command {
     Dataset(dataset::Dataset),
     Bench(bench::Bench),
     Occlusion(occlusion::Occlusion),
+    Evaluate(evaluate::Evaluate),
+    Study(study::Study),
 }
 
 impl Phasefront {
@@ -56,6 +60,8 @@ impl Phasefront {
             Command::Dataset(command) => command.run(json),
             Command::Bench(command) => command.run(self.threads.map(usize::from), json),
             Command::Occlusion(command) => command.run(json),
+            Command::Evaluate(command) => command.run(json),
+            Command::Study(command) => command.run(json),
         })
     }
 }

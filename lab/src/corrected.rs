@@ -219,13 +219,14 @@ pub fn hologram(
             };
             let (back, points) = &swept[0];
             plane.fill(Complex32::ZERO);
-            for point in points {
+            for point in &scene.points[points.clone()] {
                 plane[point.y as usize * padded_width + point.x as usize] =
                     content(*back, &point.rgb);
             }
             fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
             let mut at = *back;
             for (k, points) in &swept[1..] {
+                let points = &scene.points[points.clone()];
                 let across;
                 let transfer = match at - k {
                     1 => &neighbour,

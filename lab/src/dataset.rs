@@ -11,14 +11,16 @@
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::ldi::Ldi;
+use crate::ldi::{Ldi, LdiLayer};
 use crate::{scene, sm_lbm};
-use ndarray::{Array3, Array4};
-use ndarray_npy::NpzWriter;
+use ndarray::{Array2, Array3, Array4};
+use ndarray_npy::{NpzReader, NpzWriter};
 use num_complex::Complex32;
 use phasefront::Display;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
+use std::io::BufReader;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -204,5 +206,58 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
             .and_then(|()| npz.add_array("hologram", hologram))
             .and_then(|()| npz.finish().map(drop))
             .map_err(std::io::Error::other)
+    })
+}
+
+/// One pair: a scene and its hologram.
+pub struct Pair {
+    /// The scene.
+    pub ldi: Ldi,
+    /// Its complex midpoint hologram, (3, H, W), carrier left out.
+    pub hologram: Array3<Complex32>,
+}
+
+/// Reads pair `index` of the data set in `dir`, which `manifest` describes.
+///
+/// # Errors
+/// A pair that is not there, damaged, or of another shape than the manifest says.
+pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> {
+    let path = Manifest::pair_path(dir, index);
+    let file = File::open(&path).map_err(|e| {
+        Error::file(
+            &path,
+            format!("{e}; `phasefront dataset` into the same folder completes the data set"),
+        )
+    })?;
+    let damaged = |e: &dyn std::fmt::Display| Error::file(&path, format!("is no whole pair: {e}"));
+    let mut npz = NpzReader::new(BufReader::new(file)).map_err(|e| damaged(&e))?;
+    let rgb: Array4<u8> = npz.by_name("rgb").map_err(|e| damaged(&e))?;
+    let depth: Array3<u16> = npz.by_name("depth").map_err(|e| damaged(&e))?;
+    let hologram: Array3<Complex32> = npz.by_name("hologram").map_err(|e| damaged(&e))?;
+    let (layers, size) = (manifest.ldi_layers, manifest.size);
+    if rgb.dim() != (layers, size, size, 4)
+        || depth.dim() != (layers, size, size)
+        || hologram.dim() != (3, size, size)
+    {
+        return Err(damaged(&format!(
+            "shapes {:?}, {:?} and {:?} are not those of {layers} layers of {size}×{size} pixels",
+            rgb.dim(),
+            depth.dim(),
+            hologram.dim()
+        )));
+    }
+    let layers = (0..layers).map(|l| LdiLayer {
+        rgb: Array3::from_shape_fn((3, size, size), |(c, y, x)| {
+            f32::from(rgb[(l, y, x, c)]) / 255.0
+        }),
+        depth: Array2::from_shape_fn((size, size), |(y, x)| match rgb[(l, y, x, 3)] {
+            0 => f32::NAN,
+            _ => f32::from(depth[(l, y, x)]) / 65535.0,
+        }),
+    });
+    let ldi = Ldi::new(layers.collect()).map_err(|e| damaged(&e))?;
+    Ok(Pair {
+        ldi,
+        hologram: hologram.as_standard_layout().into_owned(),
     })
 }

@@ -4,15 +4,18 @@ pub mod bench;
 pub mod corrected;
 pub mod dataset;
 pub mod error;
+pub mod evaluate;
 pub mod files;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
 pub mod occlusion;
 pub mod point_based;
+pub mod plot;
 pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;
 pub mod sm_lbm;
+pub mod study;
 
 pub use error::{Error, Result};

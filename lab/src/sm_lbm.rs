@@ -20,6 +20,7 @@ use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::wave::asm::{self, Padding, Transfer};
 use phasefront::wave::fft::Fft2;
+use std::ops::Range;
 
 /// One point of a scene, on its plane.
 #[derive(Clone, Copy)]
@@ -31,8 +32,11 @@ pub(crate) struct Point {
 
 /// A scene cut into planes.
 pub(crate) struct Planes {
-    /// For each plane that holds points: its index k, back first, and its points, by rows.
-    pub(crate) occupied: Vec<(usize, Vec<Point>)>,
+    /// All points: those of a plane together, by rows, and of two hits in one place the front one
+    /// last, so that it wins.
+    pub(crate) points: Vec<Point>,
+    /// The planes that hold points, back first: the index k, and where its points lie.
+    pub(crate) occupied: Vec<(usize, Range<usize>)>,
 }
 
 /// The plane of a point of depth `d` among `planes`.
@@ -46,35 +50,48 @@ pub fn plane_z_m(k: usize, planes: usize, display: &Display) -> f64 {
 }
 
 impl Planes {
+    /// By counting, so that no point is held twice.
     pub(crate) fn of(ldi: &Ldi, planes: usize) -> Self {
-        let mut points: Vec<(usize, usize, Point)> = Vec::new();
-        for (layer, content) in ldi.layers.iter().enumerate() {
-            for ((y, x), &d) in content.depth.indexed_iter() {
-                if !d.is_nan() {
-                    let point = Point {
-                        y: y as u32,
-                        x: x as u32,
-                        rgb: std::array::from_fn(|c| content.rgb[(c, y, x)]),
-                    };
-                    points.push((plane_of_depth(d, planes), layer, point));
+        let mut next = vec![0; planes];
+        for d in ldi.layers.iter().flat_map(|layer| &layer.depth) {
+            if !d.is_nan() {
+                next[plane_of_depth(*d, planes)] += 1;
+            }
+        }
+        let mut occupied = Vec::new();
+        let mut total = 0;
+        for (k, next) in next.iter_mut().enumerate() {
+            let count = std::mem::replace(next, total);
+            if count > 0 {
+                occupied.push((k, total..total + count));
+            }
+            total += count;
+        }
+        occupied.reverse();
+        let nowhere = Point {
+            y: 0,
+            x: 0,
+            rgb: [0.0; 3],
+        };
+        let mut points = vec![nowhere; total];
+        let (height, width) = ldi.shape();
+        for y in 0..height {
+            for layer in ldi.layers.iter().rev() {
+                for x in 0..width {
+                    let d = layer.depth[(y, x)];
+                    if !d.is_nan() {
+                        let place = &mut next[plane_of_depth(d, planes)];
+                        points[*place] = Point {
+                            y: y as u32,
+                            x: x as u32,
+                            rgb: std::array::from_fn(|c| layer.rgb[(c, y, x)]),
+                        };
+                        *place += 1;
+                    }
                 }
             }
         }
-        // Back planes first; within a plane by rows, and of two hits in one place the front one last, so that it wins.
-        points.sort_unstable_by_key(|(plane, layer, point)| {
-            use std::cmp::Reverse;
-            (Reverse(*plane), point.y, point.x, Reverse(*layer))
-        });
-        let occupied = points
-            .chunk_by(|a, b| a.0 == b.0)
-            .map(|group| {
-                (
-                    group[0].0,
-                    group.iter().map(|(_, _, point)| *point).collect(),
-                )
-            })
-            .collect();
-        Planes { occupied }
+        Planes { points, occupied }
     }
 }
 
@@ -88,7 +105,8 @@ pub(crate) fn row_of(points: &[Point], y: usize) -> &[Point] {
 /// The complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
 /// the planes done, of all those that hold points in three colours.
 ///
-/// Memory: two buffers of (H', W') complex numbers and 20 bytes a point.
+/// Memory: two buffers of (H', W') complex numbers, 20 bytes a point, 8 bytes a plane, and the
+/// transfer functions, a quarter of a buffer each: one for neighbours, one for a wider gap.
 ///
 /// # Errors
 /// No planes, or a volume whose reach cannot be padded.
@@ -132,17 +150,20 @@ pub fn hologram(
             )
         };
         let neighbour = transfer(step_m);
-        let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
         let Some((back, points)) = scene.occupied.first() else {
             break;
         };
-        for point in points {
+        // The columns are not in use yet: their buffer holds the farthest plane.
+        let plane = &mut scratch.columns;
+        plane.fill(Complex32::ZERO);
+        for point in &scene.points[points.clone()] {
             plane[point.y as usize * padded_width + point.x as usize] = point.rgb[colour].into();
         }
-        fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+        fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         let mut at = *back;
         let done = colour * scene.occupied.len();
         for (i, (k, points)) in scene.occupied.iter().enumerate().skip(1) {
+            let points = &scene.points[points.clone()];
             let across;
             let transfer = match at - k {
                 1 => &neighbour,

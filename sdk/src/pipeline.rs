@@ -181,8 +181,11 @@ impl Pipeline {
     }
 }
 
-/// A network gives wrong depths on a display that it was not trained for.
-fn check_display(network: &Network, display: &Display) -> Result<()> {
+/// Checks that `network` was trained for a display like `display`: on another it gives wrong depths.
+///
+/// # Errors
+/// A pitch, wavelength or volume that differs by over 2 %.
+pub fn check_display(network: &Network, display: &Display) -> Result<()> {
     let trained = network.display();
     let pairs = [
         ("pitch", "µm", 1e6, trained.pitch_m, display.pitch_m()),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -29,6 +29,14 @@ def parser():
     p.add_argument("-o", "--output", required=True, help="folder of the data set")
     p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --scenes 1000 --size 384 --planes 200")
+
+    p = add("shards", run_shards, "Make a data set on many machines, as Ray tasks; what follows -- goes to `phasefront dataset`.")
+    p.add_argument("-o", "--output", required=True, help="folder of the data set, the same one on all machines")
+    p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command, on all machines (default: phasefront on the PATH)")
+    p.add_argument("--address", help="of the Ray cluster, or auto (default: a cluster of this machine's cores is started)")
+    p.add_argument("--cpus", type=int, default=1, help="cores and threads of a task (default 1)")
+    p.add_argument("--shards", type=int, help="tasks (default: four for each that runs at a time)")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --scenes 4000 --size 384 --planes 1000")
 
     p = add("stage1", run_stage1, "Train a hologram network on scenes and their holograms.")
     training_flags(p)
@@ -112,8 +120,17 @@ def resume_flag(p):
 
 
 def run_data(args):
-    arguments = args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
-    data.make(args.output, arguments, args.phasefront)
+    data.make(args.output, passed_on(args), args.phasefront)
+
+
+def run_shards(args):
+    made = shards.make(args.output, passed_on(args), args.phasefront, args.address, args.shards, args.cpus)
+    print(f"{args.output}: {made} shards", file=sys.stderr)
+
+
+def passed_on(args):
+    """What stands behind --, for `phasefront dataset`."""
+    return args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
 
 
 def run_stage1(args):

@@ -101,7 +101,7 @@ impl PrecisionName {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum EncoderName {
+pub(super) enum EncoderName {
     /// Double phase
     Double,
     /// Double phase after a small blur (AA-DPM)
@@ -111,7 +111,7 @@ enum EncoderName {
 }
 
 impl EncoderName {
-    fn encoding(self) -> Encoding {
+    pub(super) fn encoding(self) -> Encoding {
         match self {
             EncoderName::Double => Encoding::DoublePhase,
             EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
@@ -119,7 +119,7 @@ impl EncoderName {
         }
     }
 
-    fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             EncoderName::Double => "double",
             EncoderName::AntiAlias => "anti-alias",

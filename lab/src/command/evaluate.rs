@@ -1,0 +1,194 @@
+//! `phasefront evaluate`: the paper's Table 2 on a data set.
+
+use super::flags::progress_bar;
+use super::hologram::{EncoderName, PrecisionName};
+use clap::{Args, ValueEnum};
+use phasefront_lab::dataset::Manifest;
+use phasefront_lab::evaluate::{self, Method, Row, Shown};
+use phasefront_lab::{Error, Result, models};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Judge methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks
+///
+/// A focal stack is a scene's 15 most frequent depths and 5 random ones.
+#[derive(Args)]
+pub(crate) struct Evaluate {
+    /// Folder of the data set, as `phasefront dataset` makes it
+    data: PathBuf,
+    /// Methods to judge, separated by commas
+    #[arg(
+        long,
+        value_enum,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        required_unless_present = "network"
+    )]
+    method: Vec<MethodName>,
+    /// Networks to judge, separated by commas: one that comes along (8), or an ONNX file
+    #[arg(long, value_name = "8|FILE,…", value_delimiter = ',')]
+    network: Vec<String>,
+    /// Numbers that networks which come along compute in
+    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
+    precision: PrecisionName,
+    /// Encoders to judge as well, separated by commas; the complex field always is
+    #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
+    encoder: Vec<EncoderName>,
+    /// Which pairs
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// Only the first so many of them
+    #[arg(long, value_name = "N")]
+    scenes: Option<usize>,
+    /// Planes of SM-LBM [default: the data set's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    planes: Option<u32>,
+    /// Chooses the random depths of the focal stacks
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
+    seed: u64,
+    /// Folder for pictures of the worst scenes: input, ours, truth, 4 times the difference
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Pictures a row
+    #[arg(long, value_name = "N", default_value_t = 3, requires = "pictures")]
+    worst: usize,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum MethodName {
+    /// The visible image as the field, phase 0
+    Rgb,
+    /// SM-LBM of what is visible
+    Visible,
+    /// SM-LBM of all layers
+    Layers,
+    /// A sub-hologram for each visible point (Maimone et al.)
+    Points,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Split {
+    Train,
+    Validation,
+    Test,
+}
+
+impl Evaluate {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let manifest = Manifest::read(&self.data)?;
+        let (split, [start, end]) = match self.split {
+            Split::Train => ("train", manifest.splits.train),
+            Split::Validation => ("validation", manifest.splits.validation),
+            Split::Test => ("test", manifest.splits.test),
+        };
+        let scenes: Vec<usize> = (start..end)
+            .take(self.scenes.unwrap_or(usize::MAX))
+            .collect();
+        let methods = self.methods(&manifest)?;
+        let mut shown = vec![Shown::complex()];
+        shown.extend(self.encoder.iter().map(|encoder| Shown {
+            name: encoder.name().into(),
+            encoding: Some(encoder.encoding()),
+        }));
+        if let Some(dir) = &self.pictures {
+            std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
+        }
+        let bar = progress_bar(scenes.len() as u64, "scenes");
+        let rows = evaluate::evaluate(
+            &manifest,
+            &self.data,
+            &scenes,
+            &methods,
+            &shown,
+            self.seed,
+            &|| bar.inc(1),
+        )?;
+        bar.finish_and_clear();
+        if let Some(dir) = &self.pictures {
+            for (way, row) in rows.iter().enumerate() {
+                let (method, shown) = (&methods[way / shown.len()], &shown[way % shown.len()]);
+                for (rank, index) in row.worst(self.worst).into_iter().enumerate() {
+                    let name = format!(
+                        "{}-{}-worst-{}-scene-{index:06}.png",
+                        file_stem(&row.method),
+                        row.shown,
+                        rank + 1
+                    );
+                    evaluate::write_picture(
+                        &dir.join(name),
+                        &manifest,
+                        &self.data,
+                        index,
+                        method,
+                        shown,
+                    )?;
+                }
+            }
+        }
+        let value = json!({
+            "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
+            "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
+            "focal_stack": {
+                "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
+            },
+            "rows": rows,
+        });
+        super::print(json, &value, table(&rows, scenes.len(), split));
+        Ok(())
+    }
+
+    fn methods<'a>(&self, manifest: &'a Manifest) -> Result<Vec<Method<'a>>> {
+        let planes = self.planes.map_or(manifest.planes, |n| n as usize);
+        let mut methods: Vec<_> = (self.method.iter())
+            .map(|name| match name {
+                MethodName::Rgb => Method::rgb(),
+                MethodName::Visible => Method::visible(&manifest.display, planes),
+                MethodName::Layers => Method::layers(&manifest.display, planes),
+                MethodName::Points => Method::points(&manifest.display, planes),
+            })
+            .collect();
+        for name in &self.network {
+            let network = models::network(name, self.precision.is_int8())?;
+            let label = format!("network {}", file_stem(name));
+            let method = Method::network(label, &network, manifest.size, &manifest.display);
+            methods.push(method.map_err(|e| Error::file(name, e))?);
+        }
+        Ok(methods)
+    }
+}
+
+/// A name that a file may have: of a path its last part without the extension, no blanks.
+fn file_stem(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default();
+    stem.to_string_lossy().replace(' ', "-")
+}
+
+fn table(rows: &[Row], scenes: usize, split: &str) -> String {
+    let width = (rows.iter())
+        .map(|row| row.method.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(6);
+    let mut text = format!(
+        "{:width$}  {:10}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "method", "shown"
+    );
+    for row in rows {
+        let worst = row.worst(1)[0];
+        let least = row
+            .scenes
+            .iter()
+            .map(|(_, f)| f.amplitude_psnr)
+            .fold(f64::INFINITY, f64::min);
+        text += &format!(
+            "\n{:width$}  {:10}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {least:13.2} ({worst})",
+            row.method,
+            row.shown,
+            row.mean.amplitude_psnr,
+            row.mean.amplitude_ssim,
+            row.mean.focal_psnr,
+            row.mean.focal_ssim,
+        );
+    }
+    text
+}

@@ -1,0 +1,404 @@
+//! How good holograms are on a data set: the paper's Table 2. Amplitude PSNR and SSIM of the midpoint
+//! hologram, and their means over a focal stack of each scene's 15 most frequent depths and 5
+//! random ones; for any way to make a field ([`Method`]), as it is or encoded.
+//!
+//! An encoded field is judged as an eye sees it: through modulator levels and the Fourier aperture.
+//! The truth is always the data set's complex field. Pairs are valid to their border, so the whole
+//! frame counts.
+
+use crate::dataset::{self, Manifest};
+use crate::error::Result;
+use crate::files;
+use crate::ldi::Ldi;
+use crate::metrics;
+use crate::point_based::{self, Occlusion};
+use crate::reconstruct::APERTURE_RADIUS;
+use crate::scene::dice::Dice;
+use crate::sm_lbm;
+use ndarray::{Array2, Array3, Axis, concatenate};
+use num_complex::Complex32;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::modulator::{Modulator, remove_mean_phase};
+use phasefront::network::InputKind;
+use phasefront::pipeline::check_display;
+use phasefront::refocus::{Refocus, phase_only_field};
+use phasefront::slm::Response;
+use phasefront::{Display, Network};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::cmp::Reverse;
+use std::path::Path;
+
+/// Bins of a scene's depth histogram.
+pub const DEPTH_BINS: usize = 200;
+/// Depths of a focal stack that are a scene's most frequent.
+pub const FREQUENT_DEPTHS: usize = 15;
+/// Depths of a focal stack that are random, of the other bins.
+pub const RANDOM_DEPTHS: usize = 5;
+/// What differences are multiplied by in [`write_picture`].
+pub const DIFFERENCE_GAIN: f32 = 4.0;
+
+type MakeField<'a> = dyn Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a;
+
+/// A way from a scene to its complex midpoint hologram.
+pub struct Method<'a> {
+    /// What it is called in tables and file names.
+    pub name: String,
+    field: Box<MakeField<'a>>,
+}
+
+impl<'a> Method<'a> {
+    /// Any function from a scene to its midpoint hologram, (3, H, W), carrier left out.
+    pub fn new(
+        name: impl Into<String>,
+        field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a,
+    ) -> Self {
+        Method {
+            name: name.into(),
+            field: Box::new(field),
+        }
+    }
+
+    /// The visible image itself as the field, with phase 0: what doing nothing is worth.
+    pub fn rgb() -> Self {
+        Self::new("rgb", |ldi| Ok(visible_rgb(ldi).mapv(Complex32::from)))
+    }
+
+    /// SM-LBM with `planes` planes on what is visible, an RGB-D image's worth.
+    pub fn visible(display: &'a Display, planes: usize) -> Self {
+        Self::new("visible", move |ldi| {
+            let front = Ldi::new(vec![ldi.layers[0].clone()])?;
+            sm_lbm::hologram(&front, display, planes, &|_, _| {})
+        })
+    }
+
+    /// The point-based method at `planes` depths on what is visible, the paper's first row of Table 2.
+    pub fn points(display: &'a Display, planes: usize) -> Self {
+        Self::new("points", move |ldi| {
+            point_based::hologram(ldi, display, planes, Occlusion::Input, &|_, _| {})
+        })
+    }
+
+    /// SM-LBM with `planes` planes on all layers.
+    pub fn layers(display: &'a Display, planes: usize) -> Self {
+        Self::new("layers", move |ldi| {
+            sm_lbm::hologram(ldi, display, planes, &|_, _| {})
+        })
+    }
+
+    /// A network on scenes of `size`×`size` pixels, of RGB-D or as many layers as it takes.
+    ///
+    /// # Errors
+    /// A pre-filter, or a network for another display.
+    pub fn network(
+        name: impl Into<String>,
+        network: &Network,
+        size: usize,
+        display: &Display,
+    ) -> Result<Self> {
+        let layers = match network.input() {
+            InputKind::Rgbd => 1,
+            InputKind::Ldi { layers } => layers,
+            other => {
+                return Err(phasefront::Error::Network(format!(
+                    "it takes '{other}'; a network for 'rgbd' or layered depth images is needed"
+                ))
+                .into());
+            }
+        };
+        check_display(network, display)?;
+        let plan = network.plan(size, size)?;
+        let head = network.head();
+        Ok(Self::new(name, move |ldi| {
+            let input = network_input(ldi, layers);
+            let mut output = vec![0.0; plan.channels().1 * size * size];
+            plan.run(&input, &mut output, &mut plan.scratch())?;
+            let mut field = Array3::zeros((3, size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            head.field(&output, &input, values)?;
+            remove_mean_phase(values);
+            Ok(field)
+        }))
+    }
+}
+
+/// The front layer's amplitudes, black where nothing is.
+fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
+    let front = &ldi.layers[0];
+    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| {
+        match front.depth[(y, x)].is_nan() {
+            true => 0.0,
+            false => front.rgb[(c, y, x)],
+        }
+    })
+}
+
+/// A network's input of `layers` layers, (4·layers, H, W): colour and depth of each, minus ½; black and farthest
+/// where there is no hit.
+fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
+    let (height, width) = ldi.shape();
+    let mut input = Vec::with_capacity(4 * layers * height * width);
+    for layer in 0..layers {
+        for channel in 0..4 {
+            for y in 0..height {
+                for x in 0..width {
+                    let layer = ldi.layers.get(layer).filter(|l| !l.depth[(y, x)].is_nan());
+                    input.push(match (layer, channel) {
+                        (Some(layer), 3) => layer.depth[(y, x)] - 0.5,
+                        (Some(layer), c) => layer.rgb[(c, y, x)] - 0.5,
+                        (None, 3) => 0.5,
+                        (None, _) => -0.5,
+                    });
+                }
+            }
+        }
+    }
+    input
+}
+
+/// How a field is shown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Shown {
+    /// What it is called in tables and file names.
+    pub name: String,
+    /// How it becomes phases; `None`: it is shown as the complex field it is.
+    pub encoding: Option<Encoding>,
+}
+
+impl Shown {
+    /// The complex field itself.
+    pub fn complex() -> Self {
+        Shown {
+            name: "complex".into(),
+            encoding: None,
+        }
+    }
+}
+
+/// How close one scene's hologram comes to the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// Of the midpoint's amplitude, dB; infinite where it is the truth.
+    pub amplitude_psnr: f64,
+    /// Of the midpoint's amplitude.
+    pub amplitude_ssim: f64,
+    /// Mean over the focal stack, dB.
+    pub focal_psnr: f64,
+    /// Mean over the focal stack.
+    pub focal_ssim: f64,
+}
+
+/// One way on all scenes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the [`Method`].
+    pub method: String,
+    /// Name of the [`Shown`].
+    pub shown: String,
+    /// Means over the scenes.
+    pub mean: Figures,
+    /// Each scene: its index in the data set, and its figures.
+    pub scenes: Vec<(usize, Figures)>,
+}
+
+impl Row {
+    /// Indices of the `count` scenes of the least amplitude PSNR, worst first.
+    pub fn worst(&self, count: usize) -> Vec<usize> {
+        let mut scenes = self.scenes.clone();
+        scenes.sort_by(|(_, a), (_, b)| a.amplitude_psnr.total_cmp(&b.amplitude_psnr));
+        scenes.iter().take(count).map(|(index, _)| *index).collect()
+    }
+}
+
+/// The normalized depths of a scene's focal stack: the middles of the fullest bins of the histogram of its visible
+/// depths, then of random others. The same `seed` gives the same.
+pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
+    let mut counts = [0usize; DEPTH_BINS];
+    for d in depth.iter().filter(|d| !d.is_nan()) {
+        counts[((d * DEPTH_BINS as f32) as usize).min(DEPTH_BINS - 1)] += 1;
+    }
+    let mut bins: Vec<usize> = (0..DEPTH_BINS).collect();
+    bins.sort_by_key(|bin| Reverse(counts[*bin]));
+    let mut dice = Dice::new(seed);
+    for i in FREQUENT_DEPTHS..FREQUENT_DEPTHS + RANDOM_DEPTHS {
+        bins.swap(i, dice.integer(i, DEPTH_BINS - 1));
+    }
+    bins.truncate(FREQUENT_DEPTHS + RANDOM_DEPTHS);
+    bins.iter()
+        .map(|bin| (*bin as f64 + 0.5) / DEPTH_BINS as f64)
+        .collect()
+}
+
+/// What looks at holograms of one data set: plans for its shape and display.
+pub struct Viewer {
+    display: Display,
+    size: usize,
+    complex: Refocus,
+    apertured: Refocus,
+}
+
+impl Viewer {
+    /// Plans views from anywhere in the volume.
+    ///
+    /// # Errors
+    /// A volume that cannot be propagated through.
+    pub fn new(manifest: &Manifest) -> Result<Self> {
+        let display = manifest.display.clone();
+        let ends = [0.5, -0.5].map(|part| part * display.volume_depth_m());
+        let plan = |aperture| Refocus::new(manifest.size, manifest.size, &display, &ends, aperture);
+        Ok(Viewer {
+            complex: plan(None)?,
+            apertured: plan(Some(APERTURE_RADIUS))?,
+            size: manifest.size,
+            display,
+        })
+    }
+
+    /// The amplitudes of `field`, (3, H, W), at each of `z_m`, metres, where it is shown by `shown`.
+    ///
+    /// # Errors
+    /// A z outside of the volume, or an encoding that cannot be planned.
+    pub fn views(
+        &self,
+        field: &Array3<Complex32>,
+        shown: &Shown,
+        z_m: &[f64],
+    ) -> Result<Vec<Array3<f32>>> {
+        let size = self.size;
+        let mut values = field.iter().copied().collect::<Vec<_>>();
+        let refocus = match shown.encoding {
+            None => &self.complex,
+            Some(encoding) => {
+                let response = Response::linear(self.display.bits())?;
+                let modulator = Modulator::new(
+                    size,
+                    size,
+                    &self.display,
+                    encoding,
+                    Scale::Max,
+                    response.clone(),
+                )?;
+                let mut levels = vec![0; values.len()];
+                let modulation =
+                    modulator.modulate(&mut values, &mut levels, &mut modulator.scratch());
+                phase_only_field(&levels, &response, modulation.scale, &mut values);
+                &self.apertured
+            }
+        };
+        let views = refocus.focal_stack(&values, z_m)?;
+        Ok((views.into_iter())
+            .map(|view| Array3::from_shape_vec((3, size, size), view).expect("the field's shape"))
+            .collect())
+    }
+}
+
+/// Judges each of `methods` in each of the ways `shown` on the pairs `scenes` of the data set in `dir`: rows in
+/// that order, the ways of a method together. `seed` chooses the random depths. `done` hears of each
+/// scene.
+///
+/// # Errors
+/// No scenes, a pair that cannot be read, or what a method refuses.
+pub fn evaluate(
+    manifest: &Manifest,
+    dir: &Path,
+    scenes: &[usize],
+    methods: &[Method<'_>],
+    shown: &[Shown],
+    seed: u64,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Row>> {
+    if scenes.is_empty() {
+        return Err(crate::Error::file(
+            dir,
+            "no scenes to evaluate on in this split; the data set needs at least 40 for one",
+        ));
+    }
+    let viewer = Viewer::new(manifest)?;
+    let of_scenes = scenes
+        .par_iter()
+        .map(|&index| {
+            let pair = dataset::read_pair(manifest, dir, index)?;
+            let depths = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
+            let mut z_m = vec![0.0];
+            z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
+            let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?;
+            let mut figures = Vec::with_capacity(methods.len() * shown.len());
+            for method in methods {
+                let field = (method.field)(&pair.ldi)?;
+                for shown in shown {
+                    figures.push(judge(&viewer.views(&field, shown, &z_m)?, &truth)?);
+                }
+            }
+            done();
+            Ok(figures)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let ways = methods
+        .iter()
+        .flat_map(|m| shown.iter().map(move |s| (m, s)));
+    Ok(ways
+        .enumerate()
+        .map(|(way, (method, shown))| {
+            let each = || of_scenes.iter().map(|figures| figures[way]);
+            let mean =
+                |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
+            Row {
+                method: method.name.clone(),
+                shown: shown.name.clone(),
+                mean: Figures {
+                    amplitude_psnr: mean(|f| f.amplitude_psnr),
+                    amplitude_ssim: mean(|f| f.amplitude_ssim),
+                    focal_psnr: mean(|f| f.focal_psnr),
+                    focal_ssim: mean(|f| f.focal_ssim),
+                },
+                scenes: scenes.iter().copied().zip(each()).collect(),
+            }
+        })
+        .collect())
+}
+
+/// The midpoint view comes first, the focal stack after it.
+fn judge(views: &[Array3<f32>], truth: &[Array3<f32>]) -> Result<Figures> {
+    let each = (views.iter().zip(truth))
+        .map(|(view, truth)| metrics::compare(view.view(), truth.view()))
+        .collect::<Result<Vec<_>>>()?;
+    let (midpoint, stack) = (&each[0], &each[1..]);
+    let mean = |figure: fn(&metrics::Comparison) -> f64| {
+        stack.iter().map(figure).sum::<f64>() / stack.len() as f64
+    };
+    Ok(Figures {
+        amplitude_psnr: midpoint.psnr_overall,
+        amplitude_ssim: midpoint.ssim_overall,
+        focal_psnr: mean(|c| c.psnr_overall),
+        focal_ssim: mean(|c| c.ssim_overall),
+    })
+}
+
+/// Writes a PNG of pair `index` by `method` as `shown`, side by side: the visible image, the midpoint's amplitude,
+/// the true one, and [`DIFFERENCE_GAIN`] times their difference.
+///
+/// # Errors
+/// A pair that cannot be read, what the method refuses, or a file that cannot be written.
+pub fn write_picture(
+    path: &Path,
+    manifest: &Manifest,
+    dir: &Path,
+    index: usize,
+    method: &Method<'_>,
+    shown: &Shown,
+) -> Result<()> {
+    let viewer = Viewer::new(manifest)?;
+    let pair = dataset::read_pair(manifest, dir, index)?;
+    let ours = viewer
+        .views(&(method.field)(&pair.ldi)?, shown, &[0.0])?
+        .remove(0);
+    let truth = viewer
+        .views(&pair.hologram, &Shown::complex(), &[0.0])?
+        .remove(0);
+    let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
+    let gap = Array3::from_elem((3, manifest.size, 4), 1.0);
+    let input = visible_rgb(&pair.ldi);
+    let panels = [&input, &gap, &ours, &gap, &truth, &gap, &difference].map(|panel| panel.view());
+    let strip = concatenate(Axis(2), &panels).expect("panels of one height");
+    files::write_amplitude(path, strip.view())
+}

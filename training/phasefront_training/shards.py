@@ -1,0 +1,74 @@
+"""A data set made by many processes or machines: each shard of `phasefront dataset` is a Ray task.
+
+All tasks write into one folder, which every machine must see under the same path, as it must the command. A pair
+is renamed into its place when it is whole, so shards neither wait for nor disturb each other, and a stopped run goes
+on when it is started again, with any number of shards. Ray is an extra: `pip install './training[ray]'`.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tqdm import tqdm
+
+from .data import DataError
+
+SHARDS_PER_SLOT = 4  # scenes differ in cost: small shards leave no machine idle at the end
+RETRIES = 2  # of a shard whose machine was lost
+
+
+def make(output, arguments, command="phasefront", address=None, shards=None, cpus=1):
+    """Makes the data set in `output`, `shards` tasks of `cpus` cores; returns how many shards there were.
+
+    `address` is the Ray cluster's; None starts one on this machine for the time of the call. Raises DataError where
+    Ray is not installed or a shard fails.
+    """
+    try:
+        import ray
+    except ImportError:
+        raise DataError("Ray is not installed: pip install './training[ray]', or make the data set by `data`") from None
+    if cpus < 1 or (shards is not None and shards < 1):
+        raise DataError("--cpus and --shards must be 1 or more")
+    begun_here = not ray.is_initialized()
+    if begun_here:
+        try:
+            ray.init(address=address or "local", log_to_driver=False, include_dashboard=False if address is None else None)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            raise DataError(f"no Ray cluster at '{address or 'local'}': {str(error).splitlines()[0]}") from None
+    try:
+        slots = int(ray.cluster_resources().get("CPU", 0)) // cpus
+        if slots == 0:
+            raise DataError(f"no machine of the cluster has {cpus} cores for a task; lower --cpus")
+        count = shards or SHARDS_PER_SLOT * slots
+        task = ray.remote(num_cpus=cpus, max_retries=RETRIES)(_run)
+        output = str(Path(output).absolute())
+        pending = [task.remote(_call(command, arguments, output, i, count, cpus)) for i in range(count)]
+        with tqdm(total=count, desc="shards", disable=not sys.stderr.isatty()) as bar:
+            while pending:
+                finished, pending = ray.wait(pending)
+                for failure in ray.get(finished):
+                    if failure:
+                        raise DataError(failure)
+                bar.update(len(finished))
+        return count
+    except ray.exceptions.RayError as error:
+        raise DataError(f"Ray: {str(error).splitlines()[0]}") from None
+    finally:
+        if begun_here:
+            ray.shutdown()
+
+
+def _call(command, arguments, output, shard, count, cpus):
+    return [command, "dataset", *arguments, "--shard", f"{shard}/{count}", "--threads", str(cpus), "-o", output]
+
+
+def _run(call):
+    """Runs one shard on whatever machine this is; returns what went wrong, or None."""
+    try:
+        done = subprocess.run(call, capture_output=True, text=True, check=False)
+    except OSError as error:
+        return f"'{call[0]}' cannot be run on every machine: {error.strerror}"
+    if done.returncode == 0:
+        return None
+    last = (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]
+    return f"'{' '.join(call)}' failed: {last}"
