@@ -54,9 +54,10 @@ impl Bare {
         for direction in (0..planes).flat_map(|_| [0, 1]) {
             for fft in [&self.row[direction], &self.column[direction]] {
                 let lines = self.plane.len() / fft.len();
+                let piece = self.scratch.len() / self.parts;
                 self.plane
                     .par_chunks_mut(lines.div_ceil(self.parts) * fft.len())
-                    .zip(self.scratch.par_chunks_mut(self.scratch.len() / self.parts))
+                    .zip(self.scratch.par_chunks_mut(piece))
                     .for_each(|(lines, scratch)| fft.process_with_scratch(lines, scratch));
             }
         }

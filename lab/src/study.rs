@@ -35,7 +35,7 @@ pub struct Scenes {
 pub struct Row {
     /// Layers or planes.
     pub value: usize,
-    /// Mean over the scenes, dB.
+    /// Mean over the scenes, dB; infinite where one of them equals the finest to the bit.
     pub psnr: f64,
     /// Mean over the scenes.
     pub ssim: f64,

@@ -102,32 +102,31 @@ impl Study {
             What::Layers => ("layers", format!("LDI layers against {finest}")),
             What::Planes => ("bits of depth", format!("planes against {finest}")),
         };
-        let points = |figure: fn(&Row) -> f64| {
-            (rows.iter())
-                .map(|row| {
-                    let x = match self.what {
-                        What::Layers => row.value as i32,
-                        What::Planes => row.value.ilog2() as i32,
-                    };
-                    (x, figure(row))
-                })
+        let x_of = |row: &Row| match self.what {
+            What::Layers => row.value as i32,
+            What::Planes => row.value.ilog2() as i32,
+        };
+        // Scenes that equal the finest to the bit have no finite PSNR, and then nor has their mean.
+        let points = |figure: fn(&Row) -> f64| -> Vec<(i32, f64)> {
+            (rows.iter().map(|row| (x_of(row), figure(row))))
+                .filter(|(_, y)| y.is_finite())
                 .collect()
         };
-        let panels = [
-            Panel {
-                title: &title,
-                x,
-                y: "SSIM",
-                points: points(|row| row.ssim),
-            },
-            Panel {
+        let mut panels = vec![Panel {
+            title: &title,
+            x,
+            y: "SSIM",
+            points: points(|row| row.ssim),
+        }];
+        let psnr = points(|row| row.psnr);
+        if !psnr.is_empty() {
+            panels.push(Panel {
                 title: &title,
                 x,
                 y: "PSNR (dB)",
-                // An amplitude that is the finest to the bit is drawn at the most that f32 tells apart.
-                points: points(|row| row.psnr.min(150.0)),
-            },
-        ];
+                points: psnr,
+            });
+        }
         plot::write_svg(&self.output.join(format!("{name}.svg")), &panels)
     }
 }
