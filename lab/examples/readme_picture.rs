@@ -24,7 +24,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let board = (110, 590);
     let clock = (1370, 160);
     let parts = [
-        [whole(&input), part(&hologram, board.0, board.1), whole(&near), whole(&far)],
+        [
+            whole(&input),
+            part(&hologram, board.0, board.1),
+            whole(&near),
+            whole(&far),
+        ],
         [
             part(&near, board.0, board.1),
             part(&far, board.0, board.1),
