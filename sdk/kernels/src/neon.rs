@@ -221,7 +221,7 @@ pub(crate) fn burn(rounds: u64) -> u64 {
             }
             // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
             unsafe {
-                asm!("/* {0} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
+                asm!("/* {0:v} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
             }
         }
         black_box(sums);

@@ -77,7 +77,7 @@ fn sin_cos_pi(t: f32) -> (f32, f32) {
     let r2 = r * r;
     // Taylor series of sin πr and cos πr; the first term left out is below 1e-8 on the interval.
     let sin = r
-        * (3.141_592_7
+        * (std::f32::consts::PI
             + r2 * (-5.167_713 + r2 * (2.550_164 + r2 * (-0.599_264_5 + r2 * 0.082_145_89))));
     let cos = 1.0
         + r2 * (-4.934_802

@@ -179,8 +179,12 @@ impl Model {
     }
 
     fn weights(&self, b: &mut Builder, i: usize, reads: usize, writes: usize, input_scale: f32) {
-        let spread =
-            (6.0 / (9.0 * reads as f32)).sqrt() * if i > 1 && i % 2 == 0 { 0.7 } else { 1.0 };
+        let spread = (6.0 / (9.0 * reads as f32)).sqrt()
+            * if i > 1 && i.is_multiple_of(2) {
+                0.7
+            } else {
+                1.0
+            };
         let count = reads * writes * 9;
         let (w, bias) = (format!("w{i}"), format!("b{i}"));
         let shape = [writes as i64, reads as i64, 3, 3];
