@@ -27,7 +27,7 @@ pub struct Tiling {
     pub strip_columns: usize,
 }
 
-/// What measured best for `chain` on the current pool: two bands a thread where the frame is high enough that little is
+/// A tiling for `chain` on the current pool, by reasoning and not yet by measurement: two bands a thread where the frame is high enough that little is
 /// computed twice, and strips whose rings stay in a core's second-level cache.
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     const CACHE: usize = 1 << 20;
