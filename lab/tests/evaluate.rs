@@ -257,7 +257,7 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
 #[test]
 fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let data = Data::new();
-    let network = models::network("8").unwrap();
+    let network = models::network("8", false).unwrap();
     let method = Method::network("8", &network, SIZE, &data.manifest.display).unwrap();
     let rows = data.evaluate(&[method, Method::rgb()], &[Shown::complex()]);
     assert!(rows[0].mean.amplitude_psnr > rows[1].mean.amplitude_psnr);
