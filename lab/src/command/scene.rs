@@ -1,33 +1,53 @@
-//! `phasefront scene`: a random scene as a layered depth image.
+//! `phasefront scene`: a random scene, or a model from a file, as a layered depth image.
 
 use super::flags::parse_size;
 use clap::Args;
+use phasefront_lab::scene::shapes::Light;
 use phasefront_lab::{Result, scene};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Make a random scene and render it as a layered depth image
+/// Render a random scene, or a glTF, GLB or OBJ model, as a layered depth image
 #[derive(Args)]
 pub(crate) struct Scene {
-    /// The same seed gives the same scene
-    #[arg(long, value_name = "N")]
-    seed: u64,
+    /// A random scene; the same seed gives the same one
+    #[arg(long, value_name = "N", required_unless_present = "model")]
+    seed: Option<u64>,
+    /// A .gltf, .glb or .obj file, fitted to the frame and the volume
+    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    model: Option<PathBuf>,
     /// Width and height, pixels
     #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]
     size: (usize, usize),
     /// Layers: hits kept along a line of sight
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=64))]
     layers: u8,
+    /// Render by depth peeling on the GPU rather than exactly on the CPU
+    #[arg(long)]
+    gpu: bool,
     /// Folder of the layered depth image: layer_0.png, depth_0.png, layer_1.png …
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
 }
 
+/// What models are lit by: from the upper left, in front.
+const LIGHT: Light = Light {
+    direction: [-0.36, 0.48, 0.8],
+    ambient: 0.35,
+};
+
 impl Scene {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let (width, height) = self.size;
-        let scene = scene::random_scene(self.seed, height, width);
-        let ldi = scene::render_ldi_reference(&scene, height, width, self.layers.into())?;
+        let layers = self.layers.into();
+        let scene = match &self.model {
+            Some(path) => scene::read_model(path, height, width, Some(LIGHT))?,
+            None => scene::random_scene(self.seed.unwrap_or(0), height, width),
+        };
+        let ldi = match self.gpu {
+            true => scene::DepthPeeler::new()?.render(&scene, height, width, layers)?,
+            false => scene::render_ldi_reference(&scene, height, width, layers)?,
+        };
         ldi.write(&self.output)?;
         let hits: Vec<usize> = (ldi.layers.iter())
             .map(|layer| layer.depth.iter().filter(|d| !d.is_nan()).count())

@@ -94,7 +94,7 @@ fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
 #[inline(always)]
 fn acos(a: f32) -> f32 {
     const C: [f32; 8] = [
-        1.570_796_3,
+        FRAC_PI_2,
         -0.214_598_8,
         0.088_978_99,
         -0.050_174_305,
