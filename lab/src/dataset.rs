@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
+use std::io::{Cursor, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -155,7 +156,7 @@ pub fn make(
     } else {
         let mut text = serde_json::to_vec_pretty(manifest).map_err(|e| Error::file(&place, e))?;
         text.push(b'\n');
-        files::write_atomically(&place, |file| std::io::Write::write_all(file, &text))?;
+        files::write_atomically(&place, |file| file.write_all(&text))?;
     }
     // In order, so that what a stopped run leaves is a beginning.
     let mine: Range<usize> = 0..manifest.scenes.saturating_sub(shard).div_ceil(shards);
@@ -199,14 +200,16 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
             false => (d * 65535.0).round() as u16,
         }
     });
-    files::write_atomically(path, |file| {
-        let mut npz = NpzWriter::new_compressed(file);
-        npz.add_array("rgb", &rgb)
-            .and_then(|()| npz.add_array("depth", &depth))
-            .and_then(|()| npz.add_array("hologram", hologram))
-            .and_then(|()| npz.finish().map(drop))
-            .map_err(std::io::Error::other)
-    })
+    // In memory first: on a full disk the archive's writer would speak for itself on stderr.
+    let archive = || -> std::result::Result<Vec<u8>, ndarray_npy::WriteNpzError> {
+        let mut npz = NpzWriter::new_compressed(Cursor::new(Vec::new()));
+        npz.add_array("rgb", &rgb)?;
+        npz.add_array("depth", &depth)?;
+        npz.add_array("hologram", hologram)?;
+        Ok(npz.finish()?.into_inner())
+    };
+    let bytes = archive().map_err(|e| Error::file(path, e))?;
+    files::write_atomically(path, |file| file.write_all(&bytes))
 }
 
 /// One pair: a scene and its hologram.

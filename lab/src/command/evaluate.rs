@@ -25,8 +25,8 @@ pub(crate) struct Evaluate {
         required_unless_present = "network"
     )]
     method: Vec<MethodName>,
-    /// Networks to judge, separated by commas: one that comes along (8, 15), or an ONNX file
-    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
+    /// Networks to judge, separated by commas: one that comes along (8), or an ONNX file
+    #[arg(long, value_name = "8|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that networks which come along compute in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
