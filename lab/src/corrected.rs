@@ -13,7 +13,7 @@
 
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
-use crate::sm_lbm::{Planes, plane_z_m, row_of};
+use crate::sm_lbm::{Planes, cross, plane_z_m};
 use ndarray::{Array3, ArrayView1, Axis};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
@@ -235,24 +235,10 @@ pub fn hologram(
                         &across
                     }
                 };
-                fft.columns(
-                    &scratch.rows,
-                    &mut scratch.columns,
-                    |x, column| transfer.apply(x, column),
-                    &mut scratch.work,
-                );
-                // The silhouette takes what comes from behind; the plane's content is weighted, none included.
-                fft.rows_there_and_back(
-                    &scratch.columns,
-                    &mut scratch.rows,
-                    &mut scratch.work,
-                    |y| !row_of(points, y).is_empty(),
-                    |y, row| {
-                        for point in row_of(points, y) {
-                            row[point.x as usize] = content(*k, &point.rgb);
-                        }
-                    },
-                );
+                // Content that this kernel does not correct is weighted 0: its silhouette still blocks.
+                cross(&fft, &mut scratch, transfer, points, |point| {
+                    content(*k, &point.rgb)
+                });
                 at = *k;
                 done += 1;
                 progress(done, 3 * propagations);

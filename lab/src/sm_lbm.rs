@@ -19,7 +19,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::wave::asm::{self, Padding, Transfer};
-use phasefront::wave::fft::Fft2;
+use phasefront::wave::fft::{Fft2, Scratch};
 use std::ops::Range;
 
 /// One point of a scene, on its plane.
@@ -96,10 +96,38 @@ impl Planes {
 }
 
 /// The points of row `y` among the `points` of a plane.
-pub(crate) fn row_of(points: &[Point], y: usize) -> &[Point] {
+fn row_of(points: &[Point], y: usize) -> &[Point] {
     let start = points.partition_point(|p| (p.y as usize) < y);
     let length = points[start..].partition_point(|p| p.y as usize == y);
     &points[start..start + length]
+}
+
+/// One step of the wave, whose transformed rows `scratch` holds: over `transfer`'s distance to a plane of
+/// `points`, where it is replaced by what they are (Eq. 3 and 4).
+pub(crate) fn cross(
+    fft: &Fft2,
+    scratch: &mut Scratch,
+    transfer: &Transfer,
+    points: &[Point],
+    content: impl Fn(&Point) -> Complex32 + Sync,
+) {
+    fft.columns(
+        &scratch.rows,
+        &mut scratch.columns,
+        |x, column| transfer.apply(x, column),
+        &mut scratch.work,
+    );
+    fft.rows_there_and_back(
+        &scratch.columns,
+        &mut scratch.rows,
+        &mut scratch.work,
+        |y| !row_of(points, y).is_empty(),
+        |y, row| {
+            for point in row_of(points, y) {
+                row[point.x as usize] = content(point);
+            }
+        },
+    );
 }
 
 /// The complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
@@ -172,24 +200,9 @@ pub fn hologram(
                     &across
                 }
             };
-            fft.columns(
-                &scratch.rows,
-                &mut scratch.columns,
-                |x, column| transfer.apply(x, column),
-                &mut scratch.work,
-            );
-            // Eq. 3 and 4: where the plane has a point, the wave from behind is replaced by it.
-            fft.rows_there_and_back(
-                &scratch.columns,
-                &mut scratch.rows,
-                &mut scratch.work,
-                |y| !row_of(points, y).is_empty(),
-                |y, row| {
-                    for point in row_of(points, y) {
-                        row[point.x as usize] = point.rgb[colour].into();
-                    }
-                },
-            );
+            cross(&fft, &mut scratch, transfer, points, |point| {
+                point.rgb[colour].into()
+            });
             at = *k;
             progress(done + i, total);
         }
