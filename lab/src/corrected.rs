@@ -264,7 +264,7 @@ pub fn hologram(
             progress(done, 3 * propagations);
         }
         fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
-        fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work, |_, _| {});
+        fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work);
         let rows = scratch.rows.chunks_exact(padded_width);
         let mut out = hologram.index_axis_mut(Axis(0), colour);
         for (mut out, row) in out.rows_mut().into_iter().zip(rows) {

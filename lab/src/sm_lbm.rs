@@ -213,12 +213,7 @@ pub fn hologram(
             |x, column| home.apply(x, column),
             &mut scratch.work,
         );
-        fft.rows_inverse(
-            &scratch.columns,
-            &mut scratch.rows,
-            &mut scratch.work,
-            |_, _| {},
-        );
+        fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
         let rows = scratch.rows.chunks_exact(padded_width);
         for (mut out, row) in hologram
             .index_axis_mut(ndarray::Axis(0), colour)

@@ -154,12 +154,8 @@ impl Refocus {
             |x, column| transfer.apply(x, column),
             &mut scratch.work,
         );
-        self.fft.rows_inverse(
-            &scratch.columns,
-            &mut scratch.rows,
-            &mut scratch.work,
-            |_, _| {},
-        );
+        self.fft
+            .rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
         self.fft.crop(&scratch.rows, plane);
         Ok(())
     }

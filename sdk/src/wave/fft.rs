@@ -130,7 +130,7 @@ impl Fft2 {
         } = scratch;
         self.rows_forward(plane, rows, work);
         self.columns(rows, columns, filter, work);
-        self.rows_inverse(columns, rows, work, |_, _| {});
+        self.rows_inverse(columns, rows, work);
         self.crop(rows, plane);
     }
 
@@ -241,21 +241,12 @@ impl Fft2 {
             });
     }
 
-    /// From `columns`, (W', H'), back to `rows`, (H, W'), each transformed back and handed to `then`
-    /// with its index; its first W values are the frame's.
-    pub fn rows_inverse<F>(
-        &self,
-        columns: &[Complex32],
-        rows: &mut [Complex32],
-        work: &mut Work,
-        then: F,
-    ) where
-        F: Fn(usize, &mut [Complex32]) + Sync,
-    {
+    /// From `columns`, (W', H'), back to `rows`, (H, W'), each transformed back; the first W values of a row
+    /// are the frame's.
+    pub fn rows_inverse(&self, columns: &[Complex32], rows: &mut [Complex32], work: &mut Work) {
         let inverse = &self.row[1];
-        self.rows_from(columns, rows, work, |y, row, work| {
+        self.rows_from(columns, rows, work, |_, row, work| {
             inverse.process_with_scratch(row, work);
-            then(y, row);
         });
     }
 
