@@ -7,7 +7,7 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::network::{Precision, f32_peak, int8_peak};
 use phasefront::slm::Response;
-use phasefront::{Display, Network, Pipeline, RgbdFrame};
+use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -106,7 +106,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
     let pipeline = Pipeline::new(
         height,
         width,
-        network,
+        Method::Network(network),
         display,
         Encoding::ANTI_ALIAS,
         Scale::Fixed(1.0),
@@ -126,7 +126,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
             .times;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         for (stage, time) in [
-            ("network", times.network),
+            ("network", times.method),
             ("propagate", times.propagate),
             ("encode", times.encode),
         ] {
@@ -140,7 +140,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
     let total_ms = median(&mut totals);
     let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
     let gmac_per_s = macs / stage_ms["network"] / 1e6;
-    let isa = pipeline.network().engine().isa;
+    let isa = pipeline.method().engine().and_then(|engine| engine.isa);
     let peak = isa.and_then(|isa| match network.precision() {
         Precision::Int8 => int8_peak(isa, PEAK_TIME),
         _ => f32_peak(isa, PEAK_TIME),
@@ -149,7 +149,9 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         layers: network.layers(),
         precision: network.precision().to_string(),
         backend: "cpu",
-        kernels: pipeline.network().engine().name.to_owned(),
+        kernels: (pipeline.method().engine())
+            .map_or("", |engine| engine.name)
+            .to_owned(),
         width,
         height,
         threads: case.threads,

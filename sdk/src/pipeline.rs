@@ -1,40 +1,33 @@
-//! One RGB-D frame through all stages: network, offset, phase encoding, levels, with the time of
-//! each. Many frames are a session's work.
+//! One RGB-D frame through all stages: midpoint hologram, offset, phase encoding, levels, with the time
+//! of each. Many frames are a session's work.
 
 use crate::display::Display;
 use crate::encode::{Encoding, Scale};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::frame::RgbdFrame;
+use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
-use crate::network::{Head, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::slm::Response;
 use num_complex::Complex32;
 use std::time::{Duration, Instant};
 
-/// How far a display may lie from what a network was trained for, relative.
-const DISPLAY_TOLERANCE: f64 = 0.02;
-
-/// A plan for one network, frame shape and display. Immutable; shared between threads.
+/// A plan for one method, frame shape and display. Immutable; shared between threads.
 pub struct Pipeline {
-    shape: (usize, usize),
-    network: NetworkPlan,
-    head: Head,
+    method: MethodPlan,
     modulator: Modulator,
 }
 
 /// Working memory of a [`Pipeline`] for one frame at a time.
 pub struct PipelineScratch {
-    input: Vec<f32>,
-    output: Vec<f32>,
-    network: NetworkScratch,
+    method: MethodScratch,
     modulator: ModulatorScratch,
 }
 
 /// How long each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageTimes {
-    /// The network, its input and head included.
-    pub network: Duration,
+    /// From the frame to the midpoint hologram.
+    pub method: Duration,
     /// From the midpoint to the modulator.
     pub propagate: Duration,
     /// From the field to levels.
@@ -44,7 +37,7 @@ pub struct StageTimes {
 impl StageTimes {
     /// All stages together.
     pub fn total(&self) -> Duration {
-        self.network + self.propagate + self.encode
+        self.method + self.propagate + self.encode
     }
 }
 
@@ -58,58 +51,45 @@ pub struct FrameReport {
 }
 
 impl Pipeline {
-    /// Plans (`height`, `width`) frames through `network` to `display`, whose response is `response`.
+    /// Plans (`height`, `width`) frames by `method` to `display`, whose response is `response`.
     ///
     /// # Errors
-    /// A network for layered input or for another display, or what [`Modulator::new`] refuses.
+    /// What [`MethodPlan::new`] or [`Modulator::new`] refuses.
     pub fn new(
         height: usize,
         width: usize,
-        network: &Network,
+        method: Method,
         display: &Display,
         encoding: Encoding,
         scale: Scale,
         response: Response,
     ) -> Result<Self> {
-        if network.input() != InputKind::Rgbd {
-            return Err(Error::Network(format!(
-                "it takes {} planes of a layered depth image; a network for RGB-D frames is needed",
-                network.input().channels()
-            )));
-        }
-        check_display(network, display)?;
         Ok(Pipeline {
-            shape: (height, width),
-            network: network.plan(height, width)?,
-            head: network.head(),
+            method: MethodPlan::new(height, width, method, display)?,
             modulator: Modulator::new(height, width, display, encoding, scale, response)?,
         })
     }
 
     /// (H, W).
     pub fn shape(&self) -> (usize, usize) {
-        self.shape
+        self.method.shape()
     }
 
-    /// The network's plan: which path runs it, and why.
-    pub fn network(&self) -> &NetworkPlan {
-        &self.network
+    /// The plan of the midpoint hologram.
+    pub fn method(&self) -> &MethodPlan {
+        &self.method
     }
 
     /// Working memory for one frame at a time.
     pub fn scratch(&self) -> PipelineScratch {
-        let size = self.shape.0 * self.shape.1;
-        let (inputs, outputs) = self.network.channels();
         PipelineScratch {
-            input: vec![0.0; inputs * size],
-            output: vec![0.0; outputs * size],
-            network: self.network.scratch(),
+            method: self.method.scratch(),
             modulator: self.modulator.scratch(),
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): network, mean phase taken out, offset. Gives
-    /// the times of the network and of the offset.
+    /// The field at the modulator, into `field`, (3, H, W): midpoint hologram, mean phase taken out,
+    /// offset. Gives the times of the midpoint hologram and of the offset.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -119,20 +99,8 @@ impl Pipeline {
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
-        if frame.shape() != self.shape {
-            return Err(Error::Frame(format!(
-                "the frame is {}×{}; this plan takes {}×{}",
-                frame.shape().1,
-                frame.shape().0,
-                self.shape.1,
-                self.shape.0
-            )));
-        }
         let start = Instant::now();
-        frame.network_input(&mut scratch.input);
-        self.network
-            .run(&scratch.input, &mut scratch.output, &mut scratch.network)?;
-        self.head.field(&scratch.output, &scratch.input, field)?;
+        self.method.field(frame, field, &mut scratch.method)?;
         remove_mean_phase(field);
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
@@ -168,48 +136,15 @@ impl Pipeline {
         levels: &mut [u8],
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
-        let (network, propagate) = self.field(frame, field, scratch)?;
+        let (method, propagate) = self.field(frame, field, scratch)?;
         let modulation = self.modulate(field, levels, scratch);
         Ok(FrameReport {
             scale: modulation.scale,
             times: StageTimes {
-                network,
+                method,
                 propagate,
                 encode: modulation.encode,
             },
         })
     }
-}
-
-/// Checks that `network` was trained for a display like `display`: on another it gives wrong depths.
-///
-/// # Errors
-/// A pitch, wavelength or volume that differs by over 2 %.
-pub fn check_display(network: &Network, display: &Display) -> Result<()> {
-    let trained = network.display();
-    let pairs = [
-        ("pitch", "µm", 1e6, trained.pitch_m, display.pitch_m()),
-        (
-            "volume depth",
-            "mm",
-            1e3,
-            trained.volume_depth_m,
-            display.volume_depth_m(),
-        ),
-    ];
-    let colours = trained
-        .wavelengths_m
-        .into_iter()
-        .zip(display.wavelengths_m())
-        .map(|(trained, given)| ("wavelength", "nm", 1e9, trained, given));
-    for (what, unit, scale, trained, given) in pairs.into_iter().chain(colours) {
-        if (trained - given).abs() > DISPLAY_TOLERANCE * trained {
-            return Err(Error::Network(format!(
-                "it was trained for a {what} of {:.3} {unit}, the display has {:.3}; train one for this display, or use a method without a network",
-                trained * scale,
-                given * scale
-            )));
-        }
-    }
-    Ok(())
 }

@@ -1,8 +1,9 @@
 """A deeper network from a trained one, that begins by giving what the trained one gives.
 
 A chain of an even number of layers is a first layer, residual pairs and the last layer; one of an odd number has one
-more layer without a skip before the last. New residual pairs begin as the identity. From even to odd, the new single layer is
-a kernel that copies. From odd to even the single layer must become a pair, whose skip adds what the old network did not
+more layer without a skip before the last. New residual pairs begin as a tenth of what a fresh one is: near the identity,
+but with units that fire, for a branch that begins at zero dies behind its ReLU in the first steps. From even to odd, the
+new single layer is a kernel that copies. From odd to even the single layer must become a pair, whose skip adds what the old network did not
 have: its partner copies four times over, so that this
 weighs little, and the last layer is fitted anew to the old output by least squares over examples.
 """
@@ -12,13 +13,13 @@ from torch.nn import functional as F
 
 from .networks import Architecture, Chain
 
-WAKE = 1e-6  # bias of a new pair's second layer: nothing to the output, but behind a ReLU a gradient needs more than 0
+BRANCH = 0.1  # of a fresh residual branch
 GAIN = 4.0  # of the copy that a skip's sum must not drown
 RIDGE = 1e-6  # of the mean diagonal, in the fit of the last layer
 
 
 def grow(network, layers, examples=()):
-    """A Chain of `layers` layers that gives what `network` gives, to about 1e-5 where it can be exact.
+    """A Chain of `layers` layers that gives nearly what `network` gives: the new branches are small.
 
     examples: network inputs (C, H, W); needed from an odd to an even number of layers. Raises ValueError where the
     network cannot grow so.
@@ -46,8 +47,7 @@ def _insert_pairs(network, layers):
             j = i if i < old.layers - tail else i + layers - old.layers
             grown.convs[j].load_state_dict(conv.state_dict())
         for j in range(old.layers - tail + 1, layers - tail, 2):
-            grown.convs[j].weight.zero_()
-            grown.convs[j].bias.fill_(WAKE)
+            grown.convs[j].weight *= BRANCH
     return grown
 
 

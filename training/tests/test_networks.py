@@ -14,15 +14,16 @@ def test_sizes_are_the_papers():
 
 
 @pytest.mark.parametrize(("layers", "to"), [(4, 8), (5, 9), (8, 15), (8, 30), (15, 31)])
-def test_growing_is_the_identity_and_learns(layers, to):
+def test_growing_stays_near_the_old_network_and_all_units_live(layers, to):
+    torch.manual_seed(0)
     small = Chain(Architecture(layers))
     for conv in small.convs:
         torch.nn.init.normal_(conv.bias, std=0.1)
     x = torch.rand(1, 4, 20, 24) - 0.5
     big = grow(small, to)
-    assert torch.allclose(big(x), small(x), atol=1e-4)
+    assert (big(x) - small(x)).square().mean() < 0.02 * small(x).var()
     big(x).square().mean().backward()
-    assert all(conv.weight.grad.abs().max() > 0 for conv in big.convs[2::2])
+    assert all(conv.weight.grad.abs().amax((1, 2, 3)).gt(0).float().mean() > 0.8 for conv in big.convs)
 
 
 def test_growing_from_odd_to_even_is_near_the_old_network():

@@ -207,7 +207,7 @@ impl Hologram {
         let pipeline = Pipeline::new(
             height,
             width,
-            &network,
+            phasefront::Method::Network(&network),
             display,
             self.encoder.encoding(),
             self.scale(),
@@ -221,7 +221,7 @@ impl Hologram {
         // The encoder filters the field that it is given, so a copy is kept where it is asked for.
         let kept = self.complex.as_ref().map(|_| values.to_vec());
         let modulation = pipeline.modulate(values, bytes, &mut scratch);
-        let engine = pipeline.network().engine();
+        let engine = pipeline.method().engine();
         Ok(Made {
             field: kept.map(|values| stack(values, height, width)),
             levels,
@@ -231,7 +231,7 @@ impl Hologram {
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
-            engine: Some(format!("{} ({})", engine.name, engine.why)),
+            engine: engine.map(|engine| format!("{} ({})", engine.name, engine.why)),
         })
     }
 
