@@ -15,6 +15,7 @@ pub(crate) use colour::check_size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
 pub use convert::{ColourPlan, ColourScratch};
 pub use plane::{Orientation, Plane, Rotation};
+pub(crate) use resample::Axis;
 pub use resample::Crop;
 
 use crate::error::{Error, Result};

@@ -76,7 +76,14 @@ impl Cameras {
         (metres, confidence): (&[f32], &[f32]),
         (to, to_confidence): (&mut [f32], &mut [f32]),
     ) -> usize {
-        assert!([metres.len(), confidence.len(), to.len(), to_confidence.len()] == [height * width; 4]);
+        assert!(
+            [
+                metres.len(),
+                confidence.len(),
+                to.len(),
+                to_confidence.len()
+            ] == [height * width; 4]
+        );
         to.fill(f32::NAN);
         to_confidence.fill(0.0);
         let scale_x = width as f64 / colour_shape.1 as f64;
@@ -105,7 +112,12 @@ impl Cameras {
             let v = self.colour.fy * turned(1) / distance + self.colour.cy;
             let (u, v) = ((u + 0.5) * scale_x - 0.5, (v + 0.5) * scale_y - 0.5);
             // A reading is a small patch: both neighbours each way, or a picture that is stretched gets gaps.
-            for (u, v) in [(u.floor(), v.floor()), (u.ceil(), v.floor()), (u.floor(), v.ceil()), (u.ceil(), v.ceil())] {
+            for (u, v) in [
+                (u.floor(), v.floor()),
+                (u.ceil(), v.floor()),
+                (u.floor(), v.ceil()),
+                (u.ceil(), v.ceil()),
+            ] {
                 if u < 0.0 || v < 0.0 || u >= width as f64 || v >= height as f64 {
                     continue;
                 }
@@ -135,7 +147,13 @@ mod tests {
     #[test]
     fn the_same_camera_sees_the_same() {
         let metres: Vec<f32> = (0..64 * 48)
-            .map(|i| if i % 7 == 0 { f32::NAN } else { 1.0 + (i % 64) as f32 / 64.0 })
+            .map(|i| {
+                if i % 7 == 0 {
+                    f32::NAN
+                } else {
+                    1.0 + (i % 64) as f32 / 64.0
+                }
+            })
             .collect();
         let sure: Vec<f32> = (0..64 * 48).map(|i| i as f32).collect();
         let (mut to, mut to_sure) = (vec![0.0; 64 * 48], vec![0.0; 64 * 48]);
@@ -149,7 +167,9 @@ mod tests {
         for (colour, shape) in [(CAMERA, (48, 64)), (colour, (96, 128))] {
             let cameras = Cameras::concentric(colour, CAMERA);
             cameras.reproject((48, 64), shape, (&metres, &sure), (&mut to, &mut to_sure));
-            let kept = (metres.iter().zip(&to)).filter(|(a, b)| (**a - **b).abs() < 1e-5).count();
+            let kept = (metres.iter().zip(&to))
+                .filter(|(a, b)| (**a - **b).abs() < 1e-5)
+                .count();
             // Rounding may move a reading's patch by a pixel; most stay alone.
             assert!(kept > 64 * 48 / 2, "{kept}");
         }
@@ -169,13 +189,31 @@ mod tests {
             translation_m: [-0.1, 0.0, 0.0],
             ..Cameras::concentric(CAMERA, CAMERA)
         };
-        let seen = cameras.reproject((48, 64), (48, 64), (&metres, &sure), (&mut to, &mut to_sure));
+        let seen = cameras.reproject(
+            (48, 64),
+            (48, 64),
+            (&metres, &sure),
+            (&mut to, &mut to_sure),
+        );
         let row = &to[24 * 64..25 * 64];
-        assert!(row[20..34].iter().all(|z| (*z - 1.0).abs() < 1e-6), "{row:?}");
+        assert!(
+            row[20..34].iter().all(|z| (*z - 1.0).abs() < 1e-6),
+            "{row:?}"
+        );
         assert!(row[36..37].iter().all(|z| z.is_nan()), "{row:?}");
-        assert!(row[..18].iter().chain(&row[39..60]).all(|z| (*z - 2.0).abs() < 1e-6), "{row:?}");
+        assert!(
+            row[..18]
+                .iter()
+                .chain(&row[39..60])
+                .all(|z| (*z - 2.0).abs() < 1e-6),
+            "{row:?}"
+        );
         assert_eq!(seen, to.iter().filter(|z| !z.is_nan()).count());
-        assert!(to.iter().zip(&to_sure).all(|(z, s)| z.is_nan() == (*s == 0.0)));
+        assert!(
+            to.iter()
+                .zip(&to_sure)
+                .all(|(z, s)| z.is_nan() == (*s == 0.0))
+        );
     }
 
     #[test]
@@ -186,6 +224,10 @@ mod tests {
         let mut cameras = Cameras::concentric(CAMERA, CAMERA);
         assert!(cameras.check().is_ok());
         cameras.translation_m[1] = f64::NAN;
-        assert!(cameras.check().is_err_and(|e| e.to_string().contains("pose")));
+        assert!(
+            cameras
+                .check()
+                .is_err_and(|e| e.to_string().contains("pose"))
+        );
     }
 }

@@ -50,7 +50,13 @@ impl DepthFormat {
         let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
         let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
         let f32_at = || f32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
-        let metres = |m: f32| if m.is_finite() && m > 0.0 { m } else { f32::NAN };
+        let metres = |m: f32| {
+            if m.is_finite() && m > 0.0 {
+                m
+            } else {
+                f32::NAN
+            }
+        };
         match self {
             DepthFormat::MetresF32 => (metres(f32_at()), 1.0),
             DepthFormat::MetresF16 => (metres(f16_at()), 1.0),
@@ -106,12 +112,7 @@ impl<'a> DepthImage<'a> {
     ///
     /// # Errors
     /// [`Error::Frame`] that names an empty or too large image, a stride that is too small, or too few bytes.
-    pub fn new(
-        format: DepthFormat,
-        width: usize,
-        height: usize,
-        plane: Plane<'a>,
-    ) -> Result<Self> {
+    pub fn new(format: DepthFormat, width: usize, height: usize, plane: Plane<'a>) -> Result<Self> {
         check_size("depth", width, height)?;
         plane.check("depth", width, height, format.pixel_bytes())?;
         Ok(DepthImage {
@@ -209,14 +210,44 @@ mod tests {
     fn each_format_reads_as_its_platform_says() {
         let f16_bytes = |v: f32| f16::from_f32(v).to_le_bytes().to_vec();
         let cases = [
-            (DepthFormat::MetresF32, 2.5f32.to_le_bytes().to_vec(), 2.5, 1.0),
+            (
+                DepthFormat::MetresF32,
+                2.5f32.to_le_bytes().to_vec(),
+                2.5,
+                1.0,
+            ),
             (DepthFormat::MetresF16, f16_bytes(2.5), 2.5, 1.0),
-            (DepthFormat::DisparityF32, 0.4f32.to_le_bytes().to_vec(), 2.5, 1.0),
+            (
+                DepthFormat::DisparityF32,
+                0.4f32.to_le_bytes().to_vec(),
+                2.5,
+                1.0,
+            ),
             (DepthFormat::DisparityF16, f16_bytes(0.5), 2.0, 1.0),
-            (DepthFormat::MillimetresU16, 9000u16.to_le_bytes().to_vec(), 9.0, 1.0),
-            (DepthFormat::AndroidDepth16, 2500u16.to_le_bytes().to_vec(), 2.5, 1.0),
-            (DepthFormat::AndroidDepth16, (1 << 13 | 2500u16).to_le_bytes().to_vec(), 2.5, 0.0),
-            (DepthFormat::AndroidDepth16, (7 << 13 | 8191u16).to_le_bytes().to_vec(), 8.191, 6.0 / 7.0),
+            (
+                DepthFormat::MillimetresU16,
+                9000u16.to_le_bytes().to_vec(),
+                9.0,
+                1.0,
+            ),
+            (
+                DepthFormat::AndroidDepth16,
+                2500u16.to_le_bytes().to_vec(),
+                2.5,
+                1.0,
+            ),
+            (
+                DepthFormat::AndroidDepth16,
+                (1 << 13 | 2500u16).to_le_bytes().to_vec(),
+                2.5,
+                0.0,
+            ),
+            (
+                DepthFormat::AndroidDepth16,
+                (7 << 13 | 8191u16).to_le_bytes().to_vec(),
+                8.191,
+                6.0 / 7.0,
+            ),
             (DepthFormat::NormalizedU8, vec![0], 0.0, 1.0),
             (DepthFormat::NormalizedU8, vec![255], 1.0, 1.0),
             (DepthFormat::NormalizedU16, vec![0xff, 0xff], 1.0, 1.0),
@@ -224,12 +255,26 @@ mod tests {
         for (format, bytes, metres, confidence) in cases {
             assert_eq!(bytes.len(), format.pixel_bytes());
             let (value, sure) = format.reading(&bytes);
-            assert!((value - metres).abs() < 1e-6 && sure == confidence, "{format:?} {value}");
+            assert!(
+                (value - metres).abs() < 1e-6 && sure == confidence,
+                "{format:?} {value}"
+            );
         }
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert!(DepthFormat::MetresF32.reading(&bad.to_le_bytes()).0.is_nan());
+            assert!(
+                DepthFormat::MetresF32
+                    .reading(&bad.to_le_bytes())
+                    .0
+                    .is_nan()
+            );
             assert!(DepthFormat::MetresF16.reading(&f16_bytes(bad)).0.is_nan());
-            assert!(DepthFormat::DisparityF16.reading(&f16_bytes(bad)).0.is_nan() || bad.is_infinite());
+            assert!(
+                DepthFormat::DisparityF16
+                    .reading(&f16_bytes(bad))
+                    .0
+                    .is_nan()
+                    || bad.is_infinite()
+            );
         }
         assert!(DepthFormat::MillimetresU16.reading(&[0, 0]).0.is_nan());
         assert!(DepthFormat::AndroidDepth16.reading(&[0, 0x20]).0.is_nan());
@@ -250,16 +295,27 @@ mod tests {
             DepthFormat::NormalizedU8,
             DepthFormat::NormalizedU16,
         ] {
-            for confidences in [None, Some(ConfidenceFormat::LowMediumHigh), Some(ConfidenceFormat::U8)] {
+            for confidences in [
+                None,
+                Some(ConfidenceFormat::LowMediumHigh),
+                Some(ConfidenceFormat::U8),
+            ] {
                 let (w, h) = (random.random_range(1..20), random.random_range(1..20));
                 let n = format.pixel_bytes();
                 let pixel = n + random.random_range(0..3);
                 let row = (w - 1) * pixel + n + random.random_range(0..9);
-                let bytes: Vec<u8> = (0..(h - 1) * row + (w - 1) * pixel + n).map(|_| random.random()).collect();
-                let map: Vec<u8> = (0..h * (2 * w + 1)).map(|_| random.random_range(0..=255)).collect();
-                let mut image = DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
+                let bytes: Vec<u8> = (0..(h - 1) * row + (w - 1) * pixel + n)
+                    .map(|_| random.random())
+                    .collect();
+                let map: Vec<u8> = (0..h * (2 * w + 1))
+                    .map(|_| random.random_range(0..=255))
+                    .collect();
+                let mut image =
+                    DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
                 if let Some(format) = confidences {
-                    image = image.with_confidence(format, w, h, Plane::new(&map, 2 * w + 1, 2)).unwrap();
+                    image = image
+                        .with_confidence(format, w, h, Plane::new(&map, 2 * w + 1, 2))
+                        .unwrap();
                 }
                 let (mut values, mut sure) = (vec![9.0; w * h], vec![9.0; w * h]);
                 let valid = image.readings(0.4, &mut values, &mut sure);
@@ -267,7 +323,8 @@ mod tests {
                 for y in 0..h {
                     for x in 0..w {
                         let (value, own) = format.reading(&bytes[y * row + x * pixel..][..n]);
-                        let map = confidences.map_or(1.0, |f| f.confidence(map[y * (2 * w + 1) + 2 * x]));
+                        let map =
+                            confidences.map_or(1.0, |f| f.confidence(map[y * (2 * w + 1) + 2 * x]));
                         let (is, is_sure) = (values[y * w + x], sure[y * w + x]);
                         match value.is_nan() || own.min(map) < 0.4 {
                             true => assert!(is.is_nan() && is_sure == 0.0),
@@ -305,7 +362,10 @@ mod tests {
             ),
         ] {
             let message = refused.map(|_| ()).map_err(|e| e.to_string());
-            assert!(message.as_ref().is_err_and(|m| m.contains(word)), "{word}: {message:?}");
+            assert!(
+                message.as_ref().is_err_and(|m| m.contains(word)),
+                "{word}: {message:?}"
+            );
         }
     }
 }

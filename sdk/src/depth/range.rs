@@ -130,8 +130,16 @@ mod tests {
             far_m: 3.0,
         };
         assert!(fixed.check().is_ok());
-        assert_eq!(RangeTracker::new(fixed).next(&[9.0], FRAME).unwrap(), (0.5, 3.0));
-        for (near_m, far_m) in [(1.0, 1.0), (2.0, 1.0), (f32::NAN, 1.0), (0.0, f32::INFINITY)] {
+        assert_eq!(
+            RangeTracker::new(fixed).next(&[9.0], FRAME).unwrap(),
+            (0.5, 3.0)
+        );
+        for (near_m, far_m) in [
+            (1.0, 1.0),
+            (2.0, 1.0),
+            (f32::NAN, 1.0),
+            (0.0, f32::INFINITY),
+        ] {
             assert!(DepthRange::Fixed { near_m, far_m }.check().is_err());
         }
     }

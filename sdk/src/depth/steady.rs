@@ -66,8 +66,11 @@ impl Steadier {
                     let age = self.age[i].saturating_add(elapsed);
                     let near_x = x.saturating_sub(NEIGHBOURS)..(x + NEIGHBOURS + 1).min(width);
                     let spoken_for = || {
-                        (near_y.clone())
-                            .any(|y| near_x.clone().any(|x| agree(readings[y * width + x], known)))
+                        (near_y.clone()).any(|y| {
+                            near_x
+                                .clone()
+                                .any(|x| agree(readings[y * width + x], known))
+                        })
                     };
                     match !known.is_nan() && age <= HOLD && spoken_for() {
                         true => (known, age),
@@ -97,8 +100,9 @@ mod tests {
         let mut steadier = Steadier::default();
         let (mut before, mut after) = (0.0f64, 0.0f64);
         for frame in 0..40 {
-            let mut readings: Vec<f32> =
-                (0..400).map(|_| 2.0 + random.random_range(-0.02..0.02)).collect();
+            let mut readings: Vec<f32> = (0..400)
+                .map(|_| 2.0 + random.random_range(-0.02..0.02))
+                .collect();
             let raw = readings.clone();
             assert_eq!(steadier.steady(&mut readings, 20, FRAME, true), 400);
             if frame > 10 {

@@ -55,8 +55,7 @@ impl<'a> CameraFrame<'a> {
             (self.colour.shape(), self.depth.shape());
         match self.alignment {
             Alignment::Aligned => {
-                let ratio =
-                    (width * depth_height) as f64 / (height * depth_width) as f64;
+                let ratio = (width * depth_height) as f64 / (height * depth_width) as f64;
                 // A pixel more or less of a small image is no other field of view.
                 let rounding = 1.0 / depth_height.min(depth_width) as f64;
                 match (ratio - 1.0).abs() <= ASPECT_TOLERANCE.max(rounding) {

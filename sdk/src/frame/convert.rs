@@ -93,8 +93,7 @@ impl ColourPlan {
 
     /// Whether the plan is for images as `image` turned by `orientation`. Strides do not matter.
     pub fn fits(&self, image: &ColourImage<'_>, orientation: Orientation) -> bool {
-        (self.format, self.sensor, self.orientation)
-            == (image.format(), image.shape(), orientation)
+        (self.format, self.sensor, self.orientation) == (image.format(), image.shape(), orientation)
     }
 
     /// (H, W) of the amplitudes.

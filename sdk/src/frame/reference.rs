@@ -24,7 +24,8 @@ pub fn convert(
                 crop.y + (y as f64 + 0.5) * crop.height / height as f64,
             );
             let sizes = (crop.width / width as f64, crop.height / height as f64);
-            let mean = |plane, byte, share| mean(image, orientation, plane, byte, share, centre, sizes);
+            let mean =
+                |plane, byte, share| mean(image, orientation, plane, byte, share, centre, sizes);
             let colour = match image.format() {
                 ColourFormat::Rgba | ColourFormat::Rgb => [0, 1, 2].map(|b| mean(0, b, 1) / 255.0),
                 ColourFormat::Bgra => [2, 1, 0].map(|b| mean(0, b, 1) / 255.0),
@@ -65,9 +66,8 @@ fn mean(
             let y = (row as f64 + 0.5) * share as f64 / height as f64;
             let (x, y) = turn(orientation, x, y);
             let (x, y) = (x * upright_width as f64, y * upright_height as f64);
-            let weight = |apart: f64, size: f64| {
-                (1.0 - apart.abs() / size.max(share as f64)).max(0.0)
-            };
+            let weight =
+                |apart: f64, size: f64| (1.0 - apart.abs() / size.max(share as f64)).max(0.0);
             let weight = weight(x - centre.0, size.0) * weight(y - centre.1, size.1);
             let at = row * plane.row_stride + column * plane.pixel_stride + byte;
             sum += weight * f64::from(plane.bytes[at]);
