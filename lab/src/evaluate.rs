@@ -108,14 +108,14 @@ impl<'a> Method<'a> {
         };
         check_display(network, display)?;
         let plan = network.plan(size, size)?;
-        let head = network.head();
+        let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
             let input = network_input(ldi, layers);
             let mut output = vec![0.0; plan.channels().1 * size * size];
             plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            head.field(&output, &input, values)?;
+            head.field(kind, &output, &input, values)?;
             remove_mean_phase(values);
             Ok(field)
         }))

@@ -3,7 +3,7 @@
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
-use crate::network::{Engine, Head, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use num_complex::Complex32;
 
 /// How far a display may lie from what a network was trained for, relative.
@@ -21,13 +21,10 @@ pub enum Method<'a> {
 pub struct MethodPlan {
     shape: (usize, usize),
     network: NetworkPlan,
-    head: Head,
 }
 
 /// Working memory of a [`MethodPlan`] for one frame at a time.
 pub struct MethodScratch {
-    input: Vec<f32>,
-    output: Vec<f32>,
     network: NetworkScratch,
 }
 
@@ -48,7 +45,6 @@ impl MethodPlan {
         Ok(MethodPlan {
             shape: (height, width),
             network: network.plan(height, width)?,
-            head: network.head(),
         })
     }
 
@@ -64,11 +60,7 @@ impl MethodPlan {
 
     /// Working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
-        let size = self.shape.0 * self.shape.1;
-        let (inputs, outputs) = self.network.channels();
         MethodScratch {
-            input: vec![0.0; inputs * size],
-            output: vec![0.0; outputs * size],
             network: self.network.scratch(),
         }
     }
@@ -76,10 +68,7 @@ impl MethodPlan {
     /// The midpoint hologram of `frame`, carrier-free, at z = 0, into `field`, (3, H, W).
     ///
     /// # Errors
-    /// A frame of another shape.
-    ///
-    /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// A frame of another shape, or a `field` that has not 3·H·W values.
     pub fn field(
         &self,
         frame: &RgbdFrame,
@@ -95,10 +84,7 @@ impl MethodPlan {
                 self.shape.0
             )));
         }
-        frame.network_input(&mut scratch.input);
-        self.network
-            .run(&scratch.input, &mut scratch.output, &mut scratch.network)?;
-        self.head.field(&scratch.output, &scratch.input, field)
+        self.network.field(frame, field, &mut scratch.network)
     }
 }
 
