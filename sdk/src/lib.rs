@@ -18,6 +18,7 @@ pub mod network;
 pub mod pipeline;
 pub mod refocus;
 pub mod slm;
+pub mod sweep;
 pub mod wave;
 
 pub use display::Display;
@@ -27,6 +28,7 @@ pub use method::Method;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};
 pub use pipeline::Pipeline;
+pub use sweep::Sweep;
 
 /// The README's code compiles.
 #[cfg(doctest)]
