@@ -104,6 +104,28 @@ impl RgbdFrame {
     pub fn depth(&self) -> ArrayView2<'_, f32> {
         self.depth.view()
     }
+
+    /// The amplitudes and the normalized depth as they lie in memory.
+    pub(crate) fn values(&self) -> (&[f32], &[f32]) {
+        let contiguous = "standard layout";
+        (
+            self.rgb.as_slice().expect(contiguous),
+            self.depth.as_slice().expect(contiguous),
+        )
+    }
+
+    /// # Errors
+    /// Another shape than a plan's.
+    pub(crate) fn check_shape(&self, plan: (usize, usize)) -> Result<()> {
+        let (height, width) = self.shape();
+        if (height, width) != plan {
+            return Err(Error::Frame(format!(
+                "the frame is {width}×{height}; this plan takes {}×{}",
+                plan.1, plan.0
+            )));
+        }
+        Ok(())
+    }
 }
 
 /// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½.

@@ -8,9 +8,12 @@
 //! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
 //! against. `unsafe` lives in those files alone.
 //!
+//! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
+//!
 //! Nothing here knows ONNX, tract or optics.
 
 mod f32;
+pub mod fir;
 mod int8;
 mod isa;
 mod peak;
