@@ -15,6 +15,7 @@ pub mod frame;
 pub mod method;
 pub mod modulator;
 pub mod network;
+pub mod output;
 pub mod pipeline;
 pub mod preview;
 pub mod refocus;
