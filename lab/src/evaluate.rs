@@ -157,12 +157,12 @@ fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
 }
 
 /// How a field is shown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,
     /// How it becomes phases; `None`: it is shown as the complex field it is.
-    pub encoding: Option<Encoding>,
+    pub encoding: Option<Encoding<'static>>,
 }
 
 impl Shown {

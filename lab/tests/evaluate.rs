@@ -64,7 +64,7 @@ impl Data {
     }
 }
 
-fn encoded(name: &str, encoding: Encoding) -> Shown {
+fn encoded(name: &str, encoding: Encoding<'static>) -> Shown {
     Shown {
         name: name.into(),
         encoding: Some(encoding),

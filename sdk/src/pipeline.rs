@@ -60,7 +60,7 @@ impl Pipeline {
         width: usize,
         method: Method,
         display: &Display,
-        encoding: Encoding,
+        encoding: Encoding<'_>,
         scale: Scale,
         response: Response,
     ) -> Result<Self> {
@@ -88,8 +88,8 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): midpoint hologram, mean phase taken out,
-    /// offset. Gives the times of the midpoint hologram and of the offset.
+    /// The field at the modulator, into `field`, (3, H, W): midpoint hologram, mean phase taken out (but for an
+    /// encoding that was trained with it), offset. Gives the times of the midpoint hologram and of the offset.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -101,7 +101,9 @@ impl Pipeline {
     ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
         self.method.field(frame, field, &mut scratch.method)?;
-        remove_mean_phase(field);
+        if !self.modulator.keeps_phase() {
+            remove_mean_phase(field);
+        }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))

@@ -7,7 +7,7 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
-use phasefront::{Pipeline, RgbdFrame};
+use phasefront::{Network, Pipeline, RgbdFrame};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
@@ -42,6 +42,9 @@ pub(crate) struct Hologram {
     /// How the field becomes phases
     #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
     encoder: EncoderName,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
+    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
+    prefilter: Option<String>,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -108,15 +111,27 @@ pub(super) enum EncoderName {
     AntiAlias,
     /// Double phase after a cut of high frequencies (BL-DPM)
     BandLimit,
+    /// Double phase after a pre-filter network (DDPM)
+    Deep,
 }
 
 impl EncoderName {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            EncoderName::Double => Encoding::DoublePhase,
-            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
-            EncoderName::BandLimit => Encoding::BAND_LIMIT,
-        }
+    pub(super) fn encoding(self, prefilter: Option<&Network>) -> Result<Encoding<'_>> {
+        Ok(match (self, prefilter) {
+            (EncoderName::Double, None) => Encoding::DoublePhase,
+            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
+            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
+            (EncoderName::Deep, Some(network)) => Encoding::Deep(network),
+            (EncoderName::Deep, None) => {
+                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Input(format!(
+                    "--prefilter goes with --encoder deep, not with {}",
+                    self.name()
+                )));
+            }
+        })
     }
 
     pub(super) fn name(self) -> &'static str {
@@ -124,6 +139,7 @@ impl EncoderName {
             EncoderName::Double => "double",
             EncoderName::AntiAlias => "anti-alias",
             EncoderName::BandLimit => "band-limit",
+            EncoderName::Deep => "deep",
         }
     }
 }
@@ -149,6 +165,11 @@ impl Hologram {
                 ));
             }
         }
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
+        let encoding = self.encoder.encoding(prefilter.as_ref())?;
         let display = self.display.read()?;
         let response = match display.lut {
             Some(lut) => Response::lut(lut),
@@ -160,7 +181,7 @@ impl Hologram {
         });
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
-                self.by_network(&self.frame.read()?, &display.display, response)?
+                self.by_network(&self.frame.read()?, &display.display, encoding, response)?
             }
             (Method::Network, Some(dir)) => {
                 return Err(Error::file(
@@ -173,7 +194,7 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, response)?
+                self.by_physics(method, &ldi, &display.display, encoding, response)?
             }
         };
         let info = HologramInfo {
@@ -200,6 +221,7 @@ impl Hologram {
         &self,
         frame: &RgbdFrame,
         display: &phasefront::Display,
+        encoding: Encoding<'_>,
         response: Response,
     ) -> Result<Made> {
         let network = models::network(&self.network, self.precision.is_int8())?;
@@ -209,7 +231,7 @@ impl Hologram {
             width,
             phasefront::Method::Network(&network),
             display,
-            self.encoder.encoding(),
+            encoding,
             self.scale(),
             response,
         )?;
@@ -241,17 +263,11 @@ impl Hologram {
         method: Method,
         ldi: &Ldi,
         display: &phasefront::Display,
+        encoding: Encoding<'_>,
         response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(
-            height,
-            width,
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
         let mut scratch = modulator.scratch();
         let start = Instant::now();
         let bar = progress_bar(0, "");
