@@ -180,7 +180,7 @@ fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
 }
 
 /// How a field is shown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,

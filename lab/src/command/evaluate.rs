@@ -99,10 +99,18 @@ impl Evaluate {
             .collect();
         let methods = self.methods(&manifest)?;
         let mut shown = vec![Shown::complex()];
-        shown.extend(self.encoder.iter().map(|encoder| Shown {
-            name: encoder.name().into(),
-            encoding: Some(encoder.encoding()),
-        }));
+        for encoder in &self.encoder {
+            let encoding = encoder.encoding(None).map_err(|_| {
+                Error::Input(format!(
+                    "--encoder {} needs the network that its pre-filter was trained with: `python -m phasefront_training evaluate-encoding` judges the pair",
+                    encoder.name()
+                ))
+            })?;
+            shown.push(Shown {
+                name: encoder.name().into(),
+                encoding: Some(encoding),
+            });
+        }
         if let Some(dir) = &self.pictures {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }

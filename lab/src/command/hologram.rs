@@ -7,13 +7,14 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
-use phasefront::{Pipeline, RgbdFrame, Sweep};
+use phasefront::{Network, Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -45,6 +46,9 @@ pub(crate) struct Hologram {
     /// How the field becomes phases
     #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
     encoder: EncoderName,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
+    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
+    prefilter: Option<String>,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -113,15 +117,27 @@ pub(super) enum EncoderName {
     AntiAlias,
     /// Double phase after a cut of high frequencies (BL-DPM)
     BandLimit,
+    /// Double phase after a pre-filter network (DDPM)
+    Deep,
 }
 
 impl EncoderName {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            EncoderName::Double => Encoding::DoublePhase,
-            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
-            EncoderName::BandLimit => Encoding::BAND_LIMIT,
-        }
+    pub(super) fn encoding(self, prefilter: Option<Network>) -> Result<Encoding> {
+        Ok(match (self, prefilter) {
+            (EncoderName::Double, None) => Encoding::DoublePhase,
+            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
+            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
+            (EncoderName::Deep, Some(network)) => Encoding::Deep(Arc::new(network)),
+            (EncoderName::Deep, None) => {
+                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Input(format!(
+                    "--prefilter goes with --encoder deep, not with {}",
+                    self.name()
+                )));
+            }
+        })
     }
 
     pub(super) fn name(self) -> &'static str {
@@ -129,6 +145,7 @@ impl EncoderName {
             EncoderName::Double => "double",
             EncoderName::AntiAlias => "anti-alias",
             EncoderName::BandLimit => "band-limit",
+            EncoderName::Deep => "deep",
         }
     }
 }
@@ -172,6 +189,11 @@ impl Hologram {
                 ));
             }
         }
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
+        let encoding = self.encoder.encoding(prefilter.as_ref())?;
         let display = self.display.read()?;
         let response = match display.lut {
             Some(lut) => Response::lut(lut),
@@ -184,13 +206,13 @@ impl Hologram {
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
                 let network = models::network(&self.network, self.precision.is_int8())?;
-                let method = phasefront::Method::Network(&network);
-                self.by_pipeline("network", method, &display.display, response)?
+                let method = phasefront::Method::Network(Arc::new(network));
+                self.by_pipeline("network", method, &display.display, encoding, response)?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display.display, response)?
+                self.by_pipeline("sweep", method, &display.display, encoding, response)?
             }
             (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
@@ -203,7 +225,7 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, response)?
+                self.by_physics(method, &ldi, &display.display, encoding, response)?
             }
         };
         let info = HologramInfo {
@@ -232,6 +254,7 @@ impl Hologram {
         stage: &'static str,
         method: phasefront::Method,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
@@ -241,7 +264,7 @@ impl Hologram {
             width,
             method,
             display,
-            self.encoder.encoding(),
+            encoding,
             self.scale(),
             response,
         )?;
@@ -273,17 +296,11 @@ impl Hologram {
         method: Method,
         ldi: &Ldi,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(
-            height,
-            width,
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();

@@ -2,32 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::method::Method;
-use crate::network::Network;
-use std::sync::Arc;
 use std::time::Duration;
-
-/// What makes the midpoint hologram, held by the session. See [`Method`].
-#[derive(Clone)]
-#[non_exhaustive]
-pub enum SessionMethod {
-    /// A trained network for RGB-D frames.
-    Network(Arc<Network>),
-}
-
-impl SessionMethod {
-    /// The same, borrowed.
-    pub fn method(&self) -> Method<'_> {
-        match self {
-            SessionMethod::Network(network) => Method::Network(network),
-        }
-    }
-}
 
 /// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
 #[derive(Clone)]
 pub struct Rung {
     /// What makes the midpoint hologram.
-    pub method: SessionMethod,
+    pub method: Method,
     /// Height of the hologram, pixels.
     pub height: usize,
     /// Width of the hologram, pixels.
@@ -250,8 +231,17 @@ mod tests {
     fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
         let mut ladder = Ladder::new(4, 0);
         let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
-        let to: Vec<_> = steps.iter().map(|(_, c)| (c.from, c.to, c.reason)).collect();
-        assert_eq!(to, [(0, 1, QualityReason::TooSlow), (1, 2, QualityReason::TooSlow)]);
+        let to: Vec<_> = steps
+            .iter()
+            .map(|(_, c)| (c.from, c.to, c.reason))
+            .collect();
+        assert_eq!(
+            to,
+            [
+                (0, 1, QualityReason::TooSlow),
+                (1, 2, QualityReason::TooSlow)
+            ]
+        );
         assert!(steps[1].0 < 20);
     }
 
@@ -295,10 +285,16 @@ mod tests {
             assert_eq!(fixed, None);
         }
         let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
-        assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
+        assert_eq!(
+            asked.map(|c| (c.to, c.reason)),
+            Some((2, QualityReason::Asked))
+        );
         // Without a target rate there is nothing to hold.
         for _ in 0..100 {
-            assert_eq!(ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
+            assert_eq!(
+                ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive),
+                None
+            );
         }
     }
 }
