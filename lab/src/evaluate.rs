@@ -289,7 +289,7 @@ impl Viewer {
     ) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
-        let refocus = match shown.encoding {
+        let refocus = match shown.encoding.clone() {
             None => &self.complex,
             Some(encoding) => {
                 let response = Response::linear(self.display.bits())?;

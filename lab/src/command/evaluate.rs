@@ -1,7 +1,8 @@
 //! `phasefront evaluate`: the paper's Table 2 on a data set.
 
+use super::flags::EncoderName;
 use super::flags::progress_bar;
-use super::hologram::{EncoderName, PrecisionName, sweep_for};
+use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
 use phasefront::sweep::MAX_HIDDEN_LAYERS;
 use phasefront::{Display, Sweep};

@@ -1,20 +1,19 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, FrameFlags, progress_bar};
+use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
-use phasefront::{Network, Pipeline, RgbdFrame, Sweep};
+use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -43,12 +42,8 @@ pub(crate) struct Hologram {
     /// What keeps light from where it should not go, for --method points
     #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
     occlusion: OcclusionName,
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
-    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
-    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
-    prefilter: Option<String>,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -109,47 +104,6 @@ impl PrecisionName {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum EncoderName {
-    /// Double phase
-    Double,
-    /// Double phase after a small blur (AA-DPM)
-    AntiAlias,
-    /// Double phase after a cut of high frequencies (BL-DPM)
-    BandLimit,
-    /// Double phase after a pre-filter network (DDPM)
-    Deep,
-}
-
-impl EncoderName {
-    pub(super) fn encoding(self, prefilter: Option<Network>) -> Result<Encoding> {
-        Ok(match (self, prefilter) {
-            (EncoderName::Double, None) => Encoding::DoublePhase,
-            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
-            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
-            (EncoderName::Deep, Some(network)) => Encoding::Deep(Arc::new(network)),
-            (EncoderName::Deep, None) => {
-                return Err(Error::Input("--encoder deep needs --prefilter".into()));
-            }
-            (_, Some(_)) => {
-                return Err(Error::Input(format!(
-                    "--prefilter goes with --encoder deep, not with {}",
-                    self.name()
-                )));
-            }
-        })
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            EncoderName::Double => "double",
-            EncoderName::AntiAlias => "anti-alias",
-            EncoderName::BandLimit => "band-limit",
-            EncoderName::Deep => "deep",
-        }
-    }
-}
-
 /// Planes of the methods of exact waves.
 const DEFAULT_PLANES: usize = 256;
 
@@ -189,11 +143,7 @@ impl Hologram {
                 ));
             }
         }
-        let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, false)?),
-            None => None,
-        };
-        let encoding = self.encoder.encoding(prefilter.as_ref())?;
+        let encoding = self.encoder.read()?;
         let display = self.display.read()?;
         let response = match display.lut {
             Some(lut) => Response::lut(lut),
@@ -206,7 +156,7 @@ impl Hologram {
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
                 let network = models::network(&self.network, self.precision.is_int8())?;
-                let method = phasefront::Method::Network(Arc::new(network));
+                let method = phasefront::Method::Network(network);
                 self.by_pipeline("network", method, &display.display, encoding, response)?
             }
             (Method::Sweep, None) => {

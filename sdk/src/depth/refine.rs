@@ -390,12 +390,12 @@ impl Refiner {
             let least = depths.into_iter().fold(f32::INFINITY, f32::min);
             let most = depths.into_iter().fold(f32::NEG_INFINITY, f32::max);
             if most - least <= TOLERANCE {
-                for x in x..end {
-                    row[x] = bilinear(&depths, self.x.offset[x], offset_y);
+                for (to, offset_x) in row[x..end].iter_mut().zip(&self.x.offset[x..end]) {
+                    *to = bilinear(&depths, *offset_x, offset_y);
                 }
             } else {
                 let colours = around.map(|i| readings.guide[i]);
-                for x in x..end {
+                for (x, to) in (x..end).zip(&mut row[x..end]) {
                     let at = y * out_width + x;
                     let colour = std::array::from_fn(|c| rgb[c * out_height * out_width + at]);
                     let mut votes: [Vote; 9] = std::array::from_fn(|k| {
@@ -407,7 +407,7 @@ impl Refiner {
                             near * self.up_colour.of(apart(colours[k], colour)),
                         )
                     });
-                    row[x] = surface(&mut votes);
+                    *to = surface(&mut votes);
                 }
             }
             x = end;
