@@ -11,6 +11,7 @@ use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
 use phasefront::{Display, Modulator, Network};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 struct Counting;
@@ -51,7 +52,7 @@ fn hot_calls_allocate_nothing() {
     let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
-    let prefilter = Network::from_onnx(&Model::prefilter("6").bytes()).unwrap();
+    let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -68,10 +69,11 @@ fn hot_calls_allocate_nothing() {
                 Encoding::DoublePhase,
                 Encoding::ANTI_ALIAS,
                 Encoding::BAND_LIMIT,
-                Encoding::Deep(&prefilter),
+                Encoding::Deep(prefilter.clone()),
             ] {
                 let response = Response::linear(8).unwrap();
-                let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response).unwrap();
+                let plan =
+                    Modulator::new(h, w, &display, encoding.clone(), Scale::Max, response).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
