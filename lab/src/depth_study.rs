@@ -185,7 +185,7 @@ pub fn study(
     seed: u64,
     planes: usize,
     display: &Display,
-    methods: &[(String, Method<'_>)],
+    methods: &[(String, Method)],
     done: &dyn Fn(),
 ) -> Result<Vec<Row>> {
     if scenes == 0 {
@@ -193,7 +193,12 @@ pub fn study(
     }
     let shape = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
     let plans = (methods.iter())
-        .map(|(name, method)| Ok((name, MethodPlan::new(shape.0, shape.1, *method, display)?)))
+        .map(|(name, method)| {
+            Ok((
+                name,
+                MethodPlan::new(shape.0, shape.1, method.clone(), display)?,
+            ))
+        })
         .collect::<Result<Vec<_>>>()?;
     let mut rows: Vec<Row> = Vec::new();
     for scene in 0..scenes as u64 {

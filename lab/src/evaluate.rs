@@ -180,7 +180,7 @@ fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
 }
 
 /// How a field is shown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,
@@ -289,7 +289,7 @@ impl Viewer {
     ) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
-        let refocus = match shown.encoding {
+        let refocus = match shown.encoding.clone() {
             None => &self.complex,
             Some(encoding) => {
                 let response = Response::linear(self.display.bits())?;

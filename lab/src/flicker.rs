@@ -7,8 +7,8 @@ use crate::ldi::Ldi;
 use crate::scene;
 use phasefront::depth::image::{DepthFormat, DepthImage};
 use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
-use phasefront::session::{Brightness, RunningMode, SessionMethod, SessionOptions};
-use phasefront::{Display, Session};
+use phasefront::session::{Brightness, RunningMode, SessionOptions};
+use phasefront::{Display, Method, Session};
 use serde::Serialize;
 
 /// Noise and missing readings, new in each frame.
@@ -78,7 +78,7 @@ pub fn study(
     seed: u64,
     frames: usize,
     display: &Display,
-    method: &SessionMethod,
+    method: &Method,
     done: &dyn Fn(),
 ) -> Result<Vec<Row>> {
     if frames < 2 {

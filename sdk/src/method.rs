@@ -6,16 +6,17 @@ use crate::frame::RgbdFrame;
 use crate::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::sweep::{self, Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
+use std::sync::Arc;
 
 /// How far a display may lie from what a network was trained for, relative.
 const DISPLAY_TOLERANCE: f64 = 0.02;
 
 /// What makes the hologram.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
-pub enum Method<'a> {
+pub enum Method {
     /// A trained network for RGB-D frames.
-    Network(&'a Network),
+    Network(Arc<Network>),
     /// The plane sweep, for any display.
     Sweep(Sweep),
 }
@@ -53,7 +54,7 @@ impl MethodPlan {
                         network.input().channels()
                     )));
                 }
-                check_display(network, display)?;
+                check_display(&network, display)?;
                 Way::Network(Box::new(network.plan(height, width)?))
             }
             Method::Sweep(sweep) => {

@@ -7,6 +7,7 @@
 //! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
 pub mod chain;
+mod filter;
 mod fused;
 mod head;
 mod metadata;
@@ -17,6 +18,7 @@ mod stock;
 mod tensor;
 
 pub use chain::Precision;
+pub use filter::{FilterPlan, FilterScratch};
 pub use head::Head;
 pub use metadata::{InputKind, TrainedDisplay};
 
@@ -42,13 +44,23 @@ pub trait Source: Sync {
 }
 
 /// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
-#[derive(Debug)]
 pub struct Network {
     chain: Chain,
     input: InputKind,
     head: Head,
     display: TrainedDisplay,
     proto: ModelProto,
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (layers, filters) = (self.layers(), self.filters());
+        let (input, precision) = (self.input, self.precision());
+        write!(
+            f,
+            "Network({input}, {layers} layers of {filters} filters, {precision})"
+        )
+    }
 }
 
 impl Network {
@@ -172,25 +184,52 @@ impl Network {
 
     fn fused_plan(&self, height: usize, width: usize, chain: FusedChain) -> Result<NetworkPlan> {
         check_size(height, width, MAX_PIXELS)?;
-        let isa = chain.isa();
-        let why = format!(
-            "{} layers of {} filters in {}: one fused chain",
-            self.layers(),
-            self.filters(),
-            self.precision()
-        );
+        let engine = self.fused_engine(&chain);
         Ok(NetworkPlan {
             input: self.input,
             head: self.head,
             height,
             width,
             path: Path::Fused(chain),
-            engine: Engine {
-                name: isa.name(),
-                isa: Some(isa),
-                why,
-            },
+            engine,
         })
+    }
+
+    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels.
+    ///
+    /// # Errors
+    /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
+    /// empty field or one too large.
+    pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
+        if self.input != InputKind::Field {
+            return Err(Error::Network(format!(
+                "a pre-filter takes 'field', this network '{}'",
+                self.input
+            )));
+        }
+        let chain = FusedChain::new(&self.chain, None)
+            .map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
+        check_size(height, width, MAX_PIXELS)?;
+        Ok(FilterPlan {
+            engine: self.fused_engine(&chain),
+            chain,
+            head: self.head,
+            size: (height, width),
+        })
+    }
+
+    fn fused_engine(&self, chain: &FusedChain) -> Engine {
+        let isa = chain.isa();
+        Engine {
+            name: isa.name(),
+            isa: Some(isa),
+            why: format!(
+                "{} layers of {} filters in {}: one fused chain",
+                self.layers(),
+                self.filters(),
+                self.precision()
+            ),
+        }
     }
 
     /// The network as a tract graph of any frame size, its chain one fused operator: for graphs built around it.

@@ -92,8 +92,8 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out,
-    /// the rest of the offset. Gives the times of the method and of the rest.
+    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out (but for an
+    /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -105,7 +105,9 @@ impl Pipeline {
     ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
         self.method.field(frame, field, &mut scratch.method)?;
-        remove_mean_phase(field);
+        if !self.modulator.keeps_phase() {
+            remove_mean_phase(field);
+        }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))

@@ -22,13 +22,14 @@ pub use crate::depth::stream::DepthOptions;
 pub use brightness::Brightness;
 pub use event::{DropReason, Event};
 pub use hologram::Hologram;
-pub use quality::{Quality, QualityChange, QualityReason, Rung, SessionMethod, Thermal};
+pub use quality::{Quality, QualityChange, QualityReason, Rung, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
 use crate::display::Display;
 use crate::encode::Encoding;
 use crate::error::{Error, Result};
 use crate::frame::CameraFrame;
+use crate::method::Method;
 use crate::slm::Response;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
@@ -70,7 +71,7 @@ impl SessionOptions {
     ///
     /// # Errors
     /// None for a display that could be made.
-    pub fn new(display: Display, method: SessionMethod) -> Result<Self> {
+    pub fn new(display: Display, method: Method) -> Result<Self> {
         let rung = Rung {
             method,
             height: display.height(),
@@ -162,13 +163,13 @@ enum Mode {
 /// ```no_run
 /// use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
 /// use phasefront::depth::image::{DepthFormat, DepthImage};
-/// use phasefront::session::{Event, RunningMode, SessionMethod, SessionOptions};
-/// use phasefront::{Display, Network, Session};
+/// use phasefront::session::{Event, RunningMode, SessionOptions};
+/// use phasefront::{Display, Method, Network, Session};
 /// use std::sync::Arc;
 ///
 /// # fn camera() -> (u64, Vec<u8>, Vec<u8>) { unimplemented!() }
 /// let network = Network::from_onnx(&std::fs::read("rgbd-8-int8.onnx").expect("a network"))?;
-/// let method = SessionMethod::Network(Arc::new(network));
+/// let method = Method::Network(Arc::new(network));
 /// let options = SessionOptions::new(Display::default(), method)?;
 /// let session = Session::new(options, RunningMode::Live(Box::new(|event| match event {
 ///     Event::Hologram(hologram) => println!("{} bytes", hologram.levels().len()),

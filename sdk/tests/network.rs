@@ -244,6 +244,65 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
 }
 
 #[test]
+fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
+    let residual = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(8, 8)
+    };
+    let models = [
+        Model {
+            int8: true,
+            ..residual.clone()
+        },
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            layers: 3,
+            ..residual.clone()
+        },
+        residual,
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for (height, width) in [(1, 1), (7, 5), (150, 70)] {
+            let values = frame(6, height, width, 3);
+            let area = height * width;
+            let plan = network.plan(height, width).unwrap();
+            let mut output = vec![0.0; 6 * area];
+            plan.run(&values, &mut output, &mut plan.scratch()).unwrap();
+            let mut expected = vec![Complex32::ZERO; 3 * area];
+            network
+                .head()
+                .field(InputKind::Field, &output, &values, &mut expected)
+                .unwrap();
+            let plan = network.filter_plan(height, width).unwrap();
+            let mut scratch = plan.scratch();
+            for threads in [1, 2, 5] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let mut field: Vec<_> = (0..3 * area)
+                    .map(|i| Complex32::new(values[i], values[3 * area + i]))
+                    .collect();
+                let filter = || plan.filter(&mut field, &mut scratch);
+                pool.build().unwrap().install(filter);
+                assert_eq!(field, expected, "{width}×{height} on {threads}");
+            }
+        }
+    }
+    let other = Network::from_onnx(&Model::new(3, 8).bytes()).unwrap();
+    let why = other.filter_plan(4, 4).err().unwrap().to_string();
+    assert!(why.contains("takes 'field', this network 'rgbd'"), "{why}");
+    let odd = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(3, 5)
+    };
+    let odd = Network::from_onnx(&odd.bytes()).unwrap();
+    let why = odd.filter_plan(4, 4).err().unwrap().to_string();
+    assert!(why.contains("5 filters"), "{why}");
+}
+
+#[test]
 fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
     use tract_onnx::prelude::*;
     for model in [

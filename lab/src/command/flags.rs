@@ -2,12 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use phasefront::RgbdFrame;
 use phasefront::depth::DepthUnit;
+use phasefront::encode::Encoding;
+use phasefront::{Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::rgbd::{self, DepthOptions};
-use phasefront_lab::{Error, Result};
+use phasefront_lab::{Error, Result, models};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The display that a hologram is for.
 #[derive(Args)]
@@ -33,6 +35,72 @@ impl DisplayFlags {
             file.display = file.display.with_offset_m(mm / 1e3)?;
         }
         Ok(file)
+    }
+}
+
+/// How the field becomes phases.
+#[derive(Args)]
+pub(crate) struct EncoderFlags {
+    /// How the field becomes phases
+    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
+    encoder: EncoderName,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
+    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
+    prefilter: Option<String>,
+}
+
+impl EncoderFlags {
+    pub(crate) fn read(&self) -> Result<Encoding> {
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
+        self.encoder.encoding(prefilter)
+    }
+
+    pub(crate) fn name(&self) -> &'static str {
+        self.encoder.name()
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum EncoderName {
+    /// Double phase
+    Double,
+    /// Double phase after a small blur (AA-DPM)
+    AntiAlias,
+    /// Double phase after a cut of high frequencies (BL-DPM)
+    BandLimit,
+    /// Double phase after a pre-filter network (DDPM)
+    Deep,
+}
+
+impl EncoderName {
+    pub(crate) fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
+        Ok(match (self, prefilter) {
+            (EncoderName::Double, None) => Encoding::DoublePhase,
+            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
+            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
+            (EncoderName::Deep, Some(network)) => Encoding::Deep(network),
+            (EncoderName::Deep, None) => {
+                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Input(format!(
+                    "--prefilter goes with --encoder deep, not with {}",
+                    self.name()
+                )));
+            }
+        })
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            EncoderName::Double => "double",
+            EncoderName::AntiAlias => "anti-alias",
+            EncoderName::BandLimit => "band-limit",
+            EncoderName::Deep => "deep",
+        }
     }
 }
 

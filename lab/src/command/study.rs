@@ -4,7 +4,6 @@
 use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use phasefront::Method;
-use phasefront::session::SessionMethod;
 use phasefront::sweep::Sweep;
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
 use phasefront_lab::plot::{self, Panel};
@@ -12,7 +11,6 @@ use phasefront_lab::study::{self, Row, Scenes};
 use phasefront_lab::{Error, Result, files, flicker, models};
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Study how many layers or planes a hologram needs, what refined depth is worth, and how much video flickers
 #[derive(Args)]
@@ -120,7 +118,7 @@ impl Study {
         let planes = self.planes.unwrap_or(256) as usize;
         let network = models::network("8", true)?;
         let methods = [
-            ("network".to_owned(), Method::Network(&network)),
+            ("network".to_owned(), Method::Network(network)),
             (
                 "sweep".to_owned(),
                 Method::Sweep(Sweep::for_display(&display)),
@@ -157,7 +155,7 @@ impl Study {
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
         let display = self.display.read()?.display.with_size(height, width)?;
-        let method = SessionMethod::Network(Arc::new(models::network("8", true)?));
+        let method = Method::Network(models::network("8", true)?);
         let scenes = usize::from(self.scenes);
         let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
         let mut rows: Vec<flicker::Row> = Vec::new();

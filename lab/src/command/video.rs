@@ -1,17 +1,17 @@
 //! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
 
-use super::flags::{DepthFlags, DisplayFlags, parse_size, progress_bar};
-use super::hologram::{EncoderName, PrecisionName};
+use super::flags::{DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar};
+use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use ndarray::ArrayView3;
 use phasefront::depth::DepthUnit;
 use phasefront::depth::range::DepthRange;
 use phasefront::session::{
-    Brightness, Event, Hologram, Quality, RunningMode, SessionMethod, SessionOptions, Statistics,
+    Brightness, Event, Hologram, Quality, RunningMode, SessionOptions, Statistics,
 };
 use phasefront::slm::Response;
 use phasefront::sweep::Sweep;
-use phasefront::{Display, Session};
+use phasefront::{Display, Method, Session};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::video::{self, RawVideo, VideoFrame};
 use phasefront_lab::{Error, Result, models};
@@ -43,9 +43,8 @@ pub(crate) struct Video {
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// Size of the holograms [default: the first frame's colour]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(usize, usize)>,
@@ -269,17 +268,16 @@ impl Video {
         let (width, height) = self.size.unwrap_or((width, height));
         let display: Display = file.display.with_size(height, width)?;
         let method = match self.method {
-            MethodName::Network => SessionMethod::Network(Arc::new(models::network(
-                &self.network,
-                self.precision.is_int8(),
-            )?)),
-            MethodName::Sweep => SessionMethod::Sweep(Sweep::for_display(&display)),
+            MethodName::Network => {
+                Method::Network(models::network(&self.network, self.precision.is_int8())?)
+            }
+            MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
         if let Some(lut) = file.lut {
             options.response = Response::lut(lut);
         }
-        options.encoding = self.encoder.encoding();
+        options.encoding = self.encoder.read()?;
         options.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
             BrightnessName::Max => Brightness::FrameMax,

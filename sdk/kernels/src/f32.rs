@@ -116,6 +116,11 @@ impl F32Chain {
         self.isa
     }
 
+    /// How many layers.
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
     /// The tiling that suits a frame size and the current rayon pool.
     pub fn tiling(&self, height: usize, width: usize) -> Tiling {
         wavefront::tiling_for(self, height, width)

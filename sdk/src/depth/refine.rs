@@ -389,26 +389,26 @@ impl Refiner {
             let depths = around.map(|i| readings.depth[i]);
             let least = depths.into_iter().fold(f32::INFINITY, f32::min);
             let most = depths.into_iter().fold(f32::NEG_INFINITY, f32::max);
-            let colours = around.map(|i| readings.guide[i]);
-            let one_surface = most - least <= TOLERANCE;
-            for (x, value) in (x..end).zip(&mut row[x..end]) {
-                *value = match one_surface {
-                    true => bilinear(&depths, self.x.offset[x], offset_y),
-                    false => {
-                        let at = y * out_width + x;
-                        let colour = std::array::from_fn(|c| rgb[c * out_height * out_width + at]);
-                        let mut votes: [Vote; 9] = std::array::from_fn(|k| {
-                            let dx = (k % 3) as f32 - 1.0 - self.x.offset[x];
-                            let dy = (k / 3) as f32 - 1.0 - offset_y;
-                            let near = self.up_near.of(dx * dx + dy * dy);
-                            (
-                                depths[k],
-                                near * self.up_colour.of(apart(colours[k], colour)),
-                            )
-                        });
-                        surface(&mut votes)
-                    }
-                };
+            if most - least <= TOLERANCE {
+                for (to, offset_x) in row[x..end].iter_mut().zip(&self.x.offset[x..end]) {
+                    *to = bilinear(&depths, *offset_x, offset_y);
+                }
+            } else {
+                let colours = around.map(|i| readings.guide[i]);
+                for (x, to) in (x..end).zip(&mut row[x..end]) {
+                    let at = y * out_width + x;
+                    let colour = std::array::from_fn(|c| rgb[c * out_height * out_width + at]);
+                    let mut votes: [Vote; 9] = std::array::from_fn(|k| {
+                        let dx = (k % 3) as f32 - 1.0 - self.x.offset[x];
+                        let dy = (k / 3) as f32 - 1.0 - offset_y;
+                        let near = self.up_near.of(dx * dx + dy * dy);
+                        (
+                            depths[k],
+                            near * self.up_colour.of(apart(colours[k], colour)),
+                        )
+                    });
+                    *to = surface(&mut votes);
+                }
             }
             x = end;
         }

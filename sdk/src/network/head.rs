@@ -83,33 +83,36 @@ impl Head {
         base: impl Fn(usize, usize, &mut [f32]),
         field: [&mut [Complex32]; 3],
     ) {
+        if self == Head::AmplitudePhase {
+            return Self::amplitude_phase(values, field);
+        }
         for (c, field) in field.into_iter().enumerate() {
             let (first, second) = (values[c], values[3 + c]);
-            match (self, kind) {
-                (Head::AmplitudePhase, _) => {
-                    for ((out, a), p) in field.iter_mut().zip(first).zip(second) {
-                        let amplitude = (a + 1.0) * std::f32::consts::FRAC_1_SQRT_2;
-                        let (sin, cos) = sin_cos_pi(*p);
-                        *out = Complex32::new(amplitude * cos, amplitude * sin);
-                    }
+            let (mut re, mut im) = ([0.0; PIECE], [0.0; PIECE]);
+            for (piece, out) in field.chunks_mut(PIECE).enumerate() {
+                let (at, count) = (piece * PIECE, out.len());
+                base(c, at, &mut re[..count]);
+                if kind == InputKind::Field {
+                    base(3 + c, at, &mut im[..count]);
+                } else {
+                    // Colours come in minus a half.
+                    re[..count].iter_mut().for_each(|re| *re += 0.5);
                 }
-                (Head::RealImaginary, _) => {
-                    let (mut re, mut im) = ([0.0; PIECE], [0.0; PIECE]);
-                    for (piece, out) in field.chunks_mut(PIECE).enumerate() {
-                        let (at, count) = (piece * PIECE, out.len());
-                        base(c, at, &mut re[..count]);
-                        if kind == InputKind::Field {
-                            base(3 + c, at, &mut im[..count]);
-                        } else {
-                            // Colours come in minus a half.
-                            re[..count].iter_mut().for_each(|re| *re += 0.5);
-                        }
-                        let parts = out.iter_mut().zip(&first[at..]).zip(&second[at..]);
-                        for (((out, first), second), (re, im)) in parts.zip(re.iter().zip(&im)) {
-                            *out = Complex32::new(re + first, im + second);
-                        }
-                    }
+                let parts = out.iter_mut().zip(&first[at..]).zip(&second[at..]);
+                for (((out, first), second), (re, im)) in parts.zip(re.iter().zip(&im)) {
+                    *out = Complex32::new(re + first, im + second);
                 }
+            }
+        }
+    }
+
+    /// A run of pixels of [`Head::AmplitudePhase`].
+    pub(super) fn amplitude_phase(values: [&[f32]; 6], field: [&mut [Complex32]; 3]) {
+        for (c, field) in field.into_iter().enumerate() {
+            for ((out, a), p) in field.iter_mut().zip(values[c]).zip(values[3 + c]) {
+                let amplitude = (a + 1.0) * std::f32::consts::FRAC_1_SQRT_2;
+                let (sin, cos) = sin_cos_pi(*p);
+                *out = Complex32::new(amplitude * cos, amplitude * sin);
             }
         }
     }

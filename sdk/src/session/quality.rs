@@ -2,36 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::method::Method;
-use crate::network::Network;
-use crate::sweep::Sweep;
-use std::sync::Arc;
 use std::time::Duration;
-
-/// What makes the midpoint hologram, held by the session. See [`Method`].
-#[derive(Clone)]
-#[non_exhaustive]
-pub enum SessionMethod {
-    /// A trained network for RGB-D frames.
-    Network(Arc<Network>),
-    /// The plane sweep, for any display.
-    Sweep(Sweep),
-}
-
-impl SessionMethod {
-    /// The same, borrowed.
-    pub fn method(&self) -> Method<'_> {
-        match self {
-            SessionMethod::Network(network) => Method::Network(network),
-            SessionMethod::Sweep(sweep) => Method::Sweep(*sweep),
-        }
-    }
-}
 
 /// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
 #[derive(Clone)]
 pub struct Rung {
     /// What makes the midpoint hologram.
-    pub method: SessionMethod,
+    pub method: Method,
     /// Height of the hologram, pixels.
     pub height: usize,
     /// Width of the hologram, pixels.

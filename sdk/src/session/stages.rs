@@ -92,9 +92,9 @@ impl Stages {
             let pipeline = Pipeline::new(
                 height,
                 width,
-                rung.method.method(),
+                rung.method.clone(),
                 &self.options.display,
-                self.options.encoding,
+                self.options.encoding.clone(),
                 Scale::Max,
                 self.options.response.clone(),
             )?;

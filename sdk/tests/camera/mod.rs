@@ -1,9 +1,10 @@
 //! A camera for tests: frames of a synthetic scene in every format, with strides and gaps as they come.
 #![allow(dead_code)]
 
+use phasefront::Method;
 use phasefront::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
 use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane, YuvEncoding, YuvMatrix};
-use phasefront::session::{SessionMethod, SessionOptions};
+use phasefront::session::SessionOptions;
 use phasefront::{Display, Network, Result};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -202,7 +203,7 @@ pub(crate) fn with_confidence<'a>(
 /// A small display and the shipped network.
 pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
-    let method = SessionMethod::Network(Arc::new(network.expect("a hologram network")));
+    let method = Method::Network(Arc::new(network.expect("a hologram network")));
     let display = Display::from_toml(&format!(
         "width = {width}\nheight = {height}\noffset_mm = 2"
     ));
