@@ -8,8 +8,6 @@ use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, RUN};
 use std::ops::Range;
 
-/// Rows that are filtered along x before they are filtered along y.
-const BAND: usize = 32;
 /// Pixels of halo beyond light's reach: a fitted filter's light runs a little ahead.
 const HALO_MARGIN: usize = 4;
 
@@ -76,10 +74,11 @@ impl Layout {
     pub(super) fn scratch(&self) -> TileScratch {
         let rows = self.tile + 2 * self.border;
         let plane = || vec![0.0; rows * self.stride];
-        let strip = || vec![0.0; (BAND + 2 * self.longest) * self.stride];
+        let ring = || vec![0.0; (2 * self.longest + 1) * self.stride];
         TileScratch {
             field: [plane(), plane()],
-            strip: [strip(), strip()],
+            ring: [ring(), ring()],
+            places: vec![[0; 2]; self.longest + 1],
             starts: vec![0; self.halos.len() + 1],
             points: Vec::new(),
         }
@@ -96,8 +95,10 @@ impl Layout {
 pub(super) struct TileScratch {
     /// Real and imaginary part, rows of `stride`.
     field: [Vec<f32>; 2],
-    /// Rows filtered along x.
-    strip: [Vec<f32>; 2],
+    /// The last rows filtered along x.
+    ring: [Vec<f32>; 2],
+    /// Where the taps' rows or columns lie.
+    places: Vec<[usize; 2]>,
     /// Where each plane's points start, and the end.
     starts: Vec<u32>,
     points: Vec<Point>,
@@ -260,7 +261,8 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Filters the field in place, for the tile and `halo` around it: a band of rows along x, then along y.
+    /// Filters the field in place, for the tile and `halo` around it: a row along x into the ring, and as soon as its
+    /// neighbours below are there too, along y back into the field.
     fn filter(&self, taps: &[[f32; 2]], halo: usize, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let radius = taps.len() - 1;
@@ -269,36 +271,32 @@ impl<'a> Tile<'a> {
         let left = border - halo;
         let run = (self.columns.len() + 2 * halo).next_multiple_of(RUN);
         let [field_re, field_im] = &mut scratch.field;
-        let [strip_re, strip_im] = &mut scratch.strip;
-        let mut filled = top - radius;
-        for y in (top..bottom).step_by(BAND) {
-            let end = (y + BAND).min(bottom);
-            // Row r of the field lies filtered along x in row r − (y − radius) of the strip.
-            let base = y - radius;
-            if y > top {
-                let kept = 2 * radius * run;
-                for strip in [&mut *strip_re, &mut *strip_im] {
-                    strip.copy_within(BAND * run..BAND * run + kept, 0);
+        let [ring_re, ring_im] = &mut scratch.ring;
+        let places = &mut scratch.places[..=radius];
+        let slot = |row: usize| row % (2 * radius + 1) * run;
+        for row in top - radius..bottom + radius {
+            let centre = row * stride + left;
+            for (j, place) in places.iter_mut().enumerate() {
+                *place = [centre - j, centre + j];
+            }
+            let out = slot(row)..slot(row) + run;
+            self.fir.filter(
+                taps,
+                [field_re, field_im],
+                places,
+                [&mut ring_re[out.clone()], &mut ring_im[out]],
+            );
+            // Row r needs rows up to r + radius.
+            if row >= top + radius {
+                let row = row - radius;
+                for (j, place) in places.iter_mut().enumerate() {
+                    *place = [slot(row - j), slot(row + j)];
                 }
-            }
-            for row in filled..end + radius {
-                let out = (row - base) * run..(row - base + 1) * run;
-                self.fir.filter(
-                    taps,
-                    [field_re, field_im],
-                    row * stride + left,
-                    1,
-                    [&mut strip_re[out.clone()], &mut strip_im[out]],
-                );
-            }
-            filled = end + radius;
-            for row in y..end {
                 let out = row * stride + left..row * stride + left + run;
                 self.fir.filter(
                     taps,
-                    [strip_re, strip_im],
-                    (row - base) * run,
-                    run,
+                    [ring_re, ring_im],
+                    places,
                     [&mut field_re[out.clone()], &mut field_im[out]],
                 );
             }
