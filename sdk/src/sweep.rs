@@ -193,6 +193,7 @@ impl SweepPlan {
             sweep.tile,
             sweep.planes,
             |k| reach_px(display, way_m(k)).ceil() as usize,
+            |k| reach_px(display, k as f64 * optics[0].step_m).ceil() as usize,
             &filters,
         );
         Ok(SweepPlan {
