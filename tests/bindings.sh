@@ -1,0 +1,38 @@
+# Sourced by the tests of the bindings: the library as it ships, and the way to say that a test cannot run.
+# shellcheck shell=bash
+
+cache="${XDG_CACHE_HOME:-$HOME/.cache}/phasefront"
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$cache/target}"
+mkdir -p "$cache"
+
+need() { command -v "$1" >/dev/null; }
+
+# Ends the test with 77: it cannot run here, and $1 says why.
+cannot() {
+    echo "$1"
+    exit 77
+}
+
+# Runs a command as root, or fails.
+as_root() {
+    if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+}
+
+# Installs Debian packages, or fails.
+install() {
+    need apt-get || return 1
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1 && return
+    as_root apt-get update -qq >/dev/null 2>&1
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1
+}
+
+# Builds the library with the features that ship, and the generator: in two goes, for the generator's features
+# would become the library's. Sets `library` and `generator`.
+build_library() {
+    need cargo || PATH="$HOME/.cargo/bin:$PATH"
+    need cargo || cannot 'cargo is missing; see https://rustup.rs'
+    cargo build --release --quiet -p phasefront-ffi || exit 1
+    cargo build --release --quiet -p phasefront-bindgen || exit 1
+    library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
+    generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"
+}
