@@ -1,9 +1,17 @@
-//! Depth as sensors and files give it, to normalized depth: units, range, holes.
+//! Depth as sensors and files give it, to normalized depth: units, range, holes; and the depth images of phones,
+//! aligned with colour, steadied over time, and refined to the display's resolution.
 //!
 //! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
 
+pub mod align;
+pub mod image;
+pub mod range;
+pub mod refine;
+pub mod steady;
+pub mod stream;
+
 use crate::error::{Error, Result};
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2};
 
 /// What the numbers of a depth image mean. But for [`DepthUnit::Normalized`], 0, negative numbers and
 /// what is not finite mean no reading.
@@ -84,7 +92,7 @@ pub fn normalize(
             "normalized depth holds {bad}; it must lie in 0..=1, or another depth unit be named"
         )));
     }
-    let filled = fill_nearest(&mut metres)?;
+    let filled = fill_nearest(&mut metres.view_mut())?;
     if normalized {
         return Ok(NormalizedDepth {
             depth: metres,
@@ -136,7 +144,7 @@ fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
 ///
 /// # Errors
 /// If nothing but NaN is there.
-pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
+pub fn fill_nearest(depth: &mut ArrayViewMut2<'_, f32>) -> Result<usize> {
     let (height, width) = depth.dim();
     let holes = depth.iter().filter(|v| v.is_nan()).count();
     if holes == depth.len() {
@@ -218,11 +226,11 @@ mod tests {
             [0.2, nan, nan, nan],
             [nan, nan, nan, nan]
         ];
-        assert_eq!(fill_nearest(&mut depth).unwrap(), 10);
+        assert_eq!(fill_nearest(&mut depth.view_mut()).unwrap(), 10);
         assert_eq!(depth[(2, 0)], 0.2);
         assert_eq!(depth[(1, 3)], 0.7);
         assert!(depth.iter().all(|v| *v == 0.2 || *v == 0.7));
-        assert!(fill_nearest(&mut Array2::from_elem((2, 2), nan)).is_err());
+        assert!(fill_nearest(&mut Array2::from_elem((2, 2), nan).view_mut()).is_err());
     }
 
     #[test]

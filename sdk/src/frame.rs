@@ -1,6 +1,22 @@
-//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth.
+//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth; and the colour
+//! images of cameras that become it.
 //!
 //! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
+
+mod camera;
+mod colour;
+mod convert;
+mod plane;
+pub mod reference;
+mod resample;
+
+pub use camera::{Alignment, CameraFrame};
+pub(crate) use colour::check_size;
+pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
+pub use convert::{ColourPlan, ColourScratch};
+pub use plane::{Orientation, Plane, Rotation};
+pub(crate) use resample::Axis;
+pub use resample::Crop;
 
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
@@ -50,6 +66,20 @@ impl RgbdFrame {
             rgb: rgb.as_standard_layout().into_owned(),
             depth: depth.as_standard_layout().into_owned(),
         })
+    }
+
+    /// A black frame at the far end of the volume.
+    pub(crate) fn black((height, width): (usize, usize)) -> Self {
+        RgbdFrame {
+            rgb: Array3::zeros((3, height, width)),
+            depth: Array2::ones((height, width)),
+        }
+    }
+
+    /// Colour and depth to write into; what is written must be in \[0, 1].
+    pub(crate) fn planes_mut(&mut self) -> (&mut [f32], &mut [f32]) {
+        let planes = self.rgb.as_slice_mut().zip(self.depth.as_slice_mut());
+        planes.expect("both are made in standard layout")
     }
 
     /// (H, W).

@@ -16,7 +16,9 @@ pub mod method;
 pub mod modulator;
 pub mod network;
 pub mod pipeline;
+pub mod preview;
 pub mod refocus;
+pub mod session;
 pub mod slm;
 pub mod wave;
 
@@ -27,6 +29,7 @@ pub use method::Method;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};
 pub use pipeline::Pipeline;
+pub use session::Session;
 
 /// The README's code compiles.
 #[cfg(doctest)]

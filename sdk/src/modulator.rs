@@ -111,14 +111,24 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
+        self.modulate_at(field, self.scale, levels, scratch)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
         let start = Instant::now();
-        let scale = self.encoder.encode_levels(
-            field,
-            self.scale,
-            &self.response,
-            levels,
-            &mut scratch.encoder,
-        );
+        let scale =
+            self.encoder
+                .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),

@@ -121,6 +121,21 @@ impl Pipeline {
             .modulate(field, levels, &mut scratch.modulator)
     }
 
+    /// [`Self::modulate`] at another scale than the planned one: a session chooses it for each frame.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .modulate_at(field, scale, levels, &mut scratch.modulator)
+    }
+
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as
     /// the encoder's filter made it.
     ///
