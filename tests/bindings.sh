@@ -27,11 +27,14 @@ install() {
 }
 
 # Builds the library with the features that ship, and the generator: in two goes, for the generator's features
-# would become the library's. Sets `library` and `generator`.
+# would become the library's. Runs the conformance suite from Rust, whose levels the other languages compare with.
+# Sets `library` and `generator`.
 build_library() {
     need cargo || PATH="$HOME/.cargo/bin:$PATH"
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
+    export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"
     cargo build --release --quiet -p phasefront-ffi || exit 1
+    cargo test --release --quiet -p phasefront-ffi --test conformance >/dev/null || exit 1
     cargo build --release --quiet -p phasefront-bindgen || exit 1
     library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
     generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"

@@ -128,6 +128,11 @@ pub struct RawImage {
 
 #[uniffi::export]
 impl RawImage {
+    /// Another handle to the same image: whoever reads its memory holds one.
+    pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
+        Ok(self)
+    }
+
     /// Where its bytes lie. Valid as long as this object.
     pub fn address(&self) -> Result<u64, PhasefrontError> {
         Ok(self.rgba.as_ptr() as u64)

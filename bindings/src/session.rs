@@ -22,6 +22,9 @@ pub enum DropReason {
     Reset,
     /// The session was closed before it was done.
     Closed,
+    /// It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages'
+    /// streams say so.
+    Unread,
     /// For a reason that this version of the bindings does not know.
     Other,
 }
