@@ -4,7 +4,8 @@
 mod network_models;
 
 use network_models::{Model, frame, int, ints};
-use phasefront::network::{Head, InputKind, Isa, Network, Precision, reference};
+use num_complex::Complex32;
+use phasefront::network::{Head, InputKind, Isa, Network, Precision, Source, reference};
 use prost::Message;
 use tract_onnx::pb::{ModelProto, NodeProto};
 
@@ -160,6 +161,83 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
                 } else {
                     assert!(worst < 2e-5, "{case}: {worst}");
                 }
+            }
+        }
+    }
+}
+
+/// Planes in memory as a network's source.
+struct Planes<'a> {
+    values: &'a [f32],
+    size: (usize, usize),
+}
+
+impl Source for Planes<'_> {
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
+        let at = (plane * self.size.0 + row) * self.size.1 + from;
+        into.copy_from_slice(&self.values[at..][..into.len()]);
+    }
+}
+
+#[test]
+fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
+    let tanh = Model {
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(5, 8)
+    };
+    let field = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(4, 8)
+    };
+    let models = [
+        Model::new(5, 8),
+        Model::int8(8, 24),
+        Model {
+            inputs: 20,
+            input: "ldi5",
+            ..Model::int8(3, 8)
+        },
+        Model {
+            int8: true,
+            ..field.clone()
+        },
+        field,
+        Model {
+            inputs: 6,
+            input: "field",
+            ..tanh.clone()
+        },
+        tanh,
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        // The last is cut into bands, and where threads are few into strips.
+        for (height, width) in [(1, 1), (7, 5), (61, 47), (150, 300)] {
+            let values = frame(model.inputs, height, width, 7);
+            let source = Planes {
+                values: &values,
+                size: (height, width),
+            };
+            for stock in [false, true] {
+                let plan = match stock {
+                    false => network.plan(height, width),
+                    true => network.plan_on_stock_tract(height, width),
+                };
+                let plan = plan.unwrap();
+                let mut scratch = plan.scratch();
+                let mut output = vec![f32::NAN; 6 * height * width];
+                plan.run(&values, &mut output, &mut scratch).unwrap();
+                let mut expected = vec![Complex32::ZERO; 3 * height * width];
+                network
+                    .head()
+                    .field(network.input(), &output, &values, &mut expected)
+                    .unwrap();
+                let mut field = vec![Complex32::ZERO; 3 * height * width];
+                plan.field(&source, &mut field, &mut scratch).unwrap();
+                assert_eq!(field, expected, "{width}×{height}, stock: {stock}");
+                assert!(plan.field(&source, &mut field[1..], &mut scratch).is_err());
             }
         }
     }
@@ -650,11 +728,10 @@ fn missing_or_wrong_metadata_is_refused() {
         refusal(
             &Model {
                 input: "field",
-                inputs: 6,
                 ..model
             }
             .proto()
         )
-        .contains("'field'")
+        .contains("'field' with 6 channels")
     );
 }

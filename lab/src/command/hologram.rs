@@ -7,7 +7,7 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
-use phasefront::{Pipeline, RgbdFrame};
+use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
@@ -33,9 +33,12 @@ pub(crate) struct Hologram {
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
-    /// Planes of --method layers and points
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    planes: usize,
+    /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
+    #[arg(long, value_name = "N")]
+    planes: Option<usize>,
+    /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
     /// What keeps light from where it should not go, for --method points
     #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
     occlusion: OcclusionName,
@@ -59,6 +62,8 @@ pub(crate) struct Hologram {
 enum Method {
     /// A trained network on the RGB-D image
     Network,
+    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    Sweep,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -128,6 +133,24 @@ impl EncoderName {
     }
 }
 
+/// Planes of the methods of exact waves.
+const DEFAULT_PLANES: usize = 256;
+
+/// The sweep that suits `display`, with these planes and taps where given.
+pub(super) fn sweep_for(
+    display: &phasefront::Display,
+    planes: Option<usize>,
+    taps: Option<usize>,
+) -> Sweep {
+    let usual = Sweep::for_display(display);
+    let planes = planes.unwrap_or(usual.planes);
+    Sweep {
+        planes,
+        taps: taps.unwrap_or_else(|| Sweep::taps_for(display, planes)),
+        ..usual
+    }
+}
+
 /// A field at the modulator, its levels, and how long each stage took.
 struct Made {
     field: Option<Array3<Complex32>>,
@@ -160,12 +183,19 @@ impl Hologram {
         });
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
-                self.by_network(&self.frame.read()?, &display.display, response)?
+                let network = models::network(&self.network, self.precision.is_int8())?;
+                let method = phasefront::Method::Network(&network);
+                self.by_pipeline("network", method, &display.display, response)?
             }
-            (Method::Network, Some(dir)) => {
+            (Method::Sweep, None) => {
+                let sweep = sweep_for(&display.display, self.planes, self.taps);
+                let method = phasefront::Method::Sweep(sweep);
+                self.by_pipeline("sweep", method, &display.display, response)?
+            }
+            (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network takes --rgb and --depth; for a layered depth image use --method layers or points",
+                    "--method network and sweep take --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
             (Method::Layers | Method::Points, source) => {
@@ -196,18 +226,20 @@ impl Hologram {
         Ok(())
     }
 
-    fn by_network(
+    /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
+    fn by_pipeline(
         &self,
-        frame: &RgbdFrame,
+        stage: &'static str,
+        method: phasefront::Method,
         display: &phasefront::Display,
         response: Response,
     ) -> Result<Made> {
-        let network = models::network(&self.network, self.precision.is_int8())?;
+        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let pipeline = Pipeline::new(
             height,
             width,
-            phasefront::Method::Network(&network),
+            method,
             display,
             self.encoder.encoding(),
             self.scale(),
@@ -227,7 +259,7 @@ impl Hologram {
             levels,
             scale: modulation.scale,
             stages: vec![
-                ("network", predict),
+                (stage, predict),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
@@ -253,6 +285,7 @@ impl Hologram {
             response,
         )?;
         let mut scratch = modulator.scratch();
+        let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
         let bar = progress_bar(0, "");
         let progress = |done: usize, total: usize| {
@@ -263,12 +296,12 @@ impl Hologram {
             Method::Points => {
                 bar.set_message("rows");
                 let occlusion = self.occlusion.occlusion();
-                let field = point_based::hologram(ldi, display, self.planes, occlusion, &progress)?;
+                let field = point_based::hologram(ldi, display, planes, occlusion, &progress)?;
                 ("points", field)
             }
             _ => {
                 bar.set_message("planes");
-                let field = sm_lbm::hologram(ldi, display, self.planes, &progress)?;
+                let field = sm_lbm::hologram(ldi, display, planes, &progress)?;
                 ("layers", field)
             }
         };

@@ -169,7 +169,7 @@ mod tests {
         let bytes = [1, 0, 2, 0, 3, 0, 9, 4, 0, 5, 0, 6];
         let plane = Plane::new(&bytes, 7, 2);
         for (rotation, mirrored, upright) in [
-            (Rotation::None, false, vec![[1, 2, 3], [4, 5, 6]].concat()),
+            (Rotation::None, false, vec![1, 2, 3, 4, 5, 6]),
             (Rotation::None, true, vec![3, 2, 1, 6, 5, 4]),
             (Rotation::Clockwise90, false, vec![4, 1, 5, 2, 6, 3]),
             (Rotation::Clockwise90, true, vec![1, 4, 2, 5, 3, 6]),

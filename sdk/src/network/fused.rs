@@ -1,8 +1,11 @@
 //! A chain on Phasefront's own kernels: the choice of kernels, and the step sizes that they multiply by.
 
 use super::chain::{Chain, Precision, Quantisation, Weights};
+use super::{Head, InputKind, Source};
+use num_complex::Complex32;
 use phasefront_kernels::{
-    F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, Quantiser, Requantise, Scratch, SkipSum,
+    Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows,
+    Scratch, SkipSum,
 };
 use rayon::prelude::*;
 
@@ -87,6 +90,75 @@ impl FusedChain {
                 .par_chunks_mut(CHUNK)
                 .for_each(|chunk| chunk.iter_mut().for_each(|v| *v = tanh(*v)));
         }
+    }
+
+    /// Runs the chain from `source`, planes of `kind`, through `head` into `field`, (3, H, W), row by row: neither the
+    /// input nor the output lies in memory as a whole.
+    pub(super) fn field<S: Source + ?Sized>(
+        &self,
+        source: &S,
+        (kind, head): (InputKind, Head),
+        field: &mut [Complex32],
+        size: (usize, usize),
+        scratch: &FusedScratch,
+    ) {
+        let rows = FieldRows {
+            source,
+            kind,
+            head,
+            tanh: self.tanh,
+        };
+        let mut planes = field.chunks_exact_mut((size.0 * size.1).max(1));
+        let planes: [_; 3] = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        match &self.kernels {
+            Kernels::Int8(chain) => {
+                let tiling = chain.tiling(size.0, size.1);
+                chain.run_rows(&rows, planes, size, tiling, &scratch.int8);
+            }
+            Kernels::F32(chain) => {
+                let tiling = chain.tiling(size.0, size.1);
+                chain.run_rows(&rows, planes, size, tiling, &scratch.f32);
+            }
+        }
+    }
+}
+
+/// Rows of a source in, rows of a field out.
+struct FieldRows<'a, S: ?Sized> {
+    source: &'a S,
+    kind: InputKind,
+    head: Head,
+    tanh: bool,
+}
+
+impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
+    type Value = Complex32;
+
+    fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, 3>, into: &mut [f32]) {
+        let count = into.len() / self.kind.channels();
+        for (plane, into) in into.chunks_exact_mut(count).enumerate() {
+            self.source.read(plane, row, from, into);
+        }
+    }
+
+    fn write(
+        &self,
+        row: usize,
+        from: usize,
+        mut values: [&mut [f32]; OUTPUTS],
+        band: &mut Band<'_, Complex32, 3>,
+    ) {
+        if self.tanh {
+            values
+                .iter_mut()
+                .for_each(|run| run.iter_mut().for_each(|v| *v = tanh(*v)));
+        }
+        let field = band.rows_mut(row, from, values[0].len());
+        let base = |plane: usize, at: usize, into: &mut [f32]| {
+            self.source.read(plane, row, from + at, into);
+        };
+        self.head
+            .row(self.kind, values.map(|run| &*run), base, field);
     }
 }
 

@@ -241,3 +241,166 @@ fn run<W: Work>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::mpsc;
+
+    /// Work that costs a few turns of the scheduler, fails at times and panics at times.
+    struct Fake {
+        random: ChaCha8Rng,
+        broken: bool,
+    }
+
+    impl Work for Fake {
+        type Frame = Vec<u64>;
+        type Output = u64;
+
+        fn process(&mut self, frame: &Vec<u64>, _fresh: bool) -> Result<u64> {
+            assert!(!self.broken, "not recovered");
+            for _ in 0..self.random.random_range(0..4) {
+                std::thread::yield_now();
+            }
+            match self.random.random_range(0..20) {
+                0 => Err(Error::Frame("bad".into())),
+                1 => {
+                    self.broken = true;
+                    // Without the hook's message on stderr.
+                    std::panic::resume_unwind(Box::new("worse"))
+                }
+                _ => Ok(frame[0]),
+            }
+        }
+
+        fn recover(&mut self) {
+            self.broken = false;
+        }
+    }
+
+    /// Two cameras, one that resets and pauses, and a close at any moment, on real threads.
+    #[test]
+    fn any_schedule_ends_with_every_frame_told() {
+        for seed in 0..1500 {
+            let told = Arc::new(AtomicU64::new(0));
+            let panics = Arc::new(AtomicU64::new(0));
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let fake = Fake {
+                random: ChaCha8Rng::seed_from_u64(seed + 1),
+                broken: false,
+            };
+            let listener = {
+                let (told, panics) = (told.clone(), panics.clone());
+                let mut random = ChaCha8Rng::seed_from_u64(seed + 2);
+                move |report| match report {
+                    Report::ListenerPanicked => {
+                        panics.fetch_add(1, Ordering::Relaxed);
+                    }
+                    report => {
+                        told.fetch_add(1, Ordering::Relaxed);
+                        if let Report::Done {
+                            timestamp_ns,
+                            output,
+                        } = report
+                        {
+                            assert_eq!(timestamp_ns, output);
+                        }
+                        if random.random_bool(0.05) {
+                            std::panic::resume_unwind(Box::new("listener"));
+                        }
+                    }
+                }
+            };
+            let live = Live::start(fake, None, listener).unwrap();
+            let clock = AtomicU64::new(0);
+            let frames = random.random_range(0..60);
+            std::thread::scope(|scope| {
+                for _ in 0..2 {
+                    scope.spawn(|| {
+                        for _ in 0..frames {
+                            let now = clock.fetch_add(1, Ordering::Relaxed);
+                            // Closed or late: refused.
+                            let _ = live.submit(now, |spare: Option<Vec<u64>>| {
+                                let mut frame = spare.unwrap_or_default();
+                                frame.clear();
+                                frame.push(now);
+                                frame
+                            });
+                        }
+                    });
+                }
+                for _ in 0..random.random_range(0..20) {
+                    match random.random_range(0..4) {
+                        0 => live.change(Queue::reset),
+                        1 => live.change(Queue::pause),
+                        2 => live.change(|queue| {
+                            queue.resume();
+                            None
+                        }),
+                        _ => std::thread::yield_now(),
+                    }
+                }
+                if random.random_bool(0.5) {
+                    live.close();
+                }
+            });
+            live.close();
+            let counts = live.look(|queue| queue.gate.counts);
+            assert_eq!(counts.pending(), 0, "seed {seed}");
+            assert_eq!(counts.submitted, 2 * frames);
+            let known = counts.processed + counts.failed + counts.dropped.total();
+            assert_eq!(told.load(Ordering::Relaxed), known, "seed {seed}");
+            assert!(panics.load(Ordering::Relaxed) <= known);
+        }
+    }
+
+    #[test]
+    fn a_panic_is_an_error_of_its_frame_and_the_next_works() {
+        let fake = Fake {
+            random: ChaCha8Rng::seed_from_u64(0),
+            broken: false,
+        };
+        let (sender, reports) = mpsc::channel();
+        let live = Live::start(fake, None, move |report| sender.send(report).unwrap()).unwrap();
+        let (mut done, mut internal) = (0, 0);
+        for timestamp in 0..400 {
+            live.submit(timestamp, |_| vec![timestamp]).unwrap();
+            match reports.recv().unwrap() {
+                Report::Done { output, .. } => {
+                    assert_eq!(output, timestamp);
+                    done += 1;
+                }
+                Report::Failed {
+                    timestamp_ns,
+                    error: Error::Internal(message),
+                } => {
+                    assert_eq!((timestamp_ns, message.as_str()), (timestamp, "worse"));
+                    internal += 1;
+                }
+                Report::Failed { error, .. } => assert_eq!(error, Error::Frame("bad".into())),
+                other => panic!("{other:?}"),
+            }
+        }
+        assert!(done > 300 && internal > 5);
+    }
+
+    /// Copying that panics leaves no frame behind that the thread would wait for.
+    #[test]
+    fn a_frame_that_cannot_be_copied_is_given_up() {
+        let fake = Fake {
+            random: ChaCha8Rng::seed_from_u64(0),
+            broken: false,
+        };
+        let live = Live::start(fake, None, |_| {}).unwrap();
+        let copied = catch_unwind(AssertUnwindSafe(|| {
+            live.submit(1, |_| std::panic::resume_unwind(Box::new("no memory")))
+        }));
+        assert!(copied.is_err());
+        live.close();
+        assert_eq!(live.look(|queue| queue.gate.counts.dropped.total()), 1);
+    }
+}

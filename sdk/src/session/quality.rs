@@ -128,8 +128,6 @@ pub(super) struct Ladder {
     roomy_needed: u32,
     /// Frames since the last step up, while it may still have to be taken back.
     since_up: Option<u32>,
-    /// The least share of the time that each rung's frames took, where it is known.
-    known: Vec<Option<f64>>,
 }
 
 impl Ladder {
@@ -141,7 +139,6 @@ impl Ladder {
             roomy: 0,
             roomy_needed: ROOMY_FRAMES,
             since_up: None,
-            known: vec![None; rungs],
         }
     }
 
@@ -164,9 +161,6 @@ impl Ladder {
             return self.step(self.rungs - 1, QualityReason::Thermal);
         }
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
-        let known = &mut self.known[self.rung];
-        // The cost of a rung drifts with the device's temperature; what was measured long ago fades.
-        *known = Some(known.map_or(used, |known| known + 0.1 * (used - known)));
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
         self.roomy = if used < ROOM { self.roomy + 1 } else { 0 };
         if let Some(frames) = &mut self.since_up {
@@ -226,4 +220,85 @@ pub(super) fn check(ladder: &[Rung], quality: Quality, modulator: (usize, usize)
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: Duration = Duration::from_millis(33);
+
+    /// Runs `frames` frames on a device whose rungs cost these milliseconds; gives the steps and the frame of each.
+    fn run(
+        ladder: &mut Ladder,
+        costs_ms: &[u64],
+        thermal: Thermal,
+        frames: usize,
+    ) -> Vec<(usize, QualityChange)> {
+        (0..frames)
+            .filter_map(|frame| {
+                // Every 50th frame takes long for another reason.
+                let extra = if frame % 50 == 49 { 40 } else { 0 };
+                let cost = Duration::from_millis(costs_ms[ladder.rung()] + extra);
+                let change = ladder.observe(cost, Some(PERIOD), thermal, Quality::Adaptive);
+                change.map(|change| (frame, change))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
+        let mut ladder = Ladder::new(4, 0);
+        let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
+        let to: Vec<_> = steps.iter().map(|(_, c)| (c.from, c.to, c.reason)).collect();
+        assert_eq!(to, [(0, 1, QualityReason::TooSlow), (1, 2, QualityReason::TooSlow)]);
+        assert!(steps[1].0 < 20);
+    }
+
+    #[test]
+    fn it_steps_up_where_there_is_room_and_tries_in_vain_ever_more_seldom() {
+        let mut ladder = Ladder::new(3, 2);
+        let steps = run(&mut ladder, &[10, 10, 10], Thermal::Nominal, 500);
+        assert_eq!(ladder.rung(), 0);
+        assert!(steps.iter().all(|(_, c)| c.reason == QualityReason::Room));
+        // Rung 1 leaves room, rung 0 is too slow: the classic seesaw.
+        let mut ladder = Ladder::new(2, 0);
+        let steps = run(&mut ladder, &[40, 15], Thermal::Nominal, 20_000);
+        assert!(steps.len() < 40, "{}", steps.len());
+        let ups: Vec<usize> = (steps.iter())
+            .filter(|(_, c)| c.to == 0)
+            .map(|(frame, _)| *frame)
+            .collect();
+        assert!(ups[1] - ups[0] < 300 && ups[ups.len() - 1] - ups[ups.len() - 2] > 1000);
+    }
+
+    #[test]
+    fn it_heeds_heat() {
+        let mut ladder = Ladder::new(3, 0);
+        let costs = [25, 15, 5];
+        assert!(run(&mut ladder, &costs, Thermal::Nominal, 500).is_empty());
+        let steps = run(&mut ladder, &costs, Thermal::Serious, 500);
+        assert_eq!(ladder.rung(), 1);
+        assert_eq!(steps[0].1.reason, QualityReason::Thermal);
+        let steps = run(&mut ladder, &costs, Thermal::Critical, 500);
+        assert_eq!((steps.len(), steps[0].0, ladder.rung()), (1, 0, 2));
+        run(&mut ladder, &costs, Thermal::Nominal, 500);
+        assert_eq!(ladder.rung(), 0);
+    }
+
+    #[test]
+    fn the_caller_may_forbid_and_choose() {
+        let mut ladder = Ladder::new(3, 0);
+        let slow = Duration::from_secs(1);
+        for _ in 0..100 {
+            let fixed = ladder.observe(slow, Some(PERIOD), Thermal::Critical, Quality::Fixed(0));
+            assert_eq!(fixed, None);
+        }
+        let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
+        assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
+        // Without a target rate there is nothing to hold.
+        for _ in 0..100 {
+            assert_eq!(ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
+        }
+    }
 }

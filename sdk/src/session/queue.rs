@@ -83,6 +83,8 @@ pub(super) struct Queue<F> {
     waiting: Option<Waiting<F>>,
     /// Timestamp and epoch of the frame that is being processed.
     in_flight: Option<(u64, u64)>,
+    /// Timestamp of the last frame that was taken in this epoch.
+    taken_ns: Option<u64>,
     /// Frames admitted and not yet put.
     copying: usize,
     /// How often the session was reset.
@@ -101,6 +103,7 @@ impl<F> Queue<F> {
             gate: Gate::new(),
             waiting: None,
             in_flight: None,
+            taken_ns: None,
             copying: 0,
             epoch: 0,
             period_ns,
@@ -158,9 +161,8 @@ impl<F> Queue<F> {
             self.drop(timestamp_ns, reason);
             return Some(frame);
         }
-        // Of frames that were copied at the same time the newest stays, also against one that overtook it.
-        let newest = (self.waiting.as_ref().map(|w| w.timestamp_ns))
-            .max(self.in_flight.filter(|f| f.1 == epoch).map(|f| f.0));
+        // Of frames that were copied at the same time a newer one may have overtaken this one.
+        let newest = (self.waiting.as_ref().map(|w| w.timestamp_ns)).max(self.taken_ns);
         if newest.is_some_and(|newest| newest > timestamp_ns) {
             self.drop(timestamp_ns, DropReason::Superseded);
             return Some(frame);
@@ -186,6 +188,7 @@ impl<F> Queue<F> {
         debug_assert!(self.in_flight.is_none());
         let waiting = self.waiting.take()?;
         self.in_flight = Some((waiting.timestamp_ns, waiting.epoch));
+        self.taken_ns = Some(waiting.timestamp_ns);
         Some(Taken {
             timestamp_ns: waiting.timestamp_ns,
             fresh: std::mem::take(&mut self.gate.fresh),
@@ -218,6 +221,7 @@ impl<F> Queue<F> {
     pub(super) fn reset(&mut self) -> Option<F> {
         self.epoch += 1;
         self.due_ns = None;
+        self.taken_ns = None;
         self.gate.reset();
         self.drop_waiting(DropReason::Reset)
     }
@@ -259,5 +263,220 @@ impl<F> Queue<F> {
         self.gate.counts.dropped.count(reason);
         self.dropped.push_back((timestamp_ns, reason));
         reason
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::collections::BTreeMap;
+
+    /// A queue under a random order of all that may happen, and what must be so at each moment.
+    struct Run {
+        random: ChaCha8Rng,
+        queue: Queue<u64>,
+        clock: u64,
+        tickets: Vec<Ticket>,
+        flying: Option<(u64, u64)>,
+        /// What was told of each admitted frame, which is told once. Timestamps begin anew with each epoch.
+        told: BTreeMap<(u64, u64), Option<DropReason>>,
+        admitted: Vec<(u64, u64)>,
+        drops: Vec<(u64, DropReason)>,
+        epoch: u64,
+        refused: u64,
+        processed: u64,
+        failed: u64,
+        last_taken: u64,
+    }
+
+    impl Run {
+        fn new(seed: u64) -> Self {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let period = random.random_bool(0.3).then_some(20);
+            Run {
+                random,
+                queue: Queue::new(period),
+                clock: 0,
+                tickets: Vec::new(),
+                flying: None,
+                told: BTreeMap::new(),
+                admitted: Vec::new(),
+                drops: Vec::new(),
+                epoch: 0,
+                refused: 0,
+                processed: 0,
+                failed: 0,
+                last_taken: 0,
+            }
+        }
+
+        fn step(&mut self) {
+            match self.random.random_range(0..100) {
+                0..35 => self.admit(),
+                35..55 => self.put(),
+                55..75 => self.take(),
+                75..90 => self.finish(),
+                90..93 => {
+                    self.queue.reset();
+                    self.epoch += 1;
+                    (self.clock, self.last_taken) = (0, 0);
+                }
+                93..96 => {
+                    self.queue.pause();
+                    assert!(self.queue.waiting.is_none());
+                }
+                96..99 => self.queue.resume(),
+                _ => self.drain(),
+            }
+        }
+
+        fn admit(&mut self) {
+            let late = self.clock > 0 && self.random.random_bool(0.1);
+            let timestamp = match late {
+                true => self.random.random_range(0..=self.clock),
+                false => self.clock + self.random.random_range(1..30),
+            };
+            match self.queue.admit(timestamp) {
+                Err(_) => {
+                    assert!(late || self.queue.gate.closed);
+                    self.refused += 1;
+                    return;
+                }
+                Ok(Ok(ticket)) => self.tickets.push(ticket),
+                Ok(Err(reason)) => assert!(matches!(
+                    reason,
+                    DropReason::Paused | DropReason::AboveTargetRate
+                )),
+            }
+            assert!(!late);
+            self.clock = timestamp;
+            self.admitted.push((self.epoch, timestamp));
+        }
+
+        fn put(&mut self) {
+            if !self.tickets.is_empty() {
+                let at = self.random.random_range(0..self.tickets.len());
+                let ticket = self.tickets.swap_remove(at);
+                let timestamp = ticket.timestamp_ns;
+                let before = self.queue.waiting.as_ref().map(|w| w.timestamp_ns);
+                if self.random.random_bool(0.02) {
+                    self.queue.give_up(ticket);
+                } else {
+                    self.queue.put(ticket, timestamp);
+                }
+                // What waits never becomes older.
+                let after = self.queue.waiting.as_ref().map(|w| w.timestamp_ns);
+                assert!(before.is_none() || after >= before);
+            }
+        }
+
+        fn take(&mut self) {
+            if self.flying.is_none()
+                && let Some(taken) = self.queue.take()
+            {
+                assert_eq!(taken.frame, taken.timestamp_ns);
+                assert!(!self.queue.gate.paused && !self.queue.gate.closed);
+                assert!(taken.timestamp_ns > self.last_taken, "in order");
+                self.last_taken = taken.timestamp_ns;
+                assert!(!taken.fresh || self.processed_of(self.epoch) == 0);
+                self.flying = Some((self.epoch, taken.timestamp_ns));
+            }
+        }
+
+        fn processed_of(&self, epoch: u64) -> usize {
+            let done = |(key, reason): &(&(u64, u64), &Option<DropReason>)| {
+                key.0 == epoch && reason.is_none()
+            };
+            self.told.iter().filter(done).count()
+        }
+
+        fn finish(&mut self) {
+            if let Some((epoch, timestamp)) = self.flying.take() {
+                let failed = self.random.random_bool(0.2);
+                let told = self.queue.finish(failed);
+                // A result of before a reset or a close is never told.
+                assert_eq!(told, epoch == self.epoch && !self.queue.gate.closed);
+                if told {
+                    let before = self.told.insert((epoch, timestamp), None);
+                    assert!(before.is_none());
+                    match failed {
+                        true => self.failed += 1,
+                        false => self.processed += 1,
+                    }
+                }
+            }
+        }
+
+        fn drain(&mut self) {
+            while let Some(drop) = self.queue.next_drop() {
+                self.drops.push(drop);
+            }
+        }
+
+        /// Closes, ends what is on its way, and counts.
+        fn end(mut self) {
+            self.queue.close();
+            assert!(self.queue.admit(self.clock + 1).is_err());
+            self.refused += 1;
+            while !self.tickets.is_empty() {
+                assert!(!self.queue.is_done());
+                self.put();
+            }
+            assert!(self.queue.take().is_none());
+            self.finish();
+            self.drain();
+            assert!(self.queue.is_done());
+            let counts = self.queue.gate.counts;
+            assert_eq!(counts.pending(), 0);
+            assert_eq!(
+                (counts.refused, counts.processed, counts.failed),
+                (self.refused, self.processed, self.failed)
+            );
+            assert_eq!(counts.dropped.total(), self.drops.len() as u64);
+            // Every admitted frame is told once: done, failed or dropped, by its timestamp.
+            let mut told: Vec<u64> = (self.told.keys().map(|(_, timestamp)| *timestamp))
+                .chain(self.drops.iter().map(|(timestamp, _)| *timestamp))
+                .collect();
+            let mut admitted: Vec<u64> = self.admitted.iter().map(|(_, t)| *t).collect();
+            told.sort_unstable();
+            admitted.sort_unstable();
+            assert_eq!(told, admitted);
+        }
+    }
+
+    /// Five thousand random orders of submitting, copying, processing, resetting, pausing and closing.
+    #[test]
+    fn every_frame_is_told_once_whatever_happens() {
+        for seed in 0..5000 {
+            let mut run = Run::new(seed);
+            for _ in 0..run.random.random_range(1..200) {
+                run.step();
+            }
+            run.end();
+        }
+    }
+
+    #[test]
+    fn the_target_rate_is_kept_by_timestamps() {
+        // A camera of 30 frames a second with a jitter of a millisecond.
+        for (target, least, most) in [(30.0, 300, 300), (20.0, 195, 205), (15.0, 148, 152), (10.0, 98, 102), (60.0, 300, 300)] {
+            let mut queue = Queue::new(Some((1e9 / target) as u64));
+            let mut random = ChaCha8Rng::seed_from_u64(4);
+            let mut kept = 0;
+            for frame in 0..300u64 {
+                let timestamp = 1 + frame * 33_333_333 + random.random_range(0..2_000_000);
+                if let Ok(ticket) = queue.admit(timestamp).unwrap() {
+                    queue.put(ticket, ());
+                    kept += 1;
+                }
+            }
+            assert!((least..=most).contains(&kept), "{target}: {kept}");
+            assert_eq!(queue.gate.counts.dropped.above_target_rate, 300 - kept);
+            // After a gap the next frame is in time at once.
+            assert!(queue.admit(100_000_000_000).unwrap().is_ok());
+        }
     }
 }
