@@ -26,16 +26,14 @@ install() {
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1
 }
 
-# Builds the library with the features that ship, and the generator: in two goes, for the generator's features
-# would become the library's. Runs the conformance suite from Rust, whose levels the other languages compare with.
-# Sets `library` and `generator`.
+# Builds the whole workspace, for a part of it alone has other features and builds tract anew (10 minutes; never use -p).
+# Runs the conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`.
 build_library() {
     need cargo || PATH="$HOME/.cargo/bin:$PATH"
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
     export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"
-    cargo build --release --quiet -p phasefront-ffi || exit 1
-    cargo test --release --quiet -p phasefront-ffi --test conformance >/dev/null || exit 1
-    cargo build --release --quiet -p phasefront-bindgen || exit 1
+    cargo build --release --quiet --workspace || exit 1
+    cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
     library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
     generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"
 }

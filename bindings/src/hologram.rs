@@ -1,8 +1,11 @@
 //! Results: handles whose memory is read in place.
 
 use crate::error::{PhasefrontError, guard};
+use crate::options::Placement;
 use crate::statistics::FrameTimes;
+use phasefront::output::Output;
 use phasefront::session;
+use phasefront::slm::Response;
 use std::sync::Arc;
 
 /// The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
@@ -10,6 +13,7 @@ use std::sync::Arc;
 #[derive(Debug, uniffi::Object)]
 pub struct RawHologram {
     core: session::Hologram,
+    response: Arc<Response>,
 }
 
 /// What is known of a hologram.
@@ -36,8 +40,12 @@ pub struct HologramInfo {
 }
 
 impl RawHologram {
-    pub(crate) fn new(core: session::Hologram) -> Arc<Self> {
-        Arc::new(RawHologram { core })
+    /// A hologram for a modulator that answers with `response`.
+    pub(crate) fn new(core: session::Hologram, response: &Arc<Response>) -> Arc<Self> {
+        Arc::new(RawHologram {
+            core,
+            response: response.clone(),
+        })
     }
 }
 
@@ -67,8 +75,8 @@ impl RawHologram {
         Ok(self)
     }
 
-    /// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. Valid as long
-    /// as this object.
+    /// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours
+    /// follow one another without gaps, too. Valid as long as this object.
     ///
     /// # Errors
     /// Another colour.
@@ -104,12 +112,39 @@ impl RawHologram {
                     "a preview of {width}×{height} is too large; {MOST_PIXELS} pixels are the most"
                 )));
             }
-            let mut rgba = vec![0; 4 * w * h];
-            self.core.preview(z_mm / 1e3, h, w, &mut rgba)?;
+            let mut bytes = vec![0; 4 * w * h];
+            self.core.preview(z_mm / 1e3, h, w, &mut bytes)?;
             Ok(Arc::new(RawImage {
-                rgba,
+                bytes,
                 width,
                 height,
+                pixel_bytes: 4,
+            }))
+        })
+    }
+
+    /// Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
+    /// the upper bits of a byte, the hologram where `placement` says.
+    ///
+    /// # Errors
+    /// An image that the layout has not.
+    pub fn output(
+        &self,
+        placement: Placement,
+        image: u32,
+    ) -> Result<Arc<RawImage>, PhasefrontError> {
+        guard(|| {
+            let placement: phasefront::output::Placement = placement.into();
+            let display = self.core.display();
+            let plan = Output::new(display, self.core.shape(), &self.response, placement)?;
+            let mut bytes = vec![0; plan.image_bytes()];
+            plan.write(self.core.levels(), image as usize, &mut bytes)?;
+            let (height, width) = plan.shape();
+            Ok(Arc::new(RawImage {
+                bytes,
+                width: width as u32,
+                height: height as u32,
+                pixel_bytes: placement.layout.pixel_bytes() as u32,
             }))
         })
     }
@@ -118,12 +153,13 @@ impl RawHologram {
 /// Most pixels of a preview.
 const MOST_PIXELS: usize = 1 << 26;
 
-/// An image of red, green, blue and alpha, a byte each, row by row without gaps. For the layers by hand.
+/// An image, row by row without gaps. For the layers by hand.
 #[derive(Debug, uniffi::Object)]
 pub struct RawImage {
-    rgba: Vec<u8>,
+    bytes: Vec<u8>,
     width: u32,
     height: u32,
+    pixel_bytes: u32,
 }
 
 #[uniffi::export]
@@ -135,12 +171,12 @@ impl RawImage {
 
     /// Where its bytes lie. Valid as long as this object.
     pub fn address(&self) -> Result<u64, PhasefrontError> {
-        Ok(self.rgba.as_ptr() as u64)
+        Ok(self.bytes.as_ptr() as u64)
     }
 
     /// How many bytes lie there.
-    pub fn len(&self) -> Result<u64, PhasefrontError> {
-        Ok(self.rgba.len() as u64)
+    pub fn byte_len(&self) -> Result<u64, PhasefrontError> {
+        Ok(self.bytes.len() as u64)
     }
 
     /// Pixels along x.
@@ -151,5 +187,10 @@ impl RawImage {
     /// Pixels along y.
     pub fn height(&self) -> Result<u32, PhasefrontError> {
         Ok(self.height)
+    }
+
+    /// Bytes of a pixel.
+    pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
+        Ok(self.pixel_bytes)
     }
 }

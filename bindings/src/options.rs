@@ -5,7 +5,7 @@ use crate::error::PhasefrontError;
 use crate::network::Network;
 use phasefront::depth::range;
 use phasefront::session::{self, SessionMethod};
-use phasefront::{encode, slm};
+use phasefront::{encode, output, slm};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -139,6 +139,55 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with; none for as many as the device has.
     pub threads: Option<u32>,
+}
+
+/// How the levels of the colours lie in images for a modulator's driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Layout {
+    /// One image, bytes red, green, blue.
+    Rgb,
+    /// One image, bytes red, green, blue, alpha 255.
+    Rgba,
+    /// One image, bytes blue, green, red, alpha 255.
+    Bgra,
+    /// Three images, one after another: red, green, blue; a byte a pixel.
+    Grey,
+}
+
+/// How a hologram is put on its modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+pub struct Placement {
+    /// How colours lie in images.
+    pub layout: Layout,
+    /// Whether left and right are exchanged, of the whole image.
+    #[uniffi(default = false)]
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole image.
+    #[uniffi(default = false)]
+    pub flip_y: bool,
+    /// How many pixels to the right of the middle the hologram stands, before flips.
+    #[uniffi(default = 0)]
+    pub shift_x: i32,
+    /// How many pixels below the middle it stands, before flips.
+    #[uniffi(default = 0)]
+    pub shift_y: i32,
+}
+
+impl From<Placement> for output::Placement {
+    fn from(placement: Placement) -> Self {
+        output::Placement {
+            layout: match placement.layout {
+                Layout::Rgb => output::Layout::Rgb,
+                Layout::Rgba => output::Layout::Rgba,
+                Layout::Bgra => output::Layout::Bgra,
+                Layout::Grey => output::Layout::Grey,
+            },
+            flip_x: placement.flip_x,
+            flip_y: placement.flip_y,
+            shift_x: placement.shift_x,
+            shift_y: placement.shift_y,
+        }
+    }
 }
 
 impl TryFrom<&SessionOptions> for session::SessionOptions {

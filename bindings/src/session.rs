@@ -6,6 +6,7 @@ use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
 use crate::statistics::Statistics;
 use phasefront::session::{self, Event, Session, Submission};
+use phasefront::slm::Response;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -93,6 +94,7 @@ pub trait SessionListener: Send + Sync {
 #[derive(uniffi::Object)]
 pub struct RawSession {
     state: RwLock<State>,
+    response: Arc<Response>,
     listener_failures: Arc<AtomicU64>,
 }
 
@@ -117,13 +119,15 @@ impl RawSession {
     ) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
             let listener_failures = Arc::new(AtomicU64::new(0));
+            let options = session::SessionOptions::try_from(&options)?;
+            let response = Arc::new(options.response.clone());
             let running = match (mode, listener) {
                 (RunningMode::Image, None) => session::RunningMode::Image,
                 (RunningMode::Video, None) => session::RunningMode::Video,
                 (RunningMode::LiveStream, Some(listener)) => {
-                    let failures = listener_failures.clone();
+                    let (failures, response) = (listener_failures.clone(), response.clone());
                     session::RunningMode::Live(Box::new(move |event| {
-                        if let Err(error) = tell(&*listener, event) {
+                        if let Err(error) = tell(&*listener, event, &response) {
                             failures.fetch_add(1, Ordering::Relaxed);
                             log::warn!("{error}");
                         }
@@ -141,11 +145,12 @@ impl RawSession {
                     ));
                 }
             };
-            let session = Session::new((&options).try_into()?, running)?;
+            let session = Session::new(options, running)?;
             let backend = session.statistics().backend;
             log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
             Ok(Arc::new(RawSession {
                 state: RwLock::new(State::Open(Arc::new(session))),
+                response,
                 listener_failures,
             }))
         })
@@ -172,7 +177,8 @@ impl RawSession {
                 depth,
                 confidence,
             })?;
-            Ok(RawHologram::new(self.session()?.process(&frame)?))
+            let hologram = self.session()?.process(&frame)?;
+            Ok(RawHologram::new(hologram, &self.response))
         })
     }
 
@@ -288,9 +294,13 @@ impl RawSession {
 }
 
 /// Tells `listener` of `event`.
-fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), PhasefrontError> {
+fn tell(
+    listener: &dyn SessionListener,
+    event: Event,
+    response: &Arc<Response>,
+) -> Result<(), PhasefrontError> {
     match event {
-        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram)),
+        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram, response)),
         Event::Dropped {
             timestamp_ns,
             reason,

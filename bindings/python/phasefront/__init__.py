@@ -34,11 +34,13 @@ from .ffi.phasefront_ffi import (
     FrameTimes,
     HologramInfo,
     Intrinsics,
+    Layout,
     LogLevel,
     Network,
     NetworkInfo,
     Orientation,
     PhasefrontError,
+    Placement,
     Pose,
     Quality,
     QualityChange,
@@ -57,8 +59,8 @@ from .ffi.phasefront_ffi import (
 
 __all__ = [
     "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
-    "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "LogLevel",
-    "Made", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Pose", "Quality", "QualityChange", "QualityChanged",
+    "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
+    "Made", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
     "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",
     "YuvMatrix", "display_from_toml", "send_log", "session_options", "version",
 ]  # fmt: skip
@@ -244,6 +246,12 @@ class Hologram:
             raise PhasefrontError.Setting(f"a preview of {width}×{height} is empty; each side must be at least 1")
         image = self._raw.preview(z_mm, width, height)
         return _array(image, image.address(), (height, width, 4))
+
+    def output(self, placement: Placement | None = None, image: int = 0) -> numpy.ndarray:
+        """Image `image` of those that the modulator's driver takes, of the modulator's resolution, levels as they are;
+        uint8, (H, W, bytes of a pixel). All layouts but grey have one; RGB is usual."""
+        output = self._raw.output(placement or Placement(layout=Layout.RGB), image)
+        return _array(output, output.address(), (output.height(), output.width(), output.pixel_bytes()))
 
 
 @dataclass(frozen=True)

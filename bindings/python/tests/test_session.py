@@ -80,6 +80,16 @@ def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
         hologram.preview(0.0, 0, 24)
 
 
+def test_output_is_what_the_modulator_takes(options):
+    with Session(options) as session:
+        hologram = session.process(still())
+    numpy.testing.assert_array_equal(hologram.output(), hologram.levels.transpose(1, 2, 0))
+    blue = hologram.output(phasefront.Placement(layout=phasefront.Layout.GREY, flip_x=True), 2)
+    numpy.testing.assert_array_equal(blue[..., 0], hologram.levels[2, :, ::-1])
+    with pytest.raises(PhasefrontError.Setting, match="no image 1"):
+        hologram.output(image=1)
+
+
 def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
     events = Events()
     with Session(options, RunningMode.LIVE_STREAM, events) as session:

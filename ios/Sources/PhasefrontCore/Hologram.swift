@@ -32,30 +32,39 @@ public final class Hologram: Sendable {
         try raw.zAt(x: x, y: y)
     }
 
-    /// What an eye focused at `zMm` sees. Takes some milliseconds; not for the main thread.
-    public func preview(zMm: Double, width: Int, height: Int) throws -> RgbaImage {
-        try RgbaImage(
+    /// What an eye focused at `zMm` sees: red, green, blue, alpha. Takes some milliseconds; not for the main thread.
+    public func preview(zMm: Double, width: Int, height: Int) throws -> PixelImage {
+        try PixelImage(
             raw.preview(zMm: zMm, width: UInt32(clamping: width), height: UInt32(clamping: height)))
+    }
+
+    /// Image `index` of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
+    /// layouts but grey have one.
+    public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
+        try PixelImage(raw.output(placement: placement, image: UInt32(clamping: index)))
     }
 }
 
-/// An image of red, green, blue and alpha, a byte each, row by row without gaps.
-public final class RgbaImage: Sendable {
+/// An image, row by row without gaps.
+public final class PixelImage: Sendable {
     /// Pixels along x.
     public let width: Int
     /// Pixels along y.
     public let height: Int
+    /// Bytes of a pixel.
+    public let pixelBytes: Int
     let raw: RawImage
 
     init(_ raw: RawImage) throws {
         self.raw = raw
         width = try Int(raw.width())
         height = try Int(raw.height())
+        pixelBytes = try Int(raw.pixelBytes())
     }
 
     /// Reads the image in place. The pointer is valid in `body` only.
     public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
-        let (address, count) = try (raw.address(), raw.len())
+        let (address, count) = try (raw.address(), raw.byteLen())
         return try withExtendedLifetime(self) {
             try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
         }

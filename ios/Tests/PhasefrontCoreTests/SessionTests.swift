@@ -81,6 +81,18 @@ final class SessionTests: XCTestCase {
         assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
     }
 
+    func testOutputIsWhatTheModulatorTakes() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let levels = [UInt8](try hologram.levels())
+        try hologram.output().withBytes { rgba in
+            XCTAssertEqual((0..<64 * 48).map { rgba[4 * $0] }, Array(levels[..<(64 * 48)]))
+        }
+        let blue = try hologram.output(Placement(layout: .grey, flipX: true), image: 2)
+        XCTAssertEqual(blue.pixelBytes, 1)
+        XCTAssertEqual(try blue.withBytes { $0[0] }, levels[2 * 64 * 48 + 63])
+        assertRefused("no image 1") { try hologram.output(image: 1) }
+    }
+
     func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {
         let answered = Locked<(timestamps: [UInt64], threads: Set<Thread>)>(([], []))
         let session = try Session(options(), mode: .liveStream) { event in

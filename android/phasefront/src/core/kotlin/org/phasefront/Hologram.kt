@@ -30,12 +30,21 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
      */
     public fun zAt(x: Double, y: Double): Double = open { it.zAt(x, y) }
 
-    /** What an eye focused at [zMm] sees. Takes some milliseconds; not for the main thread. */
-    public fun preview(zMm: Double, width: Int, height: Int): RgbaImage {
+    /** What an eye focused at [zMm] sees: red, green, blue, alpha. Takes some milliseconds; not for the main thread. */
+    public fun preview(zMm: Double, width: Int, height: Int): PixelImage {
         if (width < 1 || height < 1) {
             throw PhasefrontException.Setting("a preview of $width×$height is empty; each side must be at least 1")
         }
-        return RgbaImage(open { it.preview(zMm, width.toUInt(), height.toUInt()) })
+        return PixelImage(open { it.preview(zMm, width.toUInt(), height.toUInt()) })
+    }
+
+    /**
+     * Image [index] of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
+     * layouts but grey have one.
+     */
+    public fun output(placement: Placement = Placement(Layout.RGBA), index: Int = 0): PixelImage {
+        if (index < 0) throw PhasefrontException.Setting("there is no image $index; the first is 0")
+        return PixelImage(open { it.output(placement, index.toUInt()) })
     }
 
     /** Gives the memory back. Closing twice does nothing. */
@@ -47,15 +56,18 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     }
 }
 
-/** An image of red, green, blue and alpha, a byte each, row by row without gaps. */
-public class RgbaImage internal constructor(private val raw: RawImage) : AutoCloseable {
+/** An image, row by row without gaps. */
+public class PixelImage internal constructor(private val raw: RawImage) : AutoCloseable {
     public val width: Int = raw.width().toInt()
     public val height: Int = raw.height().toInt()
 
+    /** Bytes of a pixel. */
+    public val pixelBytes: Int = raw.pixelBytes().toInt()
+
     /** Reads the image in place. The buffer is valid in [body] only, also while another thread closes the image. */
-    public fun <R> use(body: (ByteBuffer) -> R): R {
+    public fun <R> useBytes(body: (ByteBuffer) -> R): R {
         if (raw.uniffiIsDestroyed) throw PhasefrontException.Session("image: it is closed; read it before closing it")
-        return raw.share().use { body(memory(it.address(), it.len())) }
+        return raw.share().use { body(memory(it.address(), it.byteLen())) }
     }
 
     /** Gives the memory back. Closing twice does nothing. */

@@ -52,10 +52,17 @@ public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: B
 
 private fun Image.Plane.toPlane(): Plane = Plane(buffer, rowStride, pixelStride)
 
-/** The image as a bitmap: a new one, or [to] where it has the size and configuration ARGB_8888. */
-public fun RgbaImage.toBitmap(to: Bitmap? = null): Bitmap {
+/**
+ * The image as a bitmap: a new one, or [to] where it has the size and configuration ARGB_8888.
+ *
+ * @throws PhasefrontException.Setting for an image that is not of 4 bytes a pixel.
+ */
+public fun PixelImage.toBitmap(to: Bitmap? = null): Bitmap {
+    if (pixelBytes != 4) {
+        throw PhasefrontException.Setting("an image of $pixelBytes bytes a pixel; the layout RGBA is needed for a bitmap")
+    }
     val fits = to?.takeIf { it.width == width && it.height == height && it.config == Bitmap.Config.ARGB_8888 && it.isMutable }
     val bitmap = fits ?: Bitmap.createBitmap(width, height, Bitmap.Config.ARGB_8888)
-    use { bitmap.copyPixelsFromBuffer(it) }
+    useBytes { bitmap.copyPixelsFromBuffer(it) }
     return bitmap
 }

@@ -89,7 +89,7 @@ class SessionTest {
         image { it.process(still()) }.use { hologram ->
             hologram.preview(0.0, 32, 24).use { image ->
                 assertEquals(32 to 24, image.width to image.height)
-                image.use { bytes ->
+                image.useBytes { bytes ->
                     assertEquals(4 * 32 * 24, bytes.remaining())
                     val values = ByteArray(bytes.remaining()).also { bytes.get(it) }
                     assertTrue(values.indices.filter { it % 4 == 3 }.all { values[it] == 255.toByte() })
@@ -98,6 +98,20 @@ class SessionTest {
             }
             assertTrue(hologram.zAt(0.5, 0.5) > hologram.zAt(0.02, 0.02))
             assertRefused<PhasefrontException.Setting>("0×24") { hologram.preview(0.0, 0, 24) }
+        }
+    }
+
+    @Test
+    fun outputIsWhatTheModulatorTakes() {
+        image { it.process(still()) }.use { hologram ->
+            val levels = hologram.levels()
+            val rgba = hologram.output().use { image -> image.useBytes { bytes -> ByteArray(bytes.remaining()).also { bytes.get(it) } } }
+            assertContentEquals(levels.copyOf(64 * 48), ByteArray(64 * 48) { rgba[4 * it] })
+            hologram.output(Placement(Layout.GREY, flipX = true), 2).use { image ->
+                assertEquals(1, image.pixelBytes)
+                image.useBytes { assertEquals(levels[2 * 64 * 48 + 63], it.get(0)) }
+            }
+            assertRefused<PhasefrontException.Setting>("no image 1") { hologram.output(index = 1) }
         }
     }
 
