@@ -218,10 +218,19 @@ mod tests {
             (Layout::Bgra, vec![200, 150, 100, 255, 201, 151]),
             (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
         ] {
-            let output = Output::new(&display(3, 2), (2, 3), &response, Placement::centred(layout));
+            let output = Output::new(
+                &display(3, 2),
+                (2, 3),
+                &response,
+                Placement::centred(layout),
+            );
             let output = output.unwrap();
             assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
-            assert!(output.write(&levels, layout.images(), &mut vec![0; output.image_bytes()]).is_err());
+            assert!(
+                output
+                    .write(&levels, layout.images(), &mut vec![0; output.image_bytes()])
+                    .is_err()
+            );
             if layout == Layout::Grey {
                 assert_eq!(image(&output, &levels, 2), [200, 201, 202, 210, 211, 212]);
             }
@@ -261,7 +270,15 @@ mod tests {
                 assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
             }
         }
-        assert!(Output::new(&display(2, 4), (2, 3), &response, Placement::centred(Layout::Rgb)).is_err());
+        assert!(
+            Output::new(
+                &display(2, 4),
+                (2, 3),
+                &response,
+                Placement::centred(Layout::Rgb)
+            )
+            .is_err()
+        );
     }
 
     #[test]

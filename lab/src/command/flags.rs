@@ -50,6 +50,13 @@ pub(crate) struct FrameFlags {
     /// Depth image: grey PNG of 8 or 16 bits, or .npy
     #[arg(long, value_name = "FILE", requires = "rgb")]
     depth: Option<PathBuf>,
+    #[command(flatten)]
+    depth_numbers: DepthFlags,
+}
+
+/// What the numbers of a depth image mean, and which are shown where.
+#[derive(Args)]
+pub(crate) struct DepthFlags {
     /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth
     #[arg(long, value_enum, default_value_t = UnitName::Normalized)]
     depth_unit: UnitName,
@@ -83,6 +90,12 @@ impl FrameFlags {
         let (Some(rgb), Some(depth)) = (&self.rgb, &self.depth) else {
             return Err(Error::Input("this method needs --rgb and --depth".into()));
         };
+        rgbd::read(rgb, depth, self.depth_numbers.options())
+    }
+}
+
+impl DepthFlags {
+    pub(crate) fn options(&self) -> DepthOptions {
         let unit = match self.depth_unit {
             UnitName::Normalized => DepthUnit::Normalized,
             UnitName::M => DepthUnit::Metres,
@@ -92,12 +105,11 @@ impl FrameFlags {
                 units_per_m: self.depth_scale.unwrap_or(f64::NAN),
             },
         };
-        let options = DepthOptions {
+        DepthOptions {
             unit,
             near_m: self.near,
             far_m: self.far,
-        };
-        rgbd::read(rgb, depth, options)
+        }
     }
 }
 

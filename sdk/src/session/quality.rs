@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::network::Network;
+use crate::sweep::Sweep;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -12,6 +13,8 @@ use std::time::Duration;
 pub enum SessionMethod {
     /// A trained network for RGB-D frames.
     Network(Arc<Network>),
+    /// The plane sweep, for any display.
+    Sweep(Sweep),
 }
 
 impl SessionMethod {
@@ -19,6 +22,7 @@ impl SessionMethod {
     pub fn method(&self) -> Method<'_> {
         match self {
             SessionMethod::Network(network) => Method::Network(network),
+            SessionMethod::Sweep(sweep) => Method::Sweep(*sweep),
         }
     }
 }
@@ -250,8 +254,17 @@ mod tests {
     fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
         let mut ladder = Ladder::new(4, 0);
         let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
-        let to: Vec<_> = steps.iter().map(|(_, c)| (c.from, c.to, c.reason)).collect();
-        assert_eq!(to, [(0, 1, QualityReason::TooSlow), (1, 2, QualityReason::TooSlow)]);
+        let to: Vec<_> = steps
+            .iter()
+            .map(|(_, c)| (c.from, c.to, c.reason))
+            .collect();
+        assert_eq!(
+            to,
+            [
+                (0, 1, QualityReason::TooSlow),
+                (1, 2, QualityReason::TooSlow)
+            ]
+        );
         assert!(steps[1].0 < 20);
     }
 
@@ -295,10 +308,16 @@ mod tests {
             assert_eq!(fixed, None);
         }
         let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
-        assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
+        assert_eq!(
+            asked.map(|c| (c.to, c.reason)),
+            Some((2, QualityReason::Asked))
+        );
         // Without a target rate there is nothing to hold.
         for _ in 0..100 {
-            assert_eq!(ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
+            assert_eq!(
+                ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive),
+                None
+            );
         }
     }
 }

@@ -462,7 +462,13 @@ mod tests {
     #[test]
     fn the_target_rate_is_kept_by_timestamps() {
         // A camera of 30 frames a second with a jitter of a millisecond.
-        for (target, least, most) in [(30.0, 300, 300), (20.0, 195, 205), (15.0, 148, 152), (10.0, 98, 102), (60.0, 300, 300)] {
+        for (target, least, most) in [
+            (30.0, 300, 300),
+            (20.0, 195, 205),
+            (15.0, 148, 152),
+            (10.0, 98, 102),
+            (60.0, 300, 300),
+        ] {
             let mut queue = Queue::new(Some((1e9 / target) as u64));
             let mut random = ChaCha8Rng::seed_from_u64(4);
             let mut kept = 0;

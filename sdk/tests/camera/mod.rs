@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
 /// Every colour format.
-pub fn colour_formats() -> Vec<ColourFormat> {
+pub(crate) fn colour_formats() -> Vec<ColourFormat> {
     let mut formats = vec![ColourFormat::Rgba, ColourFormat::Bgra, ColourFormat::Rgb];
     for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
         for video_range in [false, true] {
@@ -25,7 +25,7 @@ pub fn colour_formats() -> Vec<ColourFormat> {
 }
 
 /// Every depth format.
-pub const DEPTH_FORMATS: [DepthFormat; 8] = [
+pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::MetresF32,
     DepthFormat::MetresF16,
     DepthFormat::DisparityF32,
@@ -37,16 +37,16 @@ pub const DEPTH_FORMATS: [DepthFormat; 8] = [
 ];
 
 /// Memory of one plane.
-pub struct Memory {
-    pub bytes: Vec<u8>,
-    pub row_stride: usize,
-    pub pixel_stride: usize,
+pub(crate) struct Memory {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) row_stride: usize,
+    pub(crate) pixel_stride: usize,
 }
 
 impl Memory {
     /// Bytes at random for (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and after rows, and
     /// not one byte behind the last pixel.
-    pub fn random(
+    pub(crate) fn random(
         random: &mut ChaCha8Rng,
         (height, width): (usize, usize),
         pixel: usize,
@@ -62,20 +62,20 @@ impl Memory {
         }
     }
 
-    pub fn plane(&self) -> Plane<'_> {
+    pub(crate) fn plane(&self) -> Plane<'_> {
         Plane::new(&self.bytes, self.row_stride, self.pixel_stride)
     }
 }
 
 /// An image of noise.
-pub struct Noise {
-    pub format: ColourFormat,
-    pub shape: (usize, usize),
-    pub planes: Vec<Memory>,
+pub(crate) struct Noise {
+    pub(crate) format: ColourFormat,
+    pub(crate) shape: (usize, usize),
+    pub(crate) planes: Vec<Memory>,
 }
 
 impl Noise {
-    pub fn new(
+    pub(crate) fn new(
         seed: u64,
         format: ColourFormat,
         (height, width): (usize, usize),
@@ -98,23 +98,23 @@ impl Noise {
         }
     }
 
-    pub fn image(&self) -> Result<ColourImage<'_>> {
+    pub(crate) fn image(&self) -> Result<ColourImage<'_>> {
         let planes: Vec<_> = self.planes.iter().map(Memory::plane).collect();
         ColourImage::new(self.format, self.shape.1, self.shape.0, &planes)
     }
 }
 
 /// A scene: a bright square at 1 m before a wall that runs from 2 m to 3 m.
-pub struct Scene {
-    pub width: usize,
-    pub height: usize,
-    pub rgba: Vec<u8>,
-    pub metres: Vec<f32>,
+pub(crate) struct Scene {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) rgba: Vec<u8>,
+    pub(crate) metres: Vec<f32>,
 }
 
 impl Scene {
     /// The square starts `at` pixels from the left.
-    pub fn new(height: usize, width: usize, at: usize) -> Self {
+    pub(crate) fn new(height: usize, width: usize, at: usize) -> Self {
         let square = |x: usize, y: usize| {
             (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y)
         };
@@ -137,14 +137,14 @@ impl Scene {
         }
     }
 
-    pub fn colour(&self) -> ColourImage<'_> {
+    pub(crate) fn colour(&self) -> ColourImage<'_> {
         let plane = Plane::new(&self.rgba, 4 * self.width, 4);
         ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane])
             .expect("a whole image")
     }
 
     /// The depth's bytes in `format`.
-    pub fn depth_bytes(&self, format: DepthFormat) -> Vec<u8> {
+    pub(crate) fn depth_bytes(&self, format: DepthFormat) -> Vec<u8> {
         let half = |v: f32| half::f16::from_f32(v).to_le_bytes().to_vec();
         let whole = |v: f32| (v as u16).to_le_bytes().to_vec();
         let bytes = |m: &f32| match format {
@@ -162,7 +162,12 @@ impl Scene {
 }
 
 /// A depth image over `bytes`, tightly packed.
-pub fn depth(bytes: &[u8], format: DepthFormat, width: usize, height: usize) -> DepthImage<'_> {
+pub(crate) fn depth(
+    bytes: &[u8],
+    format: DepthFormat,
+    width: usize,
+    height: usize,
+) -> DepthImage<'_> {
     let pixel = format.pixel_bytes();
     DepthImage::new(
         format,
@@ -174,13 +179,13 @@ pub fn depth(bytes: &[u8], format: DepthFormat, width: usize, height: usize) -> 
 }
 
 /// A frame of `scene` with depth in metres over `metres`, its bytes.
-pub fn frame<'a>(timestamp_ns: u64, scene: &'a Scene, metres: &'a [u8]) -> CameraFrame<'a> {
+pub(crate) fn frame<'a>(timestamp_ns: u64, scene: &'a Scene, metres: &'a [u8]) -> CameraFrame<'a> {
     let depth = depth(metres, DepthFormat::MetresF32, scene.width, scene.height);
     CameraFrame::new(timestamp_ns, scene.colour(), depth)
 }
 
 /// `depth` with a confidence map of another size or the same.
-pub fn with_confidence<'a>(
+pub(crate) fn with_confidence<'a>(
     depth: DepthImage<'a>,
     map: &'a [u8],
     width: usize,
@@ -195,7 +200,7 @@ pub fn with_confidence<'a>(
 }
 
 /// A small display and the shipped network.
-pub fn options(width: usize, height: usize) -> SessionOptions {
+pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
     let method = SessionMethod::Network(Arc::new(network.expect("a hologram network")));
     let display = Display::from_toml(&format!(
