@@ -28,7 +28,7 @@ pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener};
 pub use network::{Network, NetworkInfo};
 pub use options::{
-    Brightness, DepthRange, Encoding, Layout, Placement, Quality, Response, RunningMode, Rung,
+    Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, RunningMode, Rung,
     SessionOptions, Thermal,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

@@ -5,6 +5,7 @@ use crate::error::PhasefrontError;
 use crate::network::Network;
 use phasefront::depth::range;
 use phasefront::session::{self, SessionMethod};
+use phasefront::sweep::Sweep;
 use phasefront::{encode, output, slm};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -79,11 +80,23 @@ pub enum DepthRange {
     },
 }
 
-/// One quality: a network and a resolution. A hologram smaller than the modulator is shown in its middle.
+/// What makes holograms.
+#[derive(Debug, Clone, uniffi::Enum)]
+pub enum Method {
+    /// A trained network.
+    Network {
+        /// The network, for the session's display.
+        network: Arc<Network>,
+    },
+    /// The plane sweep, for any display: slower, and nothing needs to be trained.
+    Sweep,
+}
+
+/// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct Rung {
     /// What makes the hologram.
-    pub network: Arc<Network>,
+    pub method: Method,
     /// Width of the hologram, pixels.
     pub width: u32,
     /// Height of the hologram, pixels.
@@ -196,11 +209,16 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
     fn try_from(options: &SessionOptions) -> Result<Self, PhasefrontError> {
         let [best, ..] = options.ladder.as_slice() else {
             return Err(PhasefrontError::Setting(
-                "the ladder is empty; give at least one rung: a network and a resolution".into(),
+                "the ladder is empty; give at least one rung: a method and a resolution".into(),
             ));
         };
-        let method = |rung: &Rung| SessionMethod::Network(rung.network.core.clone());
-        let mut to = session::SessionOptions::new((&options.display).try_into()?, method(best))?;
+        let display = phasefront::Display::try_from(&options.display)?;
+        let sweep = Sweep::for_display(&display);
+        let method = |rung: &Rung| match &rung.method {
+            Method::Network { network } => SessionMethod::Network(network.core.clone()),
+            Method::Sweep => SessionMethod::Sweep(sweep),
+        };
+        let mut to = session::SessionOptions::new(display, method(best))?;
         to.ladder = (options.ladder.iter())
             .map(|rung| session::Rung {
                 method: method(rung),

@@ -7,7 +7,7 @@
 
 use phasefront_ffi::{
     Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
-    DepthRange, Encoding, FrameInfo, Network, Orientation, PlaneInfo, Quality, RawHologram,
+    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, Quality, RawHologram,
     RawSession, Response, Rotation, Rung, RunningMode, SessionOptions, YuvMatrix,
     display_from_toml,
 };
@@ -55,7 +55,13 @@ fn options(case: &Value) -> SessionOptions {
     let display = display_from_toml(case["display"].as_str().unwrap().into()).unwrap();
     SessionOptions {
         ladder: vec![Rung {
-            network: Network::built_in().unwrap(),
+            method: match case["method"].as_str().unwrap() {
+                "network" => Method::Network {
+                    network: Network::built_in().unwrap(),
+                },
+                "sweep" => Method::Sweep,
+                other => panic!("{other}"),
+            },
             width: display.width,
             height: display.height,
         }],
@@ -363,7 +369,7 @@ mod write {
             json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false})
         };
         let case = |name: &str, frames: Vec<Value>| {
-            json!({"name": name, "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
+            json!({"name": name, "method": "network", "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
                    "brightness": null, "range": null, "frames": frames})
         };
         let mut cases = Vec::new();
@@ -406,11 +412,16 @@ mod write {
         one["encoding"] = json!("double-phase");
         cases.push(one);
 
-        let mut one = case("band limit, fixed brightness, fixed range, a calibrated modulator", vec![plain]);
+        let mut one = case("band limit, fixed brightness, fixed range, a calibrated modulator", vec![plain.clone()]);
         one["encoding"] = json!("band-limit");
         one["brightness"] = json!(1.25);
         one["range"] = json!([0.5, 1.5]);
         one["lut"] = (0..256).map(|i| (i * 3 / 4 + 20) as u8).collect();
+        cases.push(one);
+
+        let mut one = case("the plane sweep, for a display that no network is for", vec![plain]);
+        one["method"] = json!("sweep");
+        one["display"] = json!(format!("{display}pitch_um = 4.5\nwavelengths_nm = [650, 530, 440]\nvolume_depth_mm = 2.0\n"));
         cases.push(one);
 
         let mut one = case("video", vec![]);

@@ -36,6 +36,7 @@ from .ffi.phasefront_ffi import (
     Intrinsics,
     Layout,
     LogLevel,
+    Method,
     Network,
     NetworkInfo,
     Orientation,
@@ -60,7 +61,7 @@ from .ffi.phasefront_ffi import (
 __all__ = [
     "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
     "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
-    "Made", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
+    "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
     "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",
     "YuvMatrix", "display_from_toml", "send_log", "session_options", "version",
 ]  # fmt: skip
@@ -302,13 +303,14 @@ class _Listener(_ffi.SessionListener):
         self._tell(QualityChanged(timestamp_ns, change))
 
 
-def session_options(network: Network, display: Display | None = None, **changes) -> SessionOptions:
-    """What is usual: holograms of the display's resolution by `network`; AA-DPM, levels in equal steps, steady
+def session_options(method: Network | Method, display: Display | None = None, **changes) -> SessionOptions:
+    """What is usual: holograms of the display's resolution by a network or another method; AA-DPM, levels in equal steps, steady
     brightness, near and far by percentiles. `changes` are fields of `SessionOptions`."""
     display = display or Display()
+    method = Method.NETWORK(network=method) if isinstance(method, Network) else method
     usual = {
         "display": display,
-        "ladder": [Rung(network=network, width=display.width, height=display.height)],
+        "ladder": [Rung(method=method, width=display.width, height=display.height)],
         "quality": Quality.ADAPTIVE(),
         "target_rate_hz": None,
         "encoding": Encoding.ANTI_ALIAS(sigma=0.7, width=3),

@@ -14,6 +14,7 @@ from phasefront import (
     DepthRange,
     Encoding,
     Frame,
+    Method,
     Orientation,
     Response,
     Rotation,
@@ -89,7 +90,8 @@ def levels_of(case, memory, network):
         changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
-    options = session_options(network, display_from_toml(case["display"]), **changes)
+    method = {"network": network, "sweep": Method.SWEEP()}[case["method"]]
+    options = session_options(method, display_from_toml(case["display"]), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]
     with Session(options, mode) as session:
         return b"".join(session.process(frame_of(frame, memory)).levels.tobytes() for frame in case["frames"])

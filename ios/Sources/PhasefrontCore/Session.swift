@@ -93,9 +93,14 @@ extension SessionOptions {
     /// What is usual: holograms of `display`'s resolution by `network`; AA-DPM, levels in equal steps, steady brightness,
     /// near and far by percentiles. Change what is not.
     public init(display: Display = Display(), network: Network) {
+        self.init(display: display, method: .network(network: network))
+    }
+
+    /// The same by `method`.
+    public init(display: Display = Display(), method: Method) {
         self.init(
             display: display,
-            ladder: [Rung(network: network, width: display.width, height: display.height)],
+            ladder: [Rung(method: method, width: display.width, height: display.height)],
             quality: .adaptive,
             targetRateHz: nil,
             encoding: .antiAlias(sigma: 0.7, width: 3),

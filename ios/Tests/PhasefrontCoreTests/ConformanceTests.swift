@@ -10,7 +10,7 @@ final class ConformanceTests: XCTestCase {
     }
 
     private struct Case: Decodable {
-        let name, mode, display, encoding: String
+        let name, method, mode, display, encoding: String
         let levels: Int
         let lut: [UInt8]?
         let brightness: Float?
@@ -85,7 +85,9 @@ final class ConformanceTests: XCTestCase {
     }
 
     private func levels(_ one: Case, _ frames: Data) throws -> Data {
-        var options = SessionOptions(display: try displayFromToml(text: one.display), network: try network.get())
+        let method = try XCTUnwrap([String: Method](
+            uniqueKeysWithValues: [("network", .network(network: try network.get())), ("sweep", .sweep)])[one.method])
+        var options = SessionOptions(display: try displayFromToml(text: one.display), method: method)
         options.encoding = try XCTUnwrap(Self.encodings[one.encoding])
         if let lut = one.lut { options.response = .lut(levels: Data(lut)) }
         if let scale = one.brightness { options.brightness = .fixed(scale: scale) }

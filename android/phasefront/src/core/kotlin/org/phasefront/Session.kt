@@ -129,9 +129,13 @@ public sealed interface SessionEvent {
  * What is usual: holograms of [display]'s resolution by [network]; AA-DPM, levels in equal steps, steady brightness, near
  * and far by percentiles. Change what is not with `copy`.
  */
-public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions = SessionOptions(
+public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions =
+    sessionOptions(Method.Network(network), display)
+
+/** The same by [method]. */
+public fun sessionOptions(method: Method, display: Display = Display()): SessionOptions = SessionOptions(
     display = display,
-    ladder = listOf(Rung(network, display.width, display.height)),
+    ladder = listOf(Rung(method, display.width, display.height)),
     quality = Quality.Adaptive,
     targetRateHz = null,
     encoding = Encoding.AntiAlias(0.7f, 3u),

@@ -76,7 +76,13 @@ class ConformanceTest {
         )
     }
 
-    private fun options(case: JSONObject): SessionOptions = sessionOptions(network, displayFromToml(case.getString("display"))).copy(
+    private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
+        "network" -> Method.Network(network)
+        "sweep" -> Method.Sweep
+        else -> error(name)
+    }
+
+    private fun options(case: JSONObject): SessionOptions = sessionOptions(method(case), displayFromToml(case.getString("display"))).copy(
         encoding = when (val name = case.getString("encoding")) {
             "double-phase" -> Encoding.DoublePhase
             "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
