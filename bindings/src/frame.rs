@@ -3,9 +3,9 @@
 use crate::error::PhasefrontError;
 use phasefront::depth::align;
 use phasefront::depth::image;
+use phasefront::depth::image::DepthImage;
 use phasefront::frame;
 use phasefront::frame::{CameraFrame, ColourImage, Plane};
-use phasefront::depth::image::DepthImage;
 
 /// How a colour image lies in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
@@ -247,7 +247,8 @@ impl FrameInfo {
             DepthFormat::NormalizedU16 => image::DepthFormat::NormalizedU16,
         };
         let (width, height) = size(self.depth.width, self.depth.height);
-        let mut depth = DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
+        let mut depth =
+            DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
         if let Some(info) = &self.confidence {
             let format = match info.format {
                 ConfidenceFormat::LowMediumHigh => image::ConfidenceFormat::LowMediumHigh,
@@ -298,7 +299,9 @@ impl TryFrom<&Cameras> for align::Cameras {
         }) = &cameras.pose
         {
             let (rows, rest) = rotation.as_chunks::<3>();
-            let rows = <[[f64; 3]; 3]>::try_from(rows).ok().filter(|_| rest.is_empty());
+            let rows = <[[f64; 3]; 3]>::try_from(rows)
+                .ok()
+                .filter(|_| rest.is_empty());
             let translation = <[f64; 3]>::try_from(translation_m.as_slice()).ok();
             let (Some(rows), Some(translation)) = (rows, translation) else {
                 return Err(PhasefrontError::Frame(format!(

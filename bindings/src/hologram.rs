@@ -138,7 +138,7 @@ impl RawHologram {
             let display = self.core.display();
             let plan = Output::new(display, self.core.shape(), &self.response, placement)?;
             let mut bytes = vec![0; plan.image_bytes()];
-            plan.write(self.core.levels(), image as usize, &mut bytes)?;
+            plan.write(self.core.output_levels(), image as usize, &mut bytes)?;
             let (height, width) = plan.shape();
             Ok(Arc::new(RawImage {
                 bytes,

@@ -28,8 +28,8 @@ pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener};
 pub use network::{Network, NetworkInfo};
 pub use options::{
-    Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, RunningMode, Rung,
-    SessionOptions, Thermal,
+    Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
+    RunningMode, SessionOptions, Thermal,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};

@@ -74,7 +74,11 @@ impl Log for Forward {
         if !self.enabled(record.metadata()) || TELLING.replace(true) {
             return;
         }
-        let listener = self.0.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let listener = self
+            .0
+            .read()
+            .unwrap_or_else(PoisonError::into_inner)
+            .clone();
         if let Some(listener) = listener {
             let level = match record.level() {
                 Level::Error => LogLevel::Error,

@@ -4,7 +4,7 @@ use crate::display::Display;
 use crate::error::PhasefrontError;
 use crate::network::Network;
 use phasefront::depth::range;
-use phasefront::session::{self, SessionMethod};
+use phasefront::session;
 use phasefront::sweep::Sweep;
 use phasefront::{encode, output, slm};
 use std::num::NonZeroUsize;
@@ -215,8 +215,8 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let display = phasefront::Display::try_from(&options.display)?;
         let sweep = Sweep::for_display(&display);
         let method = |rung: &Rung| match &rung.method {
-            Method::Network { network } => SessionMethod::Network(network.core.clone()),
-            Method::Sweep => SessionMethod::Sweep(sweep),
+            Method::Network { network } => phasefront::Method::Network(network.core.clone()),
+            Method::Sweep => phasefront::Method::Sweep(sweep),
         };
         let mut to = session::SessionOptions::new(display, method(best))?;
         to.ladder = (options.ladder.iter())

@@ -147,7 +147,11 @@ impl RawSession {
             };
             let session = Session::new(options, running)?;
             let backend = session.statistics().backend;
-            log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
+            log::info!(
+                "a session in mode {mode:?} on {}: {}",
+                backend.name,
+                backend.why
+            );
             Ok(Arc::new(RawSession {
                 state: RwLock::new(State::Open(Arc::new(session))),
                 response,

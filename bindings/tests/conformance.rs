@@ -80,7 +80,12 @@ fn options(case: &Value) -> SessionOptions {
         response: match &case["lut"] {
             Value::Null => Response::Linear,
             levels => Response::Lut {
-                levels: levels.as_array().unwrap().iter().map(|l| int(l) as u8).collect(),
+                levels: levels
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|l| int(l) as u8)
+                    .collect(),
             },
         },
         brightness: match &case["brightness"] {
@@ -116,7 +121,12 @@ fn info(frame: &Value) -> FrameInfo {
             },
             width: int(&colour["width"]),
             height: int(&colour["height"]),
-            planes: colour["planes"].as_array().unwrap().iter().map(plane).collect(),
+            planes: colour["planes"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(plane)
+                .collect(),
             matrix: match colour["matrix"].as_str().unwrap() {
                 "bt601" => YuvMatrix::Bt601,
                 "bt709" => YuvMatrix::Bt709,
@@ -220,8 +230,15 @@ fn frames_become_the_levels_that_are_expected() {
         // modulator's levels are in no order, so a turned one may be any other.
         let (count, most) = difference(&got, want, int(&case["levels"]) as i32);
         let name = &case["name"];
-        assert!(count * 200 <= got.len(), "{name}: {count} of {} levels differ", got.len());
-        assert!(most <= 1 || !case["lut"].is_null(), "{name}: a level differs by {most}");
+        assert!(
+            count * 200 <= got.len(),
+            "{name}: {count} of {} levels differ",
+            got.len()
+        );
+        assert!(
+            most <= 1 || !case["lut"].is_null(),
+            "{name}: a level differs by {most}"
+        );
         all.extend(got);
     }
     assert_eq!(all.len(), expected.len());
@@ -243,10 +260,24 @@ mod write {
         let r = (dx * dx + dy * dy).sqrt() / 0.22;
         if r < 1.0 {
             let light = 0.35 + 0.6 * (1.0 - r * r).sqrt();
-            return ([light, 0.55 * light, 0.2 + 0.1 * y], 0.6 - 0.15 * (1.0 - r * r).sqrt());
+            return (
+                [light, 0.55 * light, 0.2 + 0.1 * y],
+                0.6 - 0.15 * (1.0 - r * r).sqrt(),
+            );
         }
-        let stripe = if (x * 9.0 + y * 4.0).floor() as i64 % 2 == 0 { 0.8 } else { 0.25 };
-        ([0.3 * stripe, 0.3 + 0.5 * stripe * y, stripe * (1.0 - 0.4 * x)], 1.2 + 0.5 * x)
+        let stripe = if (x * 9.0 + y * 4.0).floor() as i64 % 2 == 0 {
+            0.8
+        } else {
+            0.25
+        };
+        (
+            [
+                0.3 * stripe,
+                0.3 + 0.5 * stripe * y,
+                stripe * (1.0 - 0.4 * x),
+            ],
+            1.2 + 0.5 * x,
+        )
     }
 
     fn at(i: usize, n: usize) -> f64 {
@@ -263,7 +294,15 @@ mod write {
 
     impl Frames {
         /// A plane whose rows and pixels have gaps, filled with what must not be read.
-        fn plane(&mut self, width: usize, height: usize, size: usize, pixel: usize, pad: usize, fill: impl Fn(usize, usize) -> Vec<u8>) -> Value {
+        fn plane(
+            &mut self,
+            width: usize,
+            height: usize,
+            size: usize,
+            pixel: usize,
+            pad: usize,
+            fill: impl Fn(usize, usize) -> Vec<u8>,
+        ) -> Value {
             let row = width * pixel + pad;
             let mut bytes = vec![0xa5; row * (height - 1) + (width - 1) * pixel + size];
             for y in 0..height {
@@ -276,14 +315,30 @@ mod write {
             json!({"offset": offset, "length": bytes.len(), "row_stride": row, "pixel_stride": pixel})
         }
 
-        fn colour(&mut self, format: &str, width: usize, height: usize, matrix: &str, video_range: bool, t: f64) -> Value {
+        fn colour(
+            &mut self,
+            format: &str,
+            width: usize,
+            height: usize,
+            matrix: &str,
+            video_range: bool,
+            t: f64,
+        ) -> Value {
             let rgb = |x: usize, y: usize| scene(at(x, width), at(y, height), t).0;
-            let (kr, kb) = if matrix == "bt709" { (0.2126, 0.0722) } else { (0.299, 0.114) };
+            let (kr, kb) = if matrix == "bt709" {
+                (0.2126, 0.0722)
+            } else {
+                (0.299, 0.114)
+            };
             let yuv = |[r, g, b]: [f64; 3]| {
                 let y = kr * r + (1.0 - kr - kb) * g + kb * b;
                 let (u, v) = ((b - y) / (2.0 - 2.0 * kb), (r - y) / (2.0 - 2.0 * kr));
                 match video_range {
-                    true => [(16.0 + 219.0 * y) / 255.0, (128.0 + 224.0 * u) / 255.0, (128.0 + 224.0 * v) / 255.0],
+                    true => [
+                        (16.0 + 219.0 * y) / 255.0,
+                        (128.0 + 224.0 * u) / 255.0,
+                        (128.0 + 224.0 * v) / 255.0,
+                    ],
                     false => [y, u + 128.0 / 255.0, v + 128.0 / 255.0],
                 }
             };
@@ -299,10 +354,14 @@ mod write {
                     let [r, g, b] = rgb(x, y);
                     vec![byte(b), byte(g), byte(r), 9]
                 })],
-                "rgb" => vec![self.plane(width, height, 3, 3, 1, |x, y| rgb(x, y).map(byte).to_vec())],
+                "rgb" => {
+                    vec![self.plane(width, height, 3, 3, 1, |x, y| rgb(x, y).map(byte).to_vec())]
+                }
                 "nv12" => vec![
                     self.plane(width, height, 1, 1, 8, luma),
-                    self.plane(half_w, half_h, 2, 2, 8, |x, y| chroma(x, y)[1..].iter().map(|v| byte(*v)).collect()),
+                    self.plane(half_w, half_h, 2, 2, 8, |x, y| {
+                        chroma(x, y)[1..].iter().map(|v| byte(*v)).collect()
+                    }),
                 ],
                 "yuv420" => vec![
                     self.plane(width, height, 1, 1, 3, luma),
@@ -316,20 +375,34 @@ mod write {
 
         fn depth(&mut self, format: &str, width: usize, height: usize, t: f64) -> Value {
             let hole = |x: usize, y: usize| (x * 7 + y * 3) % 19 == 0;
-            let pixel = if format.ends_with("f32") { 4 } else if format.ends_with("u8") { 1 } else { 2 };
+            let pixel = if format.ends_with("f32") {
+                4
+            } else if format.ends_with("u8") {
+                1
+            } else {
+                2
+            };
             let plane = self.plane(width, height, pixel, pixel, 2 * pixel, |x, y| {
                 let metres = scene(at(x, width), at(y, height), t).1;
                 let measured = if hole(x, y) { 0.0 } else { metres };
                 let normalized = (metres - 0.4) / 1.4;
                 match format {
-                    "metres-f32" => (if hole(x, y) { f32::NAN } else { metres as f32 }).to_le_bytes().to_vec(),
+                    "metres-f32" => (if hole(x, y) { f32::NAN } else { metres as f32 })
+                        .to_le_bytes()
+                        .to_vec(),
                     "metres-f16" => f16_bits(measured).to_le_bytes().to_vec(),
-                    "disparity-f32" => (if hole(x, y) { 0.0 } else { 1.0 / metres as f32 }).to_le_bytes().to_vec(),
-                    "disparity-f16" => f16_bits(if hole(x, y) { 0.0 } else { 1.0 / metres }).to_le_bytes().to_vec(),
+                    "disparity-f32" => (if hole(x, y) { 0.0 } else { 1.0 / metres as f32 })
+                        .to_le_bytes()
+                        .to_vec(),
+                    "disparity-f16" => f16_bits(if hole(x, y) { 0.0 } else { 1.0 / metres })
+                        .to_le_bytes()
+                        .to_vec(),
                     "millimetres-u16" => ((measured * 1000.0) as u16).to_le_bytes().to_vec(),
                     "android-depth16" => {
                         let code = if hole(x, y) { 1 } else { (x as u16 % 3) * 3 };
-                        ((metres * 1000.0) as u16 | code << 13).to_le_bytes().to_vec()
+                        ((metres * 1000.0) as u16 | code << 13)
+                            .to_le_bytes()
+                            .to_vec()
                     }
                     "normalized-u8" => vec![byte(normalized)],
                     "normalized-u16" => ((normalized * 65535.0) as u16).to_le_bytes().to_vec(),
@@ -365,9 +438,7 @@ mod write {
         let mut frames = Frames::default();
         let (w, h) = DISPLAY;
         let display = format!("width = {w}\nheight = {h}\n");
-        let still = |colour: Value, depth: Value| {
-            json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false})
-        };
+        let still = |colour: Value, depth: Value| json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false});
         let case = |name: &str, frames: Vec<Value>| {
             json!({"name": name, "method": "network", "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
                    "brightness": null, "range": null, "frames": frames})
@@ -380,48 +451,92 @@ mod write {
         cases.push(case("RGBA and metres", vec![plain.clone()]));
 
         let mut one = case("BGRA and 16-bit metres, sensor turned", vec![]);
-        let mut frame = still(frames.colour("bgra", 36, 48, "bt601", false, 0.0), frames.depth("metres-f16", 18, 24, 0.0));
+        let mut frame = still(
+            frames.colour("bgra", 36, 48, "bt601", false, 0.0),
+            frames.depth("metres-f16", 18, 24, 0.0),
+        );
         frame["rotation"] = json!(90);
         frame["mirrored"] = json!(true);
         one["frames"] = json!([frame]);
         cases.push(one);
 
-        let mut frame = still(frames.colour("rgb", 61, 47, "bt601", false, 0.0), frames.depth("disparity-f32", 31, 24, 0.0));
+        let mut frame = still(
+            frames.colour("rgb", 61, 47, "bt601", false, 0.0),
+            frames.depth("disparity-f32", 31, 24, 0.0),
+        );
         frame["rotation"] = json!(180);
-        cases.push(case("RGB of odd size and disparity, upside down", vec![frame]));
+        cases.push(case(
+            "RGB of odd size and disparity, upside down",
+            vec![frame],
+        ));
 
-        let mut frame = still(frames.colour("nv12", 64, 48, "bt709", true, 0.0), frames.depth("disparity-f16", 32, 24, 0.0));
+        let mut frame = still(
+            frames.colour("nv12", 64, 48, "bt709", true, 0.0),
+            frames.depth("disparity-f16", 32, 24, 0.0),
+        );
         frame["confidence"] = frames.confidence("low-medium-high", 32, 24);
-        cases.push(case("420v of BT.709 and 16-bit disparity with confidence", vec![frame]));
+        cases.push(case(
+            "420v of BT.709 and 16-bit disparity with confidence",
+            vec![frame],
+        ));
 
-        let mut frame = still(frames.colour("yuv420", 63, 47, "bt601", false, 0.0), frames.depth("millimetres-u16", 40, 30, 0.0));
+        let mut frame = still(
+            frames.colour("yuv420", 63, 47, "bt601", false, 0.0),
+            frames.depth("millimetres-u16", 40, 30, 0.0),
+        );
         frame["confidence"] = frames.confidence("u8", 40, 30);
-        cases.push(case("YUV_420_888 of odd size and millimetres with confidence", vec![frame]));
+        cases.push(case(
+            "YUV_420_888 of odd size and millimetres with confidence",
+            vec![frame],
+        ));
 
-        let mut frame = still(frames.colour("yuv420", 48, 64, "bt601", true, 0.0), frames.depth("android-depth16", 24, 32, 0.0));
+        let mut frame = still(
+            frames.colour("yuv420", 48, 64, "bt601", true, 0.0),
+            frames.depth("android-depth16", 24, 32, 0.0),
+        );
         frame["rotation"] = json!(270);
-        cases.push(case("YUV_420_888 of video range and DEPTH16, sensor turned", vec![frame]));
+        cases.push(case(
+            "YUV_420_888 of video range and DEPTH16, sensor turned",
+            vec![frame],
+        ));
 
-        let frame = still(frames.colour("nv12", 64, 48, "bt601", false, 0.0), frames.depth("normalized-u8", 64, 48, 0.0));
+        let frame = still(
+            frames.colour("nv12", 64, 48, "bt601", false, 0.0),
+            frames.depth("normalized-u8", 64, 48, 0.0),
+        );
         cases.push(case("420f and normalized depth", vec![frame]));
 
-        let mut one = case("a small frame, 16-bit normalized depth, modulator off the volume, double phase, 5 bits", vec![]);
-        one["frames"] = json!([still(frames.colour("rgba", 24, 18, "bt601", false, 0.0), frames.depth("normalized-u16", 24, 18, 0.0))]);
+        let mut one = case(
+            "a small frame, 16-bit normalized depth, modulator off the volume, double phase, 5 bits",
+            vec![],
+        );
+        one["frames"] = json!([still(
+            frames.colour("rgba", 24, 18, "bt601", false, 0.0),
+            frames.depth("normalized-u16", 24, 18, 0.0)
+        )]);
         one["display"] = json!(format!("{display}offset_mm = 4.5\nbits = 5\n"));
         one["levels"] = json!(32);
         one["encoding"] = json!("double-phase");
         cases.push(one);
 
-        let mut one = case("band limit, fixed brightness, fixed range, a calibrated modulator", vec![plain.clone()]);
+        let mut one = case(
+            "band limit, fixed brightness, fixed range, a calibrated modulator",
+            vec![plain.clone()],
+        );
         one["encoding"] = json!("band-limit");
         one["brightness"] = json!(1.25);
         one["range"] = json!([0.5, 1.5]);
         one["lut"] = (0..256).map(|i| (i * 3 / 4 + 20) as u8).collect();
         cases.push(one);
 
-        let mut one = case("the plane sweep, for a display that no network is for", vec![plain]);
+        let mut one = case(
+            "the plane sweep, for a display that no network is for",
+            vec![plain],
+        );
         one["method"] = json!("sweep");
-        one["display"] = json!(format!("{display}pitch_um = 4.5\nwavelengths_nm = [650, 530, 440]\nvolume_depth_mm = 2.0\n"));
+        one["display"] = json!(format!(
+            "{display}pitch_um = 4.5\nwavelengths_nm = [650, 530, 440]\nvolume_depth_mm = 2.0\n"
+        ));
         cases.push(one);
 
         let mut one = case("video", vec![]);
@@ -429,7 +544,10 @@ mod write {
         one["frames"] = (0..4u64)
             .map(|i| {
                 let t = i as f64 / 3.0;
-                let mut frame = still(frames.colour("bgra", 48, 36, "bt601", false, t), frames.depth("metres-f32", 24, 18, t));
+                let mut frame = still(
+                    frames.colour("bgra", 48, 36, "bt601", false, t),
+                    frames.depth("metres-f32", 24, 18, t),
+                );
                 frame["timestamp_ns"] = json!(1_000_000_000 + i * 33_000_000);
                 frame
             })

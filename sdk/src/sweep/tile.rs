@@ -366,8 +366,8 @@ impl<'a> Tile<'a> {
         let [ring_re, ring_im] = ring.each_mut().map(Aligned::values);
         let places = &mut places[..=radius];
         let slot = |row: usize| row % (2 * radius + 1) * stride;
-        for row in top - radius..bottom + radius {
-            let [from, to] = wider[row];
+        let filtered = top - radius..bottom + radius;
+        for (row, &[from, to]) in filtered.clone().zip(&wider[filtered]) {
             if from < to {
                 let centre = row * stride + from;
                 for (j, place) in places.iter_mut().enumerate() {
