@@ -56,7 +56,7 @@ fn options(case: &Value) -> SessionOptions {
     SessionOptions {
         ladder: vec![Rung {
             method: match case["method"].as_str().unwrap() {
-                "network" => Method::Network {
+                "network" => Method::Trained {
                     network: Network::built_in().unwrap(),
                 },
                 "sweep" => Method::Sweep,
@@ -165,7 +165,7 @@ fn info(frame: &Value) -> FrameInfo {
         },
         orientation: Orientation {
             rotation: match frame["rotation"].as_u64().unwrap() {
-                0 => Rotation::None,
+                0 => Rotation::Upright,
                 90 => Rotation::Clockwise90,
                 180 => Rotation::Half,
                 270 => Rotation::Clockwise270,
