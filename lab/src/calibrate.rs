@@ -6,7 +6,7 @@
 //! * [`spot`] finds the coefficients of an aberration from photographs of a focused spot.
 //! * [`rehearse`] does all three on a simulated display.
 //!
-//! What files of a calibration look like is in [`table`]; what is drawn of it in [`chart`].
+//! What files of a calibration look like is in [`table`]; its figures and drawings are [`report`]'s and [`chart`]'s.
 
 pub mod chart;
 pub mod curve;
@@ -16,7 +16,8 @@ pub mod lut;
 pub mod marks;
 pub mod pattern;
 pub mod photograph;
-// pub mod rehearse;
+pub mod rehearse;
+pub mod report;
 pub mod spot;
 pub mod table;
 

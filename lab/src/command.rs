@@ -2,6 +2,7 @@
 //! the laboratory. Flags that several commands share are in [`flags`].
 
 mod bench;
+mod calibrate;
 mod compare;
 mod dataset;
 mod evaluate;
@@ -40,6 +41,8 @@ enum Command {
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
+    #[command(subcommand)]
+    Calibrate(calibrate::Calibrate),
 }
 
 impl Phasefront {
@@ -62,6 +65,7 @@ impl Phasefront {
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),
+            Command::Calibrate(command) => command.run(json),
         })
     }
 }

@@ -86,35 +86,62 @@ impl Search {
     }
 }
 
-/// The levels, (H, W), that focus one colour's light to `z_m` by the correction `a`, through `response`: the sub-hologram in
-/// the middle of the modulator, double phase for the dark around it.
+/// The middle of the frame, as a place of a spot.
+pub const MIDDLE: [f64; 2] = [0.5, 0.5];
+
+/// The levels, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by the correction `a`, through
+/// `response`: the sub-hologram around there, double phase for the dark around it.
 ///
 /// # Errors
-/// A z at the modulator, or so far from it that the sub-hologram does not fit.
+/// A z at the modulator, or so far from it that the sub-hologram does not fit; a response for another size.
 pub fn levels(
     display: &Display,
     response: &Response,
     colour: usize,
     z_m: f64,
+    place: [f64; 2],
     a: &Coefficients,
 ) -> Result<Array2<u8>> {
     let (height, width) = (display.height(), display.width());
-    let plane = zernike::sub_hologram(
-        height,
-        width,
-        display.pitch_m(),
-        display.wavelengths_m()[colour],
-        z_m - display.offset_m(),
-        a,
-    )?;
+    if response
+        .shape()
+        .is_some_and(|shape| shape != (height, width))
+    {
+        return Err(Error::Input(format!(
+            "the per-pixel table is not for the display's {width}×{height} pixels"
+        )));
+    }
+    let (pitch_m, wavelength_m) = (display.pitch_m(), display.wavelengths_m()[colour]);
+    let distance_m = z_m - display.offset_m();
+    let radius_m = zernike::sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
+    let radius = (radius_m / pitch_m).ceil().min(65536.0) as usize;
+    let side = 2 * radius + 1;
+    let part = zernike::sub_hologram(side, side, pitch_m, wavelength_m, distance_m, a)?;
+    let corner = |at: f64, n: usize| ((at * n as f64) as usize).checked_sub(radius);
+    let (Some(left), Some(top)) = (corner(place[0], width), corner(place[1], height)) else {
+        return Err(outside(place, side));
+    };
+    if left + side > width || top + side > height {
+        return Err(outside(place, side));
+    }
     let first = colour * height * width;
     let mut levels = Array2::zeros((height, width));
     for ((y, x), level) in levels.indexed_iter_mut() {
-        let at = y * width + x;
-        let value: Complex32 = plane[at];
-        *level = response.level(double_phase::encode_value(value, x, y, 1.0), first + at);
+        let within = (top..top + side).contains(&y) && (left..left + side).contains(&x);
+        let value = match within {
+            true => part[(y - top) * side + x - left],
+            false => Complex32::ZERO,
+        };
+        let phase = double_phase::encode_value(value, x, y, 1.0);
+        *level = response.level(phase, first + y * width + x);
     }
     Ok(levels)
+}
+
+fn outside([x, y]: [f64; 2], side: usize) -> Error {
+    Error::Input(format!(
+        "a sub-hologram of {side} pixels does not fit around ({x}, {y}) of the frame; a z nearer to the modulator or a place nearer to the middle is needed"
+    ))
 }
 
 /// How sharp the spot of a photograph is: ΣI²/(ΣI)² around its brightest place, in a square of `side` pixels, what lies
@@ -244,7 +271,8 @@ mod tests {
             while !search.is_done() {
                 let sharp: Vec<f64> = (search.trials().iter().enumerate())
                     .map(|(i, trial)| {
-                        let levels = levels(&display, &response, colour, z_m, trial).unwrap();
+                        let levels =
+                            levels(&display, &response, colour, z_m, MIDDLE, trial).unwrap();
                         let shot = (search.round * TRIALS + i) as u64;
                         let photo = simulated
                             .photograph(levels.view(), colour, z_m, shot)

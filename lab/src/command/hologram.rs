@@ -5,10 +5,11 @@ use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
-use phasefront::modulator::Modulator;
-use phasefront::slm::Response;
+use phasefront::method::MethodPlan;
 use phasefront::{Pipeline, RgbdFrame};
-use phasefront_lab::files::{self, HologramInfo};
+use phasefront_lab::calibrate::table::AberrationFile;
+use phasefront_lab::corrected::{self, Correction};
+use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, models, sm_lbm};
@@ -150,18 +151,12 @@ impl Hologram {
             }
         }
         let display = self.display.read()?;
-        let response = match display.lut {
-            Some(lut) => Response::lut(lut),
-            None => Response::linear(display.display.bits())?,
-        };
         let method = self.method.unwrap_or(match self.ldi {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
         let made = match (method, &self.ldi) {
-            (Method::Network, None) => {
-                self.by_network(&self.frame.read()?, &display.display, response)?
-            }
+            (Method::Network, None) => self.by_network(&self.frame.read()?, &display)?,
             (Method::Network, Some(dir)) => {
                 return Err(Error::file(
                     dir,
@@ -173,11 +168,12 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, response)?
+                self.by_physics(method, &ldi, &display)?
             }
         };
         let info = HologramInfo {
-            display: display.display,
+            calibrated: display.calibrated(true),
+            display: display.display.clone(),
             encoder: Some(self.encoder.name().into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
@@ -187,6 +183,7 @@ impl Hologram {
                 encoder: None,
                 scale: None,
                 lut: None,
+                calibrated: display.calibrated(false),
                 ..info.clone()
             };
             files::write_complex(path, field.view(), &info)?;
@@ -196,23 +193,17 @@ impl Hologram {
         Ok(())
     }
 
-    fn by_network(
-        &self,
-        frame: &RgbdFrame,
-        display: &phasefront::Display,
-        response: Response,
-    ) -> Result<Made> {
+    fn by_network(&self, frame: &RgbdFrame, display: &DisplayFile) -> Result<Made> {
         let network = models::network(&self.network, self.precision.is_int8())?;
         let (height, width) = frame.shape();
-        let pipeline = Pipeline::new(
-            height,
-            width,
-            phasefront::Method::Network(&network),
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let method = phasefront::Method::Network(&network);
+        let plan = MethodPlan::new(height, width, method, &display.display)?;
+        let mut modulator =
+            display.modulator((height, width), self.encoder.encoding(), self.scale())?;
+        if let Some(correction) = display.constant_correction()? {
+            modulator = modulator.with_correction(&correction)?;
+        }
+        let pipeline = Pipeline::from_parts(plan, modulator)?;
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -236,22 +227,20 @@ impl Hologram {
     }
 
     /// The methods that need no network, on a layered depth image.
-    fn by_physics(
-        &self,
-        method: Method,
-        ldi: &Ldi,
-        display: &phasefront::Display,
-        response: Response,
-    ) -> Result<Made> {
+    fn by_physics(&self, method: Method, ldi: &Ldi, file: &DisplayFile) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(
-            height,
-            width,
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let display = &file.display;
+        let mut modulator =
+            file.modulator((height, width), self.encoder.encoding(), self.scale())?;
+        // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
+        let (constant, varying) = match (method, file.constant_correction()) {
+            (_, Ok(constant)) => (constant, None),
+            (Method::Layers, Err(_)) => (None, file.aberration.as_ref()),
+            (_, Err(e)) => return Err(e),
+        };
+        if let Some(correction) = constant {
+            modulator = modulator.with_correction(&correction)?;
+        }
         let mut scratch = modulator.scratch();
         let start = Instant::now();
         let bar = progress_bar(0, "");
@@ -268,7 +257,17 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
-                let field = sm_lbm::hologram(ldi, display, self.planes, &progress)?;
+                let (shape, planes) = (ldi.shape(), self.planes);
+                let field = match varying {
+                    None => sm_lbm::hologram(ldi, display, planes, &progress)?,
+                    Some(AberrationFile::Uniform(all)) => {
+                        let correction = Correction::of_aberrations(all, shape, planes, display)?;
+                        corrected::hologram(ldi, display, planes, &correction, &progress)?
+                    }
+                    Some(AberrationFile::Spatial(all)) => {
+                        corrected::spatial::hologram(ldi, display, planes, all, &progress)?
+                    }
+                };
                 ("layers", field)
             }
         };
