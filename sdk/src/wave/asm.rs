@@ -135,6 +135,12 @@ impl Transfer {
         }
     }
 
+    /// One quadrant, (W'/2 + 1, H'/2 + 1).
+    #[cfg(feature = "gpu")]
+    pub(crate) fn quadrant(&self) -> &[Complex32] {
+        &self.quadrant
+    }
+
     /// Multiplies column `x` of a spectrum by the transfer function.
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
         let rows = self.padded_height / 2 + 1;
@@ -258,6 +264,12 @@ impl Propagator {
     /// (H', W').
     pub fn padded_shape(&self) -> (usize, usize) {
         self.fft.padded_shape()
+    }
+
+    /// The transfer function.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn transfer(&self) -> &Transfer {
+        &self.transfer
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.

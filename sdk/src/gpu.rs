@@ -1,0 +1,46 @@
+//! The whole frame on the GPU: the stages of [`crate::pipeline`] as compute passes of wgpu, for Vulkan, Metal and
+//! DirectX 12, RGB-D in and modulator levels out, nothing coming back to the CPU between.
+//!
+//! Each stage is a .wgsl file beside its Rust, and has its CPU twin as oracle: f32 agrees with it to 1e-4, int8 chains
+//! to the bit. A device is not trusted before a small frame came out of it as out of the CPU.
+
+mod chain;
+mod device;
+mod encode;
+mod fft;
+mod input;
+mod pipeline;
+mod probe;
+
+pub use chain::{ChainOptions, Float, Fusion, NetworkPlan};
+pub use device::{Device, DeviceOptions};
+pub use input::{Colour, Depth, FrameBytes};
+pub use pipeline::{Deliver, FLIGHTS, FrameReport, Job, Pipeline, StageTimes, Ticket};
+pub use probe::probe;
+
+/// Why the GPU does not serve.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No GPU, or none that is wanted.
+    #[error("no GPU: {0}")]
+    None(String),
+    /// A feature, a limit or a size that this GPU refuses.
+    #[error("the GPU refuses: {0}")]
+    Refused(String),
+    /// Memory that this GPU does not have.
+    #[error("the GPU is out of memory: {0}")]
+    OutOfMemory(String),
+    /// Results that are not the CPU's.
+    #[error("the GPU answers wrongly: {0}")]
+    Wrong(String),
+    /// A device that went away, with what it was computing.
+    #[error("the GPU was lost: {0}")]
+    Lost(String),
+    /// What the CPU would refuse too.
+    #[error(transparent)]
+    Core(#[from] crate::Error),
+}
+
+/// A result of the GPU.
+pub type Result<T> = std::result::Result<T, Error>;
