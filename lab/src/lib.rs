@@ -6,6 +6,7 @@ pub mod dataset;
 pub mod error;
 pub mod evaluate;
 pub mod files;
+pub mod gpu;
 pub mod ldi;
 pub mod metrics;
 pub mod models;

@@ -9,14 +9,20 @@ mod device;
 mod encode;
 mod fft;
 mod input;
+mod peak;
 mod pipeline;
+mod preview;
 mod probe;
+mod renderer;
 
 pub use chain::{ChainOptions, Float, Fusion, NetworkPlan};
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, Depth, FrameBytes};
+pub use peak::Peak;
 pub use pipeline::{Deliver, FLIGHTS, FrameReport, Job, Pipeline, StageTimes, Ticket};
+pub use preview::Preview;
 pub use probe::probe;
+pub use renderer::{Handed, Otherwise, Renderer};
 
 /// Why the GPU does not serve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -5,9 +5,16 @@
 mod network_models;
 
 use network_models::{Model, frame};
-use phasefront::Network;
-use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion, NetworkPlan};
+use ndarray::{Array2, Array3};
+use num_complex::Complex32;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::gpu::{
+    self, ChainOptions, Colour, Deliver, Depth, Device, DeviceOptions, Float, FrameBytes, Fusion,
+    Job, NetworkPlan,
+};
 use phasefront::network::{Isa, reference};
+use phasefront::slm::Response;
+use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
@@ -157,5 +164,195 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
                 }
             }
         }
+    }
+}
+
+/// A frame with detail everywhere, of values that 8 bits and 16 bits hold.
+fn rgbd(height: usize, width: usize) -> RgbdFrame {
+    let byte = |c: usize, y: usize, x: usize| ((c * 70 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    RgbdFrame::new(
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| byte(c, y, x)),
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            ((x / 8 * 4099 + y / 8 * 257) % 65536) as f32 / 65535.0
+        }),
+    )
+    .unwrap()
+}
+
+fn int8_network() -> Network {
+    Network::from_onnx(include_bytes!("../../models/rgbd-8-int8.onnx")).unwrap()
+}
+
+fn f32_network() -> Network {
+    Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap()
+}
+
+/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
+    let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level));
+    let sum: f32 = a.iter().zip(b).map(|(&a, &b)| (shown(a) - shown(b)).norm()).sum();
+    sum / a.len() as f32
+}
+
+/// The CPU's levels and scale of a job.
+fn on_cpu(job: &Job<'_>, frame: &RgbdFrame) -> (Vec<u8>, f32) {
+    let (h, w) = (job.height, job.width);
+    let response = job.response.clone();
+    let plan =
+        Pipeline::new(h, w, job.method, &job.display, job.encoding, job.scale, response).unwrap();
+    let mut levels = vec![0; 3 * h * w];
+    let mut field = vec![Complex32::ZERO; 3 * h * w];
+    let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
+    (levels, report.unwrap().scale)
+}
+
+#[test]
+fn whole_frames_are_those_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let (int8, f32) = (int8_network(), f32_network());
+    let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
+    let linear = Response::linear(8).unwrap();
+    let half = if device.has_half() { Float::F16 } else { Float::F32 };
+    let cases = [
+        (&int8, (61, 47), 0.0, Encoding::ANTI_ALIAS, Scale::Max, &linear, Float::F32),
+        (&int8, (61, 47), 6e-3, Encoding::BAND_LIMIT, Scale::Max, &lut, Float::F32),
+        (&f32, (61, 47), -3e-3, Encoding::DoublePhase, Scale::Fixed(1.0), &linear, Float::F32),
+        (&f32, (61, 47), 2e-3, Encoding::ANTI_ALIAS, Scale::Fixed(0.8), &lut, half),
+        (&f32, (384, 384), 4e-3, Encoding::ANTI_ALIAS, Scale::Max, &linear, Float::F32),
+        (&int8, (540, 960), 0.0, Encoding::ANTI_ALIAS, Scale::Fixed(1.0), &linear, Float::F32),
+    ];
+    for (network, (h, w), offset_m, encoding, scale, response, float) in cases {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let method = Method::Network(network);
+        let mut job = Job::new(h, w, method, &display, encoding, scale, response.clone());
+        job.chain.float = float;
+        let frame = rgbd(h, w);
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&FrameBytes::of(&frame), &mut levels).unwrap();
+        let tolerance = if float == Float::F16 { 0.05 } else { 0.002 };
+        let what = format!("{} {h}×{w} {encoding:?} {scale:?}", plan.describe());
+        let apart = apart(&levels, &expected, response);
+        println!("{what}: {apart} {report:?}");
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
+    }
+}
+
+#[test]
+fn formats_of_cameras_are_read_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let network = int8_network();
+    // Odd, so that rows of 16-bit depth do not begin at words.
+    let (h, w) = (33, 45);
+    let frame = rgbd(h, w);
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(&network);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let planar = Job::new(h, w, method, &display, encoding, scale, response);
+    let (expected, _) = on_cpu(&planar, &frame);
+    let byte = |value: f32| (value * 255.0).round() as u8;
+    let pixels = |order: [usize; 3]| -> Vec<u8> {
+        let pixel = |i: usize| {
+            let [a, b, c] = order.map(|c| byte(frame.rgb()[[c, i / w, i % w]]));
+            [a, b, c, 17]
+        };
+        (0..h * w).flat_map(pixel).collect()
+    };
+    let words: Vec<u8> = frame
+        .depth()
+        .iter()
+        .flat_map(|d| ((d * 65535.0).round() as u16).to_le_bytes())
+        .collect();
+    let reals: Vec<u8> = frame.depth().iter().flat_map(|d| d.to_le_bytes()).collect();
+    for (colour, bytes) in [(Colour::Rgba, pixels([0, 1, 2])), (Colour::Bgra, pixels([2, 1, 0]))] {
+        for (depth, of_depth) in [(Depth::U16, &words), (Depth::F32, &reals)] {
+            let job = Job {
+                colour,
+                depth,
+                ..planar.clone()
+            };
+            let bytes = FrameBytes {
+                colour: &bytes,
+                depth: of_depth,
+            };
+            let read = bytes.read(colour, depth, (h, w)).unwrap();
+            assert!((&read.rgb() - &frame.rgb()).iter().all(|d| d.abs() < 1e-6));
+            assert!((&read.depth() - &frame.depth()).iter().all(|d| d.abs() < 1e-6));
+            let mut levels = vec![0; 3 * h * w];
+            let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+            plan.process(&bytes, &mut levels).unwrap();
+            let apart = apart(&levels, &expected, &planar.response);
+            assert!(apart < 0.002, "{colour:?} {depth:?}: {apart}");
+            let short = FrameBytes {
+                depth: &of_depth[1..],
+                ..bytes
+            };
+            let refused = plan.submit(&short, Deliver::Levels).unwrap_err();
+            assert!(refused.to_string().contains("depth"), "{refused}");
+        }
+    }
+}
+
+#[test]
+fn several_frames_fly_and_each_has_its_own_levels() {
+    let Some(device) = device() else { return };
+    let network = int8_network();
+    let (h, w) = (33, 45);
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(&network);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let job = Job::new(h, w, method, &display, encoding, scale, response);
+    let frames: Vec<RgbdFrame> = (0..3)
+        .map(|i| {
+            let frame = rgbd(h, w);
+            let rgb = frame.rgb().mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
+            RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
+        })
+        .collect();
+    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let tickets: Vec<_> = frames
+        .iter()
+        .map(|frame| plan.submit(&FrameBytes::of(frame), Deliver::Levels).unwrap())
+        .collect();
+    let full = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Levels);
+    assert!(full.unwrap_err().to_string().contains("in flight"));
+    let mut scales = Vec::new();
+    // Collected in another order than submitted.
+    for (ticket, frame) in tickets.into_iter().zip(&frames).rev() {
+        let (expected, scale) = on_cpu(&job, frame);
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.collect(ticket, &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.response);
+        assert!(apart < 0.002, "{apart}");
+        assert!((report.scale - scale).abs() < 1e-3, "{report:?} {scale}");
+        scales.push(report.scale);
+    }
+    assert!(scales[0] < scales[1] && scales[1] < scales[2]);
+    // One that is shown, and its picture.
+    let ticket = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Shown).unwrap();
+    let texture = plan.texture(&ticket);
+    assert_eq!((texture.width(), texture.height()), (w as u32, h as u32));
+    plan.finish(ticket).unwrap();
+    let ticket = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Shown).unwrap();
+    let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
+    assert!(refused.to_string().contains("shown"), "{refused}");
+}
+
+#[test]
+fn a_device_is_tried_out_before_it_is_used() {
+    let Some(device) = device() else { return };
+    let (int8, f32) = (int8_network(), f32_network());
+    for network in [&int8, &f32] {
+        let display = Display::default().with_offset_m(5e-3).unwrap();
+        let response = Response::linear(8).unwrap();
+        let method = Method::Network(network);
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+        let job = Job::new(1080, 1920, method, &display, encoding, scale, response);
+        gpu::probe(&device, &job).unwrap();
     }
 }

@@ -1,19 +1,21 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::gpu::{Device, DeviceOptions, FrameBytes, Job};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
 use phasefront::{Pipeline, RgbdFrame};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, models, sm_lbm};
+use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -45,6 +47,8 @@ pub(crate) struct Hologram {
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
+    #[command(flatten)]
+    backend: BackendFlags,
     #[command(flatten)]
     display: DisplayFlags,
     /// Write the complex field at the modulator there too, with a .json beside it
@@ -158,7 +162,19 @@ impl Hologram {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
+        let device = self.backend.device()?;
+        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+            return Err(Error::Input(
+                "--backend gpu runs --method network, without --complex; the rest is the CPU's".into(),
+            ));
+        }
         let made = match (method, &self.ldi) {
+            (Method::Network, None) if device.is_some() => self.on_gpu(
+                &self.frame.read()?,
+                &display.display,
+                response,
+                &device.unwrap_or_default(),
+            )?,
             (Method::Network, None) => {
                 self.by_network(&self.frame.read()?, &display.display, response)?
             }
@@ -232,6 +248,41 @@ impl Hologram {
                 ("encode", modulation.encode),
             ],
             engine: engine.map(|engine| format!("{} ({})", engine.name, engine.why)),
+        })
+    }
+
+    /// By a network on a GPU that was tried out before.
+    fn on_gpu(
+        &self,
+        frame: &RgbdFrame,
+        display: &phasefront::Display,
+        response: Response,
+        options: &DeviceOptions,
+    ) -> Result<Made> {
+        let network = models::network(&self.network, self.precision.is_int8())?;
+        let (height, width) = frame.shape();
+        let method = phasefront::Method::Network(&network);
+        let (encoding, scale) = (self.encoder.encoding(), self.scale());
+        let job = Job::new(height, width, method, display, encoding, scale, response);
+        let device = Arc::new(Device::open(options)?);
+        phasefront::gpu::probe(&device, &job)?;
+        let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
+        let mut levels = Array3::zeros((3, height, width));
+        let bytes = levels.as_slice_mut().expect("standard layout");
+        let report = pipeline.process(&FrameBytes::of(frame), bytes)?;
+        gpu::keep_programs(&device);
+        let times = report.times.unwrap_or_default();
+        Ok(Made {
+            field: None,
+            levels,
+            scale: report.scale,
+            stages: vec![
+                ("input", times.input),
+                ("network", times.network),
+                ("propagate", times.propagate),
+                ("encode", times.encode),
+            ],
+            engine: Some(pipeline.describe()),
         })
     }
 

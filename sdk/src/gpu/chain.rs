@@ -2,7 +2,7 @@
 //! is faster on this device. Its twins are [`crate::network::reference`] and the kernels' int8 module.
 
 use super::device::{Constants, Device, Dispatch};
-use super::input::{ChainInput, Colour, Depth, Packer};
+use super::input::{ChainInput, Packer, Source};
 use super::{Error, Result};
 use crate::network::chain::{Chain, Layer, Precision, Weights};
 use crate::network::{Head, Network};
@@ -127,6 +127,8 @@ pub(super) struct ChainPlan {
     /// Sums of the field: three complex f32 for each of `parts` workgroups.
     pub(super) partial: wgpu::Buffer,
     pub(super) parts: usize,
+    /// What the dispatches read and write, each value once.
+    pub(super) bytes: usize,
 }
 
 /// What all steps of a chain share while they are made.
@@ -199,6 +201,7 @@ impl ChainPlan {
             field: device.buffer("the field", field)?,
             partial: device.buffer("sums", 24 * tiles.0 * tiles.1)?,
             parts: tiles.0 * tiles.1,
+            bytes: 0,
         };
         let make = |fusion| maker.steps(chain, &packed, input, &features, &plan, end, fusion);
         let between = groups * PAIR_TILE * PAIR_TILE * numbers.value_bytes();
@@ -215,6 +218,13 @@ impl ChainPlan {
             }
             _ => (make(Fusion::Layers)?, Fusion::Layers),
         };
+        let input = chain.inputs.div_ceil(GROUP) * width * height * numbers.value_bytes();
+        // Features in and out of each hidden layer and into the last one; skips are read once more where layers are
+        // not fused; the input twice; the end once.
+        let hidden = plan.dispatches() - 1;
+        let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
+        let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
+        plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * width * height;
         Ok(plan)
     }
 
@@ -594,7 +604,7 @@ impl NetworkPlan {
         device.guarded(|| {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
-            let packer = Packer::new(device, chain, numbers, size, (Colour::Ready, Depth::F32))?;
+            let packer = Packer::new(device, chain, numbers, size, Source::Planes)?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
             Ok(NetworkPlan {

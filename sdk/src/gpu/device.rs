@@ -20,7 +20,7 @@ pub struct DeviceOptions {
     /// A part of the adapter's name, in any case; without one the fastest that is hardware is taken. Drivers in
     /// software are taken by name only: they are slower than the CPU path.
     pub name: Option<String>,
-    /// What [`Device::programs`] gave on an earlier run, with its [`Device::programs_key`].
+    /// What [`Device::programs`] gave on an earlier run. What another GPU or driver compiled is ignored.
     pub programs: Option<Vec<u8>>,
 }
 
@@ -135,11 +135,6 @@ impl Device {
         self.cache.as_ref().and_then(wgpu::PipelineCache::get_data)
     }
 
-    /// Under which name [`Device::programs`] are to be kept: another for each kind of GPU.
-    pub fn programs_key(&self) -> Option<String> {
-        wgpu::util::pipeline_cache_key(&self.info)
-    }
-
     /// The device and the queue themselves, for an app that shows what is computed.
     pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
         (&self.inner, &self.queue)
@@ -178,18 +173,22 @@ impl Device {
             submission_index: Some(submission.clone()),
             timeout: Some(patience),
         });
-        if let Err(why) = waited {
-            self.give_up(&format!(
-                "no answer for {} s: {}",
-                patience.as_secs(),
-                one_line(why)
-            ));
+        match waited {
+            Ok(_) => {}
+            Err(wgpu::PollError::Timeout) => {
+                self.give_up(&format!("no answer for {} s", patience.as_secs()));
+            }
+            Err(why) => self.give_up(&one_line(why)),
         }
         self.check()
     }
 
     /// Does `work` and gives what the device has against it as an error.
     pub(crate) fn guarded<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        // A device that was lost since says so when it is asked.
+        if let Err(why) = self.inner.poll(wgpu::PollType::Poll) {
+            self.give_up(&one_line(why));
+        }
         self.check()?;
         let memory = self.inner.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let internal = self.inner.push_error_scope(wgpu::ErrorFilter::Internal);

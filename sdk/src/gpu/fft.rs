@@ -44,7 +44,10 @@ pub(super) struct Planes<'a> {
 }
 
 /// A convolution of three planes, ready to run.
-pub(super) struct Convolution([Dispatch; 3]);
+pub(super) struct Convolution {
+    steps: [Dispatch; 3],
+    table: wgpu::Buffer,
+}
 
 /// What one of the three dispatches does.
 #[derive(Clone, Copy)]
@@ -123,16 +126,27 @@ impl Convolution {
         let places = |from: [usize; 4], to: [usize; 4]| -> [usize; 8] {
             std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] })
         };
-        Ok(Convolution([
+        let steps = [
             make("rows", row, height, &row_roots.buffer, planes.field, &rows, places(frame, spectra))?,
             // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
             make("columns", column, padded_width, &column_roots.buffer, &column_roots.buffer, &rows, places(columns, columns))?,
             make("rows back", back, height, &row_roots.buffer, &rows, planes.field, places(spectra, frame))?,
-        ]))
+        ];
+        Ok(Convolution {
+            steps,
+            table: table.buffer,
+        })
+    }
+
+    /// Another filter from the next submission on: as many quadrants as were planned, one after another.
+    pub(super) fn set(&self, device: &Device, quadrants: &[Complex32]) {
+        device
+            .queue
+            .write_buffer(&self.table, 0, bytemuck::cast_slice(quadrants));
     }
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        self.0.iter().for_each(|step| step.run(pass));
+        self.steps.iter().for_each(|step| step.run(pass));
     }
 }
 

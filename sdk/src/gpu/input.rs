@@ -6,14 +6,12 @@ use super::device::{Constants, Device, Dispatch};
 use super::{Error, Result};
 use crate::frame::RgbdFrame;
 use crate::network::chain::{Chain, Quantisation};
+use ndarray::{Array2, Array3};
 
 /// How colour lies in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Colour {
-    /// The network's input planes themselves, f32, of any number.
-    #[doc(hidden)]
-    Ready,
     /// Three planes of f32 in \[0, 1], one after another: an [`RgbdFrame`]'s.
     Planar,
     /// Bytes red, green, blue, alpha (which is not looked at).
@@ -30,6 +28,15 @@ pub enum Depth {
     F32,
     /// 65535 is 1.
     U16,
+}
+
+/// What a [`Packer`] reads.
+#[derive(Clone, Copy)]
+pub(super) enum Source {
+    /// The network's input planes themselves, f32, of any number.
+    Planes,
+    /// A frame.
+    Frame(Colour, Depth),
 }
 
 /// A frame's bytes, rows and pixels without gaps. Little-endian, as all these devices are.
@@ -50,6 +57,76 @@ impl<'a> FrameBytes<'a> {
             colour: bytemuck::cast_slice(rgb),
             depth: bytemuck::cast_slice(depth),
         }
+    }
+}
+
+impl FrameBytes<'_> {
+    /// The frame that the bytes stand for, on the CPU: the twin of the input stage.
+    ///
+    /// # Errors
+    /// [`crate::Error::Frame`] for bytes of another length, or values that no frame has.
+    pub fn read(
+        &self,
+        colour: Colour,
+        depth: Depth,
+        (height, width): (usize, usize),
+    ) -> Result<RgbdFrame> {
+        self.check(bytes_of(Source::Frame(colour, depth), 0, height * width))?;
+        let real = |bytes: &[u8]| -> Vec<f32> { bytemuck::pod_collect_to_vec(bytes) };
+        let bytes = |order: [usize; 3]| -> Vec<f32> {
+            let plane = |c: usize| self.colour.iter().skip(c).step_by(4);
+            let bytes = order.into_iter().flat_map(plane);
+            bytes.map(|&byte| f32::from(byte) / 255.0).collect()
+        };
+        let rgb = match colour {
+            Colour::Planar => real(self.colour),
+            Colour::Rgba => bytes([0, 1, 2]),
+            Colour::Bgra => bytes([2, 1, 0]),
+        };
+        let depth = match depth {
+            Depth::F32 => real(self.depth),
+            Depth::U16 => {
+                let words: Vec<u16> = bytemuck::pod_collect_to_vec(self.depth);
+                words.iter().map(|&word| f32::from(word) / 65535.0).collect()
+            }
+        };
+        let shape = |_| Error::from(crate::Error::Frame("lengths do not fit".into()));
+        Ok(RgbdFrame::new(
+            Array3::from_shape_vec((3, height, width), rgb).map_err(shape)?,
+            Array2::from_shape_vec((height, width), depth).map_err(shape)?,
+        )?)
+    }
+
+    fn check(&self, right: (usize, usize)) -> Result<()> {
+        for (what, is, right) in [
+            ("colour", self.colour.len(), right.0),
+            ("depth", self.depth.len(), right.1),
+        ] {
+            if is != right {
+                return Err(crate::Error::Frame(format!(
+                    "{what} has {is} bytes; the planned format has {right}"
+                ))
+                .into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Bytes of colour and of depth of `area` pixels.
+fn bytes_of(source: Source, inputs: usize, area: usize) -> (usize, usize) {
+    match source {
+        Source::Planes => (4 * inputs * area, 0),
+        Source::Frame(colour, depth) => (
+            match colour {
+                Colour::Planar => 12 * area,
+                Colour::Rgba | Colour::Bgra => 4 * area,
+            },
+            match depth {
+                Depth::F32 => 4 * area,
+                Depth::U16 => 2 * area,
+            },
+        ),
     }
 }
 
@@ -80,22 +157,11 @@ impl Packer {
         chain: &Chain,
         numbers: Numbers,
         (height, width): (usize, usize),
-        (colour, depth): (Colour, Depth),
+        source: Source,
     ) -> Result<Self> {
         let area = height * width;
         let groups = chain.inputs.div_ceil(GROUP);
-        let bytes = (
-            match colour {
-                Colour::Ready => 4 * chain.inputs * area,
-                Colour::Planar => 12 * area,
-                Colour::Rgba | Colour::Bgra => 4 * area,
-            },
-            match (colour, depth) {
-                (Colour::Ready, _) => 0,
-                (_, Depth::F32) => 4 * area,
-                (_, Depth::U16) => 2 * area,
-            },
-        );
+        let bytes = bytes_of(source, chain.inputs, area);
         let first = device.buffer("the network's input", groups * area * numbers.value_bytes())?;
         let input = match numbers {
             Numbers::Int8 => ChainInput {
@@ -121,25 +187,27 @@ impl Packer {
         };
         let header = format!(
             "{enable}alias Value = {value};
-            const PLANAR: u32 = 1u;
             const READY: u32 = 0u;
+            const PLANAR: u32 = 1u;
+            const RGBA: u32 = 2u;
             const BGRA: u32 = 3u;
-            const WORDS: u32 = 0u;
-            const COLOUR: u32 = {colour}u;
-            const DEPTH: u32 = {depth}u;
+            const REAL: u32 = 0u;
+            const WORDS: u32 = 1u;
+            const COLOUR: u32 = {colour};
+            const DEPTH: u32 = {depth};
             const CHANNELS: u32 = {channels}u;
             const GROUPS: u32 = {groups}u;
             ",
             value = numbers.value(),
-            colour = match colour {
-                Colour::Ready => 0,
-                Colour::Planar => 1,
-                Colour::Rgba => 2,
-                Colour::Bgra => 3,
+            colour = match source {
+                Source::Planes => "READY",
+                Source::Frame(Colour::Planar, _) => "PLANAR",
+                Source::Frame(Colour::Rgba, _) => "RGBA",
+                Source::Frame(Colour::Bgra, _) => "BGRA",
             },
-            depth = match depth {
-                Depth::F32 => 0,
-                Depth::U16 => 1,
+            depth = match source {
+                Source::Planes | Source::Frame(_, Depth::F32) => "REAL",
+                Source::Frame(_, Depth::U16) => "WORDS",
             },
             channels = chain.inputs,
         );
@@ -179,17 +247,7 @@ impl Packer {
 
     /// Sends a frame's bytes on their way; they are there when what is submitted next begins.
     pub(super) fn upload(&self, device: &Device, frame: &FrameBytes<'_>) -> Result<()> {
-        for (what, is, right) in [
-            ("colour", frame.colour.len(), self.bytes.0),
-            ("depth", frame.depth.len(), self.bytes.1),
-        ] {
-            if is != right {
-                return Err(crate::Error::Frame(format!(
-                    "{what} has {is} bytes; the planned format has {right}"
-                ))
-                .into());
-            }
-        }
+        frame.check(self.bytes)?;
         for (to, bytes) in [(&self.colour, frame.colour), (&self.depth, frame.depth)] {
             // Copies take whole words.
             let (words, rest) = bytes.split_at(bytes.len() / 4 * 4);

@@ -13,8 +13,6 @@ struct Steps { first: array<f32, 256>, last: array<f32, 256> }
 @group(0) @binding(5) var<storage, read_write> image: array<vec4f>;
 @group(0) @binding(6) var<storage, read> steps: Steps;
 
-fn byte(at: u32) -> f32 { return f32((colour[at / 4u] >> (8u * (at % 4u))) & 255u); }
-
 fn rgb(x: u32, y: u32) -> vec3f {
     let at = y * frame.width + x;
     if (COLOUR == PLANAR) {
@@ -28,7 +26,7 @@ fn rgb(x: u32, y: u32) -> vec3f {
 }
 
 fn distance(at: u32) -> f32 {
-    if (DEPTH == WORDS) { return bitcast<f32>(depth[at]); }
+    if (DEPTH == REAL) { return bitcast<f32>(depth[at]); }
     return f32((depth[at / 2u] >> (16u * (at % 2u))) & 65535u) / 65535.0;
 }
 

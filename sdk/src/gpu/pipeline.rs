@@ -4,7 +4,8 @@ use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
-use super::input::{Colour, Depth, FrameBytes, Packer};
+use super::input::{Colour, Depth, FrameBytes, Packer, Source};
+use super::peak::Peak;
 use super::{Error, Result};
 use crate::display::Display;
 use crate::encode::{Encoding, Scale};
@@ -197,7 +198,8 @@ impl Pipeline {
     ) -> Result<Self> {
         let chain = network.chain();
         let numbers = Numbers::of(device, chain, job.chain.float)?;
-        let packer = Packer::new(device, chain, numbers, size, (job.colour, job.depth))?;
+        let source = Source::Frame(job.colour, job.depth);
+        let packer = Packer::new(device, chain, numbers, size, source)?;
         let end = End::Field(network.head());
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
@@ -279,6 +281,19 @@ impl Pipeline {
     /// What the network is computed in: `f32`, `f16` or `int8`.
     pub fn numbers(&self) -> &'static str {
         self.numbers.name()
+    }
+
+    /// What the device does at its best, measured now, in the network's numbers.
+    ///
+    /// # Errors
+    /// What the device refuses; [`Error::Lost`].
+    pub fn peak(&self) -> Result<Peak> {
+        super::peak::measure(&self.device, self.numbers)
+    }
+
+    /// Bytes that the network's dispatches read and write in a frame, each value once.
+    pub fn network_bytes(&self) -> usize {
+        self.chain.bytes
     }
 
     /// Sends a frame through. At most [`FLIGHTS`] may be in flight.
