@@ -595,7 +595,14 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
 #[test]
 fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let folder = Folder::new().with_frame();
-    folder.succeeds(&with(&["--scale", "1", "--offset-mm", "3", "-o", "cpu.png"]));
+    folder.succeeds(&with(&[
+        "--scale",
+        "1",
+        "--offset-mm",
+        "3",
+        "-o",
+        "cpu.png",
+    ]));
     // Drivers write to stderr where no desktop runs.
     let on_gpu = |more: &[&str]| {
         Command::new(env!("CARGO_BIN_EXE_phasefront"))
@@ -607,13 +614,27 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
             .unwrap()
     };
     let gpu = ["--backend", "gpu", "--gpu"];
-    let missing = on_gpu(&with(&[&gpu[..], &["no such card", "-o", "gpu.png"]].concat()));
+    let missing = on_gpu(&with(
+        &[&gpu[..], &["no such card", "-o", "gpu.png"]].concat(),
+    ));
     let errors = String::from_utf8(missing.stderr).unwrap();
     assert_eq!(missing.status.code(), Some(1), "{errors}");
-    assert!(errors.contains("error: no GPU") && errors.contains("--backend cpu"), "{errors}");
+    assert!(
+        errors.contains("error: no GPU") && errors.contains("--backend cpu"),
+        "{errors}"
+    );
     assert!(!folder.path("gpu.png").exists());
 
-    let more = ["llvmpipe", "--scale", "1", "--offset-mm", "3", "-o", "gpu.png", "--json"];
+    let more = [
+        "llvmpipe",
+        "--scale",
+        "1",
+        "--offset-mm",
+        "3",
+        "-o",
+        "gpu.png",
+        "--json",
+    ];
     let made = on_gpu(&with(&[&gpu[..], &more].concat()));
     let errors = String::from_utf8(made.stderr).unwrap();
     if errors.contains("no GPU") {
@@ -622,15 +643,41 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     }
     assert!(made.status.success(), "{errors}");
     let report: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
-    assert!(report["engine"].as_str().unwrap().contains("int8"), "{report}");
-    let levels = |name| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
+    assert!(
+        report["engine"].as_str().unwrap().contains("int8"),
+        "{report}"
+    );
+    let levels = |name| {
+        image::open(folder.path(name))
+            .unwrap()
+            .into_rgb8()
+            .into_raw()
+    };
     let apart = |(a, b): (&u8, &u8)| (a.wrapping_sub(*b) as i8).unsigned_abs() > 1;
     let (cpu, gpu) = (levels("cpu.png"), levels("gpu.png"));
     let differing = cpu.iter().zip(&gpu).filter(|pair| apart(*pair)).count();
     assert!(differing * 100 < cpu.len(), "{differing} of {}", cpu.len());
 
-    let bench = ["bench", "--backend", "gpu", "--gpu", "llvmpipe", "--seconds", "0", "--json"];
-    let more = ["--size", "48x32", "--layers", "8", "--precision", "int8", "--fusion", "pairs"];
+    let bench = [
+        "bench",
+        "--backend",
+        "gpu",
+        "--gpu",
+        "llvmpipe",
+        "--seconds",
+        "0",
+        "--json",
+    ];
+    let more = [
+        "--size",
+        "48x32",
+        "--layers",
+        "8",
+        "--precision",
+        "int8",
+        "--fusion",
+        "pairs",
+    ];
     let measured = on_gpu(&[&bench[..], &more].concat());
     let errors = String::from_utf8(measured.stderr).unwrap();
     assert!(measured.status.success(), "{errors}");
@@ -638,11 +685,17 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let row = &report["rows"][0];
     assert_eq!(row["backend"], "gpu");
     assert!(row["total_ms"].as_f64().unwrap() > 0.0, "{report}");
-    assert!(row["kernels"].as_str().unwrap().contains("Pairs in 5"), "{report}");
+    assert!(
+        row["kernels"].as_str().unwrap().contains("Pairs in 5"),
+        "{report}"
+    );
 
     for (arguments, word) in [
         (with(&["--gpu", "x", "-o", "o.png"]), "--backend gpu"),
-        (with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]), "--complex"),
+        (
+            with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]),
+            "--complex",
+        ),
     ] {
         folder.refuses(&arguments, 1, &[word]);
     }

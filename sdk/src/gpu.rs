@@ -17,7 +17,7 @@ mod renderer;
 
 pub use chain::{ChainOptions, Float, Fusion, NetworkPlan};
 pub use device::{Device, DeviceOptions};
-pub use input::{Colour, Depth, FrameBytes};
+pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use peak::Peak;
 pub use pipeline::{Deliver, FLIGHTS, FrameReport, Job, Pipeline, StageTimes, Ticket};
 pub use preview::Preview;

@@ -26,9 +26,9 @@ pub struct PipelineScratch {
 /// How long each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageTimes {
-    /// From the frame to the midpoint hologram.
+    /// From the frame to the hologram where the method ends.
     pub method: Duration,
-    /// From the midpoint to the modulator.
+    /// From there to the modulator.
     pub propagate: Duration,
     /// From the field to levels.
     pub encode: Duration,
@@ -64,9 +64,13 @@ impl Pipeline {
         scale: Scale,
         response: Response,
     ) -> Result<Self> {
+        let method = MethodPlan::new(height, width, method, display)?;
+        // The modulator does the rest of the way.
+        let left_m = display.offset_m() - method.z_m();
+        let display = display.clone().with_offset_m(left_m)?;
         Ok(Pipeline {
-            method: MethodPlan::new(height, width, method, display)?,
-            modulator: Modulator::new(height, width, display, encoding, scale, response)?,
+            method,
+            modulator: Modulator::new(height, width, &display, encoding, scale, response)?,
         })
     }
 
@@ -75,7 +79,7 @@ impl Pipeline {
         self.method.shape()
     }
 
-    /// The plan of the midpoint hologram.
+    /// The plan of the method.
     pub fn method(&self) -> &MethodPlan {
         &self.method
     }
@@ -88,8 +92,8 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): midpoint hologram, mean phase taken out,
-    /// offset. Gives the times of the midpoint hologram and of the offset.
+    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out (but for an
+    /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -101,7 +105,9 @@ impl Pipeline {
     ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
         self.method.field(frame, field, &mut scratch.method)?;
-        remove_mean_phase(field);
+        if !self.modulator.keeps_phase() {
+            remove_mean_phase(field);
+        }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))
@@ -119,6 +125,21 @@ impl Pipeline {
     ) -> Modulation {
         self.modulator
             .modulate(field, levels, &mut scratch.modulator)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one: a session chooses it for each frame.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .modulate_at(field, scale, levels, &mut scratch.modulator)
     }
 
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as

@@ -1,12 +1,15 @@
 //! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
 #![allow(unsafe_code, clippy::unwrap_used)]
 
+mod network_models;
+
+use network_models::Model;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::{Display, Modulator};
+use phasefront::{Display, Modulator, Network};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -48,6 +51,7 @@ fn hot_calls_allocate_nothing() {
     let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
+    let prefilter = Network::from_onnx(&Model::prefilter("6").bytes()).unwrap();
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -64,6 +68,7 @@ fn hot_calls_allocate_nothing() {
                 Encoding::DoublePhase,
                 Encoding::ANTI_ALIAS,
                 Encoding::BAND_LIMIT,
+                Encoding::Deep(&prefilter),
             ] {
                 let response = Response::linear(8).unwrap();
                 let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response).unwrap();

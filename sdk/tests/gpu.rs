@@ -4,13 +4,16 @@
 
 mod network_models;
 
-use network_models::{Model, frame};
 use ndarray::{Array2, Array3};
+use network_models::{Model, frame};
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{
+    ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
+};
 use phasefront::gpu::{
-    self, ChainOptions, Colour, Deliver, Depth, Device, DeviceOptions, Float, FrameBytes, Fusion,
-    Job, NetworkPlan,
+    self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions,
+    Float, Frame, Fusion, Job, NetworkPlan,
 };
 use phasefront::network::{Isa, reference};
 use phasefront::slm::Response;
@@ -39,10 +42,18 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     a.iter()
         .zip(b)
         .map(|(a, b)| (a - b).abs())
-        .fold(0.0, |worst, d| if d > worst || d.is_nan() { d } else { worst })
+        .fold(
+            0.0,
+            |worst, d| if d > worst || d.is_nan() { d } else { worst },
+        )
 }
 
-fn run(network: &Network, options: ChainOptions, (h, w): (usize, usize), input: &[f32]) -> Vec<f32> {
+fn run(
+    network: &Network,
+    options: ChainOptions,
+    (h, w): (usize, usize),
+    input: &[f32],
+) -> Vec<f32> {
     let device = device().unwrap();
     let plan = NetworkPlan::new(&device, network, h, w, options).unwrap();
     let mut output = vec![f32::NAN; 6 * h * w];
@@ -149,7 +160,8 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
             let input = frame(model.inputs, size.0, size.1, 7);
             let plan = network.plan_on(Isa::Portable, size.0, size.1).unwrap();
             let mut expected = vec![0.0; 6 * size.0 * size.1];
-            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
+            plan.run(&input, &mut expected, &mut plan.scratch())
+                .unwrap();
             for fusion in [Fusion::Layers, Fusion::Pairs] {
                 let options = ChainOptions {
                     float: Float::F32,
@@ -179,27 +191,41 @@ fn rgbd(height: usize, width: usize) -> RgbdFrame {
     .unwrap()
 }
 
-fn int8_network() -> Network {
-    Network::from_onnx(include_bytes!("../../models/rgbd-8-int8.onnx")).unwrap()
+fn int8_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../models/rgbd-8-int8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
 }
 
-fn f32_network() -> Network {
-    Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap()
+fn f32_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../models/rgbd-8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
 }
 
 /// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
 fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
     let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level));
-    let sum: f32 = a.iter().zip(b).map(|(&a, &b)| (shown(a) - shown(b)).norm()).sum();
+    let sum: f32 = a
+        .iter()
+        .zip(b)
+        .map(|(&a, &b)| (shown(a) - shown(b)).norm())
+        .sum();
     sum / a.len() as f32
 }
 
 /// The CPU's levels and scale of a job.
-fn on_cpu(job: &Job<'_>, frame: &RgbdFrame) -> (Vec<u8>, f32) {
+fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
     let (h, w) = (job.height, job.width);
-    let response = job.response.clone();
-    let plan =
-        Pipeline::new(h, w, job.method, &job.display, job.encoding, job.scale, response).unwrap();
+    let job = job.clone();
+    let plan = Pipeline::new(
+        h,
+        w,
+        job.method,
+        &job.display,
+        job.encoding,
+        job.scale,
+        job.response,
+    )
+    .unwrap();
     let mut levels = vec![0; 3 * h * w];
     let mut field = vec![Complex32::ZERO; 3 * h * w];
     let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
@@ -212,88 +238,259 @@ fn whole_frames_are_those_of_the_cpu() {
     let (int8, f32) = (int8_network(), f32_network());
     let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
     let linear = Response::linear(8).unwrap();
-    let half = if device.has_half() { Float::F16 } else { Float::F32 };
+    let half = if device.has_half() {
+        Float::F16
+    } else {
+        Float::F32
+    };
     let cases = [
-        (&int8, (61, 47), 0.0, Encoding::ANTI_ALIAS, Scale::Max, &linear, Float::F32),
-        (&int8, (61, 47), 6e-3, Encoding::BAND_LIMIT, Scale::Max, &lut, Float::F32),
-        (&f32, (61, 47), -3e-3, Encoding::DoublePhase, Scale::Fixed(1.0), &linear, Float::F32),
-        (&f32, (61, 47), 2e-3, Encoding::ANTI_ALIAS, Scale::Fixed(0.8), &lut, half),
-        (&f32, (384, 384), 4e-3, Encoding::ANTI_ALIAS, Scale::Max, &linear, Float::F32),
-        (&int8, (540, 960), 0.0, Encoding::ANTI_ALIAS, Scale::Fixed(1.0), &linear, Float::F32),
+        (
+            &int8,
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Scale::Max,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (61, 47),
+            6e-3,
+            Encoding::BAND_LIMIT,
+            Scale::Max,
+            &lut,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            -3e-3,
+            Encoding::DoublePhase,
+            Scale::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            2e-3,
+            Encoding::ANTI_ALIAS,
+            Scale::Fixed(0.8),
+            &lut,
+            half,
+        ),
+        (
+            &f32,
+            (384, 384),
+            4e-3,
+            Encoding::ANTI_ALIAS,
+            Scale::Max,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (540, 960),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Scale::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
     ];
     for (network, (h, w), offset_m, encoding, scale, response, float) in cases {
         let display = Display::default().with_offset_m(offset_m).unwrap();
-        let method = Method::Network(network);
+        let method = Method::Network(network.clone());
+        let encoded = format!("{encoding:?} {scale:?}");
         let mut job = Job::new(h, w, method, &display, encoding, scale, response.clone());
         job.chain.float = float;
         let frame = rgbd(h, w);
         let (expected, expected_scale) = on_cpu(&job, &frame);
         let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
         let mut levels = vec![0; 3 * h * w];
-        let report = plan.process(&FrameBytes::of(&frame), &mut levels).unwrap();
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
         let tolerance = if float == Float::F16 { 0.05 } else { 0.002 };
-        let what = format!("{} {h}×{w} {encoding:?} {scale:?}", plan.describe());
+        let what = format!("{} {h}×{w} {encoded}", plan.describe());
         let apart = apart(&levels, &expected, response);
         println!("{what}: {apart} {report:?}");
         assert!(apart < tolerance, "{what}: {apart}");
         let scales = (report.scale - expected_scale).abs() / expected_scale;
-        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
+        assert!(
+            scales < tolerance,
+            "{what}: {} {expected_scale}",
+            report.scale
+        );
+    }
+}
+
+/// Bytes of camera planes for an odd-sided sensor, with strides as cameras have them.
+struct Sensor {
+    format: ColourFormat,
+    planes: Vec<(Vec<u8>, usize, usize)>,
+}
+
+impl Sensor {
+    fn all((h, w): (usize, usize)) -> Vec<Sensor> {
+        let plane = |rows: usize, columns: usize, step: usize, pad: usize, seed: usize| {
+            let row = columns * step + pad;
+            let smooth = |i: usize| 127.0 + 100.0 * ((i % row) as f32 * 0.13 + seed as f32).sin();
+            let bytes = (0..rows * row).map(|i| (smooth(i) + (i / row % 23) as f32) as u8);
+            (bytes.collect(), row, step)
+        };
+        let (half_h, half_w) = (h.div_ceil(2), w.div_ceil(2));
+        let video = YuvEncoding {
+            matrix: YuvMatrix::Bt709,
+            video_range: true,
+        };
+        let full = YuvEncoding::default();
+        vec![
+            Sensor {
+                format: ColourFormat::Rgba,
+                planes: vec![plane(h, w, 4, 0, 1)],
+            },
+            Sensor {
+                format: ColourFormat::Bgra,
+                planes: vec![plane(h, w, 4, 12, 2)],
+            },
+            Sensor {
+                format: ColourFormat::Rgb,
+                planes: vec![plane(h, w, 3, 1, 3)],
+            },
+            Sensor {
+                format: ColourFormat::Nv12(video),
+                planes: vec![plane(h, w, 1, 7, 4), plane(half_h, half_w, 2, 6, 5)],
+            },
+            Sensor {
+                format: ColourFormat::Yuv420(full),
+                planes: vec![
+                    plane(h, w, 1, 3, 6),
+                    plane(half_h, half_w, 2, 1, 7),
+                    // A stride beyond what there is room for.
+                    plane(half_h, half_w, 9, 900, 8),
+                ],
+            },
+        ]
+    }
+
+    fn image(&self, (h, w): (usize, usize)) -> ColourImage<'_> {
+        let planes: Vec<Plane<'_>> = self
+            .planes
+            .iter()
+            .map(|(bytes, row, step)| Plane::new(bytes, *row, *step))
+            .collect();
+        ColourImage::new(self.format, w, h, &planes).unwrap()
     }
 }
 
 #[test]
-fn formats_of_cameras_are_read_as_on_the_cpu() {
+fn images_of_cameras_are_read_as_on_the_cpu() {
     let Some(device) = device() else { return };
     let network = int8_network();
     // Odd, so that rows of 16-bit depth do not begin at words.
     let (h, w) = (33, 45);
-    let frame = rgbd(h, w);
+    let words: Vec<u16> = (0..h * w).map(|i| (i * 4099 % 65536) as u16).collect();
     let display = Display::default();
     let response = Response::linear(8).unwrap();
-    let method = Method::Network(&network);
+    let method = Method::Network(network);
     let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
     let planar = Job::new(h, w, method, &display, encoding, scale, response);
-    let (expected, _) = on_cpu(&planar, &frame);
-    let byte = |value: f32| (value * 255.0).round() as u8;
-    let pixels = |order: [usize; 3]| -> Vec<u8> {
-        let pixel = |i: usize| {
-            let [a, b, c] = order.map(|c| byte(frame.rgb()[[c, i / w, i % w]]));
-            [a, b, c, 17]
-        };
-        (0..h * w).flat_map(pixel).collect()
+    let turned = Orientation {
+        rotation: Rotation::Clockwise90,
+        mirrored: true,
     };
-    let words: Vec<u8> = frame
-        .depth()
-        .iter()
-        .flat_map(|d| ((d * 65535.0).round() as u16).to_le_bytes())
-        .collect();
-    let reals: Vec<u8> = frame.depth().iter().flat_map(|d| d.to_le_bytes()).collect();
-    for (colour, bytes) in [(Colour::Rgba, pixels([0, 1, 2])), (Colour::Bgra, pixels([2, 1, 0]))] {
-        for (depth, of_depth) in [(Depth::U16, &words), (Depth::F32, &reals)] {
+    for (sensor, orientation) in [((33, 45), Orientation::default()), ((75, 49), turned)] {
+        for camera in Sensor::all(sensor) {
+            let image = camera.image(sensor);
             let job = Job {
-                colour,
-                depth,
+                colour: Colour::Camera {
+                    format: camera.format,
+                    height: sensor.0,
+                    width: sensor.1,
+                    orientation,
+                },
+                depth: Depth::U16,
                 ..planar.clone()
             };
-            let bytes = FrameBytes {
-                colour: &bytes,
-                depth: of_depth,
+            let frame = Frame {
+                colour: ColourData::Camera(image),
+                depth: DepthData::U16(&words),
             };
-            let read = bytes.read(colour, depth, (h, w)).unwrap();
-            assert!((&read.rgb() - &frame.rgb()).iter().all(|d| d.abs() < 1e-6));
-            assert!((&read.depth() - &frame.depth()).iter().all(|d| d.abs() < 1e-6));
+            let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
             let mut levels = vec![0; 3 * h * w];
             let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
-            plan.process(&bytes, &mut levels).unwrap();
+            plan.process(&frame, &mut levels).unwrap();
             let apart = apart(&levels, &expected, &planar.response);
-            assert!(apart < 0.002, "{colour:?} {depth:?}: {apart}");
-            let short = FrameBytes {
-                depth: &of_depth[1..],
-                ..bytes
-            };
-            let refused = plan.submit(&short, Deliver::Levels).unwrap_err();
-            assert!(refused.to_string().contains("depth"), "{refused}");
+            assert!(apart < 0.003, "{:?} {sensor:?}: {apart}", camera.format);
+            for other in [
+                Frame {
+                    depth: DepthData::U16(&words[1..]),
+                    ..frame
+                },
+                Frame {
+                    depth: DepthData::F32(&[0.0; 33 * 45]),
+                    ..frame
+                },
+                Frame {
+                    colour: ColourData::Planar(&[0.0; 3 * 33 * 45]),
+                    ..frame
+                },
+            ] {
+                assert!(plan.submit(&other, Deliver::Levels).is_err());
+            }
         }
+    }
+}
+
+#[test]
+fn a_pre_filter_network_filters_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let tanh = Model {
+        inputs: 6,
+        input: "field",
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(4, 8)
+    };
+    let models = [
+        tanh.clone(),
+        Model {
+            int8: true,
+            ..tanh.clone()
+        },
+        Model {
+            tanh: false,
+            head: "real-imaginary",
+            ..tanh
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            ..Model::int8(5, 8)
+        },
+    ];
+    for model in models {
+        let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let (h, w) = (47, 61);
+        let display = Display::default();
+        let response = Response::linear(8).unwrap();
+        let method = Method::Network(f32_network());
+        let encoding = Encoding::Deep(prefilter);
+        let mut job = Job::new(h, w, method, &display, encoding, Scale::Max, response);
+        job.chain.float = Float::F32;
+        let frame = rgbd(h, w);
+        let (expected, scale) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.response);
+        // A step of 8 bits to the other side is worth more than rounding.
+        let tolerance = if model.int8 { 0.02 } else { 0.003 };
+        assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
+        assert!(
+            (report.scale - scale).abs() < tolerance * scale,
+            "{report:?} {scale}"
+        );
     }
 }
 
@@ -304,22 +501,24 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let (h, w) = (33, 45);
     let display = Display::default();
     let response = Response::linear(8).unwrap();
-    let method = Method::Network(&network);
+    let method = Method::Network(network.clone());
     let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
     let job = Job::new(h, w, method, &display, encoding, scale, response);
     let frames: Vec<RgbdFrame> = (0..3)
         .map(|i| {
             let frame = rgbd(h, w);
-            let rgb = frame.rgb().mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
+            let rgb = frame
+                .rgb()
+                .mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
             RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
         })
         .collect();
     let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
     let tickets: Vec<_> = frames
         .iter()
-        .map(|frame| plan.submit(&FrameBytes::of(frame), Deliver::Levels).unwrap())
+        .map(|frame| plan.submit(&Frame::of(frame), Deliver::Levels).unwrap())
         .collect();
-    let full = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Levels);
+    let full = plan.submit(&Frame::of(&frames[0]), Deliver::Levels);
     assert!(full.unwrap_err().to_string().contains("in flight"));
     let mut scales = Vec::new();
     // Collected in another order than submitted.
@@ -334,11 +533,11 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     }
     assert!(scales[0] < scales[1] && scales[1] < scales[2]);
     // One that is shown, and its picture.
-    let ticket = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Shown).unwrap();
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
     let texture = plan.texture(&ticket);
     assert_eq!((texture.width(), texture.height()), (w as u32, h as u32));
     plan.finish(ticket).unwrap();
-    let ticket = plan.submit(&FrameBytes::of(&frames[0]), Deliver::Shown).unwrap();
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
     let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
     assert!(refused.to_string().contains("shown"), "{refused}");
 }
@@ -350,7 +549,7 @@ fn a_device_is_tried_out_before_it_is_used() {
     for network in [&int8, &f32] {
         let display = Display::default().with_offset_m(5e-3).unwrap();
         let response = Response::linear(8).unwrap();
-        let method = Method::Network(network);
+        let method = Method::Network(network.clone());
         let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
         let job = Job::new(1080, 1920, method, &display, encoding, scale, response);
         gpu::probe(&device, &job).unwrap();

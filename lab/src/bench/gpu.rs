@@ -5,7 +5,7 @@ use super::{Case, median, test_frame};
 use crate::error::Result;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::gpu::{
-    ChainOptions, Deliver, Device, FLIGHTS, FrameBytes, Job, Pipeline, StageTimes, probe,
+    ChainOptions, Deliver, Device, FLIGHTS, Frame, Job, Pipeline, StageTimes, probe,
 };
 use phasefront::slm::Response;
 use phasefront::{Display, Method};
@@ -63,7 +63,7 @@ pub fn measure(
     let mut job = Job::new(
         height,
         width,
-        Method::Network(network),
+        Method::Network(network.clone()),
         display,
         Encoding::ANTI_ALIAS,
         Scale::Fixed(1.0),
@@ -73,7 +73,7 @@ pub fn measure(
     probe(device, &job)?;
     let mut pipeline = Pipeline::new(device, &job)?;
     let frame = test_frame(height, width)?;
-    let bytes = FrameBytes::of(&frame);
+    let bytes = Frame::of(&frame);
     let mut levels = vec![0; 3 * height * width];
     let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let mut totals = Vec::new();
@@ -122,8 +122,8 @@ pub fn measure(
     let total_ms = median(&mut totals);
     let peak = pipeline.peak()?;
     let network_s = stage_ms.get("network").map(|ms| ms / 1e3);
-    let mac_per_s = network_s
-        .map(|s| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
+    let mac_per_s =
+        network_s.map(|s| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
     Ok(GpuRow {
         layers: network.layers(),
         precision: pipeline.numbers().to_owned(),

@@ -3,9 +3,9 @@
 use super::flags::{BackendFlags, DisplayFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
-use phasefront::{Display, Network};
-use phasefront::network::Precision;
 use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
+use phasefront::network::Precision;
+use phasefront::{Display, Network};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
@@ -116,7 +116,7 @@ impl Bench {
     /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
     fn on_gpu(
         &self,
-        networks: &[Network],
+        networks: &[Arc<Network>],
         sizes: &[(usize, usize)],
         display: &Display,
         options: &DeviceOptions,

@@ -1,14 +1,14 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{BackendFlags, DisplayFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
-use phasefront::gpu::{Device, DeviceOptions, FrameBytes, Job};
+use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
-use phasefront::{Pipeline, RgbdFrame};
+use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
@@ -35,15 +35,17 @@ pub(crate) struct Hologram {
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
-    /// Planes of --method layers and points
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    planes: usize,
+    /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
+    #[arg(long, value_name = "N")]
+    planes: Option<usize>,
+    /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
     /// What keeps light from where it should not go, for --method points
     #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
     occlusion: OcclusionName,
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -63,6 +65,8 @@ pub(crate) struct Hologram {
 enum Method {
     /// A trained network on the RGB-D image
     Network,
+    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    Sweep,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -104,31 +108,21 @@ impl PrecisionName {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum EncoderName {
-    /// Double phase
-    Double,
-    /// Double phase after a small blur (AA-DPM)
-    AntiAlias,
-    /// Double phase after a cut of high frequencies (BL-DPM)
-    BandLimit,
-}
+/// Planes of the methods of exact waves.
+const DEFAULT_PLANES: usize = 256;
 
-impl EncoderName {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            EncoderName::Double => Encoding::DoublePhase,
-            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
-            EncoderName::BandLimit => Encoding::BAND_LIMIT,
-        }
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            EncoderName::Double => "double",
-            EncoderName::AntiAlias => "anti-alias",
-            EncoderName::BandLimit => "band-limit",
-        }
+/// The sweep that suits `display`, with these planes and taps where given.
+pub(super) fn sweep_for(
+    display: &phasefront::Display,
+    planes: Option<usize>,
+    taps: Option<usize>,
+) -> Sweep {
+    let usual = Sweep::for_display(display);
+    let planes = planes.unwrap_or(usual.planes);
+    Sweep {
+        planes,
+        taps: taps.unwrap_or_else(|| Sweep::taps_for(display, planes)),
+        ..usual
     }
 }
 
@@ -153,6 +147,7 @@ impl Hologram {
                 ));
             }
         }
+        let encoding = self.encoder.read()?;
         let display = self.display.read()?;
         let response = match display.lut {
             Some(lut) => Response::lut(lut),
@@ -165,23 +160,32 @@ impl Hologram {
         let device = self.backend.device()?;
         if device.is_some() && (method != Method::Network || self.complex.is_some()) {
             return Err(Error::Input(
-                "--backend gpu runs --method network, without --complex; the rest is the CPU's".into(),
+                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                    .into(),
             ));
         }
         let made = match (method, &self.ldi) {
-            (Method::Network, None) if device.is_some() => self.on_gpu(
-                &self.frame.read()?,
-                &display.display,
-                response,
-                &device.unwrap_or_default(),
-            )?,
             (Method::Network, None) => {
-                self.by_network(&self.frame.read()?, &display.display, response)?
+                let network = models::network(&self.network, self.precision.is_int8())?;
+                let method = phasefront::Method::Network(network);
+                match &device {
+                    Some(options) => {
+                        self.on_gpu(method, &display.display, encoding, response, options)?
+                    }
+                    None => {
+                        self.by_pipeline("network", method, &display.display, encoding, response)?
+                    }
+                }
             }
-            (Method::Network, Some(dir)) => {
+            (Method::Sweep, None) => {
+                let sweep = sweep_for(&display.display, self.planes, self.taps);
+                let method = phasefront::Method::Sweep(sweep);
+                self.by_pipeline("sweep", method, &display.display, encoding, response)?
+            }
+            (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network takes --rgb and --depth; for a layered depth image use --method layers or points",
+                    "--method network and sweep take --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
             (Method::Layers | Method::Points, source) => {
@@ -189,7 +193,7 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, response)?
+                self.by_physics(method, &ldi, &display.display, encoding, response)?
             }
         };
         let info = HologramInfo {
@@ -212,20 +216,23 @@ impl Hologram {
         Ok(())
     }
 
-    fn by_network(
+    /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
+    fn by_pipeline(
         &self,
-        frame: &RgbdFrame,
+        stage: &'static str,
+        method: phasefront::Method,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
-        let network = models::network(&self.network, self.precision.is_int8())?;
+        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let pipeline = Pipeline::new(
             height,
             width,
-            phasefront::Method::Network(&network),
+            method,
             display,
-            self.encoder.encoding(),
+            encoding,
             self.scale(),
             response,
         )?;
@@ -243,7 +250,7 @@ impl Hologram {
             levels,
             scale: modulation.scale,
             stages: vec![
-                ("network", predict),
+                (stage, predict),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
@@ -254,22 +261,22 @@ impl Hologram {
     /// By a network on a GPU that was tried out before.
     fn on_gpu(
         &self,
-        frame: &RgbdFrame,
+        method: phasefront::Method,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
         options: &DeviceOptions,
     ) -> Result<Made> {
-        let network = models::network(&self.network, self.precision.is_int8())?;
+        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let method = phasefront::Method::Network(&network);
-        let (encoding, scale) = (self.encoder.encoding(), self.scale());
+        let scale = self.scale();
         let job = Job::new(height, width, method, display, encoding, scale, response);
         let device = Arc::new(Device::open(options)?);
         phasefront::gpu::probe(&device, &job)?;
         let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
         let mut levels = Array3::zeros((3, height, width));
         let bytes = levels.as_slice_mut().expect("standard layout");
-        let report = pipeline.process(&FrameBytes::of(frame), bytes)?;
+        let report = pipeline.process(&Frame::of(frame), bytes)?;
         gpu::keep_programs(&device);
         let times = report.times.unwrap_or_default();
         Ok(Made {
@@ -292,18 +299,13 @@ impl Hologram {
         method: Method,
         ldi: &Ldi,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(
-            height,
-            width,
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
         let mut scratch = modulator.scratch();
+        let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
         let bar = progress_bar(0, "");
         let progress = |done: usize, total: usize| {
@@ -314,12 +316,12 @@ impl Hologram {
             Method::Points => {
                 bar.set_message("rows");
                 let occlusion = self.occlusion.occlusion();
-                let field = point_based::hologram(ldi, display, self.planes, occlusion, &progress)?;
+                let field = point_based::hologram(ldi, display, planes, occlusion, &progress)?;
                 ("points", field)
             }
             _ => {
                 bar.set_message("planes");
-                let field = sm_lbm::hologram(ldi, display, self.planes, &progress)?;
+                let field = sm_lbm::hologram(ldi, display, planes, &progress)?;
                 ("layers", field)
             }
         };

@@ -5,7 +5,7 @@ use super::device::{Constants, Device, Dispatch};
 use super::input::{ChainInput, Packer, Source};
 use super::{Error, Result};
 use crate::network::chain::{Chain, Layer, Precision, Weights};
-use crate::network::{Head, Network};
+use crate::network::{Head, InputKind, Network};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -113,7 +113,7 @@ pub(super) enum End {
     /// The six planes.
     Planes,
     /// The complex field that they stand for, and its sums by workgroup.
-    Field(Head),
+    Field(Head, InputKind),
 }
 
 /// A chain on the GPU for one frame size.
@@ -192,7 +192,7 @@ impl ChainPlan {
         ];
         let (planes, field) = match end {
             End::Planes => (24 * width * height, 0),
-            End::Field(_) => (0, 24 * width * height),
+            End::Field(..) => (0, 24 * width * height),
         };
         let mut plan = ChainPlan {
             steps: Vec::new(),
@@ -223,7 +223,11 @@ impl ChainPlan {
         // not fused; the input twice; the end once.
         let hidden = plan.dispatches() - 1;
         let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
-        let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
+        let again = if plan.fusion == Fusion::Pairs {
+            0
+        } else {
+            skips
+        };
         plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * width * height;
         Ok(plan)
     }
@@ -318,8 +322,7 @@ impl Maker<'_> {
         let tables = self.tables(second)?;
         let each = first.bytes.len() / self.eight_bytes();
         let more = format!("const EACH: u32 = {each}u;\n");
-        let source =
-            self.source(second, &weights, true, &more) + include_str!("chain_pair.wgsl");
+        let source = self.source(second, &weights, true, &more) + include_str!("chain_pair.wgsl");
         let program = self.device.program("two layers", source, "pair");
         let mut arguments = self.arguments(&weights, from, from);
         arguments.push((4, to.as_entire_binding()));
@@ -341,8 +344,9 @@ impl Maker<'_> {
         let weights = self.device.constants("weights", &layer.bytes)?;
         let head = match end {
             End::Planes => 0,
-            End::Field(Head::AmplitudePhase) => 1,
-            End::Field(Head::RealImaginary) => 2,
+            End::Field(Head::AmplitudePhase, _) => 1,
+            End::Field(Head::RealImaginary, InputKind::Field) => 3,
+            End::Field(Head::RealImaginary, _) => 2,
         };
         let more = format!("const HEAD: u32 = {head}u;\nconst TANH: bool = {tanh};\n");
         let source = self.source(layer, &weights, false, &more) + include_str!("chain_last.wgsl");
@@ -358,7 +362,11 @@ impl Maker<'_> {
     }
 
     fn grid(&self) -> [usize; 3] {
-        [self.size.1.div_ceil(TILE.0), self.size.0.div_ceil(TILE.1), 1]
+        [
+            self.size.1.div_ceil(TILE.0),
+            self.size.0.div_ceil(TILE.1),
+            1,
+        ]
     }
 
     fn arguments<'b>(

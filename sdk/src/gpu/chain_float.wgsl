@@ -94,5 +94,5 @@ fn activation(v: vec4f) -> Value { return Real4(max(v, vec4f(0))); }
 fn residual(v: vec4f, skip: Value) -> Value { return Real4(max(v, vec4f(0)) + vec4f(skip)); }
 fn following(v: Value) -> Value { return v; }
 
-// The real part that the network's correction is added to.
-fn base(at: u32) -> vec4f { return vec4f(beside[at]) + 0.5; }
+// The network's input, which its correction is added to.
+fn base(at: u32) -> vec4f { return vec4f(beside[at]); }

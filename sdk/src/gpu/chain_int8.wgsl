@@ -89,5 +89,5 @@ fn following(v: Value) -> Value {
     ));
 }
 
-// The real part that the network's correction is added to.
-fn base(at: u32) -> vec4f { return image[at] + 0.5; }
+// The network's input, which its correction is added to.
+fn base(at: u32) -> vec4f { return image[at]; }

@@ -199,7 +199,11 @@ impl Device {
         self.check()?;
         match errors.into_iter().flatten().next() {
             Some(wgpu::Error::OutOfMemory { source }) => Err(Error::OutOfMemory(one_line(source))),
-            Some(why) => Err(Error::Refused(format!("{}: {}", self.name(), one_line(why)))),
+            Some(why) => Err(Error::Refused(format!(
+                "{}: {}",
+                self.name(),
+                one_line(why)
+            ))),
             None => done,
         }
     }
@@ -392,13 +396,11 @@ impl Program {
             .collect();
         Ok(Dispatch {
             pipeline: self.0.clone(),
-            arguments: device
-                .inner
-                .create_bind_group(&wgpu::BindGroupDescriptor {
-                    label: None,
-                    layout: &self.0.get_bind_group_layout(0),
-                    entries: &entries,
-                }),
+            arguments: device.inner.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.0.get_bind_group_layout(0),
+                entries: &entries,
+            }),
             grid: grid.map(|n| n as u32),
         })
     }
@@ -453,7 +455,9 @@ fn adapter(name: Option<&str>) -> Result<wgpu::Adapter> {
         Error::None(match (name, names.is_empty()) {
             (_, true) => "no driver of Vulkan, Metal or DirectX 12 answers".into(),
             (Some(name), _) => format!("none is called '{name}'; there is {names}"),
-            (None, _) => format!("only drivers in software answer ({names}); they are taken by name"),
+            (None, _) => {
+                format!("only drivers in software answer ({names}); they are taken by name")
+            }
         })
     })
 }
@@ -494,8 +498,8 @@ pub(super) mod testing {
     pub(crate) fn device() -> Option<Arc<Device>> {
         static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
         let opened = DEVICE.get_or_init(|| {
-            let opened = Device::open(&DeviceOptions::default())
-                .or_else(|_| Device::open(&software()));
+            let opened =
+                Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
             opened.ok().map(Arc::new)
         });
         if opened.is_none() {
@@ -545,7 +549,11 @@ pub(super) mod testing {
         assert_eq!(a.len(), b.len());
         let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);
         let worst = |worst: f32, d: f32| if d > worst || d.is_nan() { d } else { worst };
-        a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, worst) / most
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).norm())
+            .fold(0.0, worst)
+            / most
     }
 }
 

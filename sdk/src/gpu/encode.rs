@@ -1,12 +1,15 @@
-//! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM and BL-DPM, double
-//! phase, the response. The twin of [`crate::encode`] and [`crate::slm`].
+//! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
+//! double phase, the response. The twin of [`crate::encode`] and [`crate::slm`].
 
+use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Constants, Device, Dispatch};
 use super::fft::{Convolution, Planes, quadrant};
+use super::input::{Packer, Source};
 use super::{Error, Result};
 use crate::encode::anti_alias::AntiAlias;
 use crate::encode::band_limit::BandLimit;
 use crate::encode::{Encoding, Scale};
+use crate::network::{InputKind, Network};
 use crate::slm::Response;
 
 /// Taps to one side up to which the blur is done in the same sweep as what follows it.
@@ -81,6 +84,7 @@ impl Target {
 
 /// The encoding of one field buffer into several targets.
 pub(super) struct Encoder {
+    prefilter: Option<Prefilter>,
     convolution: Option<Convolution>,
     before: Vec<Dispatch>,
     /// For each target.
@@ -97,7 +101,8 @@ impl Encoder {
         device: &Device,
         field: &wgpu::Buffer,
         size: (usize, usize),
-        encoding: Encoding,
+        encoding: &Encoding,
+        options: ChainOptions,
         scale: Scale,
         response: &Response,
         mut turn: Option<&wgpu::Buffer>,
@@ -109,14 +114,15 @@ impl Encoder {
         let mut convolution = None;
         let mut before = Vec::new();
         let mut taps = vec![1.0];
-        #[allow(unreachable_patterns)]
+        let mut prefilter = None;
+        let mut seen = field.clone();
         match encoding {
             Encoding::DoublePhase => {}
             Encoding::AntiAlias { sigma, width: wide } => {
-                taps = AntiAlias::new(sigma, wide)?.taps().to_vec();
+                taps = AntiAlias::new(*sigma, *wide)?.taps().to_vec();
             }
             Encoding::BandLimit { k } => {
-                let limit = BandLimit::new(height, width, k)?;
+                let limit = BandLimit::new(height, width, *k)?;
                 let kept = quadrant(size, |kx, ky| f32::from(u8::from(limit.keeps(kx, ky))));
                 convolution = Some(Convolution::new(
                     device,
@@ -129,7 +135,11 @@ impl Encoder {
                     },
                 )?);
             }
-            _ => return Err(Error::Refused(format!("{encoding:?} runs on the CPU only"))),
+            Encoding::Deep(network) => {
+                let made = Prefilter::new(device, network, field, size, options)?;
+                seen = made.chain.field.clone();
+                prefilter = Some(made);
+            }
         }
         let mut half = taps.len() - 1;
         if half > FUSED_HALF {
@@ -168,12 +178,15 @@ impl Encoder {
             table.is_some()
         );
         let source = header + include_str!("encode.wgsl");
-        let response = device.table("the response", bytemuck::cast_slice(&table.unwrap_or([0; 256])))?;
+        let response = device.table(
+            "the response",
+            bytemuck::cast_slice(&table.unwrap_or([0; 256])),
+        )?;
         let turn = turn.unwrap_or(&response.buffer);
         let common = [
             (0, frame.buffer.as_entire_binding()),
             (1, settings.buffer.as_entire_binding()),
-            (2, field.as_entire_binding()),
+            (2, seen.as_entire_binding()),
             (3, turn.as_entire_binding()),
         ];
         let grid = [width.div_ceil(COLUMNS), height, 1];
@@ -197,6 +210,7 @@ impl Encoder {
             })
             .collect::<Result<_>>()?;
         Ok(Encoder {
+            prefilter,
             convolution,
             before,
             encode,
@@ -214,6 +228,10 @@ impl Encoder {
 
     /// Encodes into the target of that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, target: usize) {
+        if let Some(prefilter) = &self.prefilter {
+            prefilter.packer.run(pass);
+            prefilter.chain.run(pass);
+        }
         if let Some(convolution) = &self.convolution {
             convolution.run(pass);
         }
@@ -227,6 +245,37 @@ impl Encoder {
             Scale::Fixed(scale) => scale,
             Scale::Max => f32::from_bits(largest).sqrt(),
         }
+    }
+}
+
+/// DDPM's network on a field.
+struct Prefilter {
+    packer: Packer,
+    chain: ChainPlan,
+}
+
+impl Prefilter {
+    fn new(
+        device: &Device,
+        network: &Network,
+        field: &wgpu::Buffer,
+        size: (usize, usize),
+        options: ChainOptions,
+    ) -> Result<Self> {
+        if network.input() != InputKind::Field {
+            return Err(crate::Error::Network(format!(
+                "a pre-filter takes 'field', this network '{}'",
+                network.input()
+            ))
+            .into());
+        }
+        let chain = network.chain();
+        let numbers = Numbers::of(device, chain, options.float)?;
+        let packer = Packer::new(device, chain, numbers, size, Source::Field(field))?;
+        let end = End::Field(network.head(), InputKind::Field);
+        let (input, fusion) = (&packer.input, options.fusion);
+        let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
+        Ok(Prefilter { packer, chain })
     }
 }
 
@@ -264,7 +313,11 @@ impl Blur<'_> {
             (3, to.as_entire_binding()),
             (4, turn.unwrap_or(from).as_entire_binding()),
         ];
-        program.on(device, &arguments, [self.size.1.div_ceil(COLUMNS), self.size.0, 3])
+        program.on(
+            device,
+            &arguments,
+            [self.size.1.div_ceil(COLUMNS), self.size.0, 3],
+        )
     }
 }
 
@@ -323,20 +376,27 @@ mod tests {
             width: 5,
         };
         let eight = Response::Linear { bits: 8 };
+        let wide = || wide.clone();
         let cases = [
             ((61, 47), Encoding::DoublePhase, Scale::Max, eight.clone()),
             ((61, 47), Encoding::ANTI_ALIAS, Scale::Max, lut.clone()),
-            ((61, 47), Encoding::ANTI_ALIAS, Scale::Fixed(0.7), Response::Linear { bits: 5 }),
+            (
+                (61, 47),
+                Encoding::ANTI_ALIAS,
+                Scale::Fixed(0.7),
+                Response::Linear { bits: 5 },
+            ),
             ((61, 47), five, Scale::Max, eight.clone()),
-            ((61, 47), wide, Scale::Fixed(1.1), eight.clone()),
+            ((61, 47), wide(), Scale::Fixed(1.1), eight.clone()),
             ((61, 47), Encoding::BAND_LIMIT, Scale::Max, lut),
-            ((1, 1), wide, Scale::Max, eight.clone()),
+            ((1, 1), wide(), Scale::Max, eight.clone()),
             ((384, 384), Encoding::ANTI_ALIAS, Scale::Max, eight.clone()),
             ((540, 960), Encoding::ANTI_ALIAS, Scale::Fixed(1.0), eight),
         ];
         for (size, encoding, scale, response) in cases {
             let area = size.0 * size.1;
-            let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
+            let turns =
+                [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
             let turn = upload(&device, &turns);
             let mut expected = field(area);
             let buffer = upload(&device, &expected);
@@ -344,7 +404,15 @@ mod tests {
                 .guarded(|| {
                     let targets = [Target::new(&device, size)?, Target::new(&device, size)?];
                     let encoder = Encoder::new(
-                        &device, &buffer, size, encoding, scale, &response, Some(&turn), &targets,
+                        &device,
+                        &buffer,
+                        size,
+                        &encoding,
+                        ChainOptions::default(),
+                        scale,
+                        &response,
+                        Some(&turn),
+                        &targets,
                     )?;
                     Ok((encoder, targets))
                 })
@@ -355,17 +423,24 @@ mod tests {
             for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
                 plane.iter_mut().for_each(|value| *value *= turn);
             }
-            let twin = crate::encode::Encoder::new(size.0, size.1, encoding).unwrap();
+            let twin = crate::encode::Encoder::new(size.0, size.1, encoding.clone()).unwrap();
             let mut levels = vec![0; 3 * area];
             let used = twin.encode_levels(
-                &mut expected, scale, &response, &mut levels, &mut twin.scratch(),
+                &mut expected,
+                scale,
+                &response,
+                &mut levels,
+                &mut twin.scratch(),
             );
             let mut phase = vec![0.0; 3 * area];
             crate::encode::double_phase::encode(&expected, size.1, area, used, &mut phase);
             let largest: Vec<u32> =
                 bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
             let found = encoder.scale(largest[0]);
-            assert!((found - used).abs() < 1e-4 * used, "{size:?} {encoding:?}: {found} {used}");
+            assert!(
+                (found - used).abs() < 1e-4 * used,
+                "{size:?} {encoding:?}: {found} {used}"
+            );
             // A level may be its neighbour where the phase lies within rounding of the bound between them.
             let steps = match response {
                 Response::Linear { bits } => (1 << bits) as f32,

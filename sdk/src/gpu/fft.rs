@@ -101,11 +101,21 @@ impl Convolution {
             ..row
         };
         let turn = planes.turn.unwrap_or(&row_roots.buffer);
-        let make = |what, stage: Stage, lines: usize, roots: &wgpu::Buffer, from: &wgpu::Buffer, to: &wgpu::Buffer, places: [usize; 8]| {
+        let make = |what,
+                    stage: Stage,
+                    lines: usize,
+                    roots: &wgpu::Buffer,
+                    from: &wgpu::Buffer,
+                    to: &wgpu::Buffer,
+                    places: [usize; 8]| {
             let together = stage.lines_together(device)?;
             let mut numbers = vec![lines];
             numbers.extend(places);
-            numbers.push(if planes.quadrants.len() > 1 { quadrant } else { 0 });
+            numbers.push(if planes.quadrants.len() > 1 {
+                quadrant
+            } else {
+                0
+            });
             numbers.resize(12, 0);
             let numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
             let numbers = device.constants("lines", bytemuck::cast_slice(&numbers))?;
@@ -127,10 +137,34 @@ impl Convolution {
             std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] })
         };
         let steps = [
-            make("rows", row, height, &row_roots.buffer, planes.field, &rows, places(frame, spectra))?,
+            make(
+                "rows",
+                row,
+                height,
+                &row_roots.buffer,
+                planes.field,
+                &rows,
+                places(frame, spectra),
+            )?,
             // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
-            make("columns", column, padded_width, &column_roots.buffer, &column_roots.buffer, &rows, places(columns, columns))?,
-            make("rows back", back, height, &row_roots.buffer, &rows, planes.field, places(spectra, frame))?,
+            make(
+                "columns",
+                column,
+                padded_width,
+                &column_roots.buffer,
+                &column_roots.buffer,
+                &rows,
+                places(columns, columns),
+            )?,
+            make(
+                "rows back",
+                back,
+                height,
+                &row_roots.buffer,
+                &rows,
+                planes.field,
+                places(spectra, frame),
+            )?,
         ];
         Ok(Convolution {
             steps,
@@ -270,7 +304,11 @@ fn butterflies(text: &mut String, n: usize, each: usize, r: usize, done: usize) 
             done * r
         );
         for q in 0..r {
-            let _ = writeln!(text, "        row[(at + {}u) * LINES + l] = v{k}[{q}];", q * done);
+            let _ = writeln!(
+                text,
+                "        row[(at + {}u) * LINES + l] = v{k}[{q}];",
+                q * done
+            );
         }
         *text += "    } }\n";
     }
@@ -317,7 +355,10 @@ mod tests {
         for n in 1..5000 {
             let all = radices(n);
             assert_eq!(all.iter().product::<usize>(), n);
-            assert!(all.iter().all(|&r| r == 4 || (2..r).all(|d| r % d != 0)), "{n}: {all:?}");
+            assert!(
+                all.iter().all(|&r| r == 4 || (2..r).all(|d| r % d != 0)),
+                "{n}: {all:?}"
+            );
         }
     }
 }
@@ -348,7 +389,9 @@ mod twins {
             quadrants: &plans.each_ref().map(|plan| plan.transfer().quadrant()),
             turn: Some(&upload(&device, &turns)),
         };
-        let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();
+        let convolution = device
+            .guarded(|| Convolution::new(&device, &planes))
+            .unwrap();
         run(&device, |pass| convolution.run(pass));
         let mut expected = given;
         let mut scratch = plans[0].scratch();
@@ -358,7 +401,10 @@ mod twins {
             plan.propagate(plane, &mut scratch);
         }
         let worst = apart(&read(&device, &buffer, expected.len()), &expected);
-        assert!(worst < 1e-4, "{size:?}, {distance_m} m, {padding:?}: {worst}");
+        assert!(
+            worst < 1e-4,
+            "{size:?}, {distance_m} m, {padding:?}: {worst}"
+        );
     }
 
     #[test]
@@ -390,7 +436,10 @@ mod twins {
                 f32::from(u8::from(aperture::passes(fx, fy, 0.8)))
             };
             let limit = |kx, ky| f32::from(u8::from(plans.1.keeps(kx, ky)));
-            for (name, kept) in [("aperture", quadrant(size, round)), ("limit", quadrant(size, limit))] {
+            for (name, kept) in [
+                ("aperture", quadrant(size, round)),
+                ("limit", quadrant(size, limit)),
+            ] {
                 let given = field(size.0 * size.1);
                 let buffer = upload(&device, &given);
                 let planes = Planes {
@@ -400,7 +449,9 @@ mod twins {
                     quadrants: &[&kept],
                     turn: None,
                 };
-                let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();
+                let convolution = device
+                    .guarded(|| Convolution::new(&device, &planes))
+                    .unwrap();
                 run(&device, |pass| convolution.run(pass));
                 let mut expected = given;
                 for plane in expected.chunks_exact_mut(size.0 * size.1) {

@@ -4,11 +4,11 @@ use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
-use super::input::{Colour, Depth, FrameBytes, Packer, Source};
+use super::input::{Colour, Depth, Frame, Packer, Source};
 use super::peak::Peak;
 use super::{Error, Result};
 use crate::display::Display;
-use crate::encode::{Encoding, Scale};
+use crate::encode::{Encoding, Scale, deep};
 use crate::method::{Method, check_display};
 use crate::network::{InputKind, Network};
 use crate::slm::Response;
@@ -27,13 +27,13 @@ const STAMPS: u32 = 8;
 
 /// What is to be computed.
 #[derive(Clone)]
-pub struct Job<'a> {
+pub struct Job {
     /// Pixels.
     pub height: usize,
     /// Pixels.
     pub width: usize,
     /// What makes the midpoint hologram.
-    pub method: Method<'a>,
+    pub method: Method,
     /// The display.
     pub display: Display,
     /// From a field to phases.
@@ -50,12 +50,12 @@ pub struct Job<'a> {
     pub chain: ChainOptions,
 }
 
-impl<'a> Job<'a> {
+impl Job {
     /// Frames as [`crate::RgbdFrame`] by `method` to `display` as [`crate::Pipeline`] makes them.
     pub fn new(
         height: usize,
         width: usize,
-        method: Method<'a>,
+        method: Method,
         display: &Display,
         encoding: Encoding,
         scale: Scale,
@@ -75,9 +75,8 @@ impl<'a> Job<'a> {
         }
     }
 
-    pub(super) fn network(&self) -> Result<&'a Network> {
-        #[allow(irrefutable_let_patterns)]
-        let Method::Network(network) = self.method else {
+    pub(super) fn network(&self) -> Result<&Network> {
+        let Method::Network(network) = &self.method else {
             return Err(Error::Refused(
                 "methods without a network run on the CPU only".into(),
             ));
@@ -175,7 +174,7 @@ impl Pipeline {
     /// # Errors
     /// What [`crate::Pipeline::new`] refuses, and [`Error::Refused`] or [`Error::OutOfMemory`] for what this device
     /// cannot do.
-    pub fn new(device: &Arc<Device>, job: &Job<'_>) -> Result<Self> {
+    pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let network = job.network()?;
         let size = (job.height, job.width);
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
@@ -187,12 +186,15 @@ impl Pipeline {
             ))
             .into());
         }
+        if let Encoding::Deep(network) = &job.encoding {
+            deep::check(network, &job.display)?;
+        }
         device.guarded(|| Self::build(device, job, network, size))
     }
 
     fn build(
         device: &Arc<Device>,
-        job: &Job<'_>,
+        job: &Job,
         network: &Network,
         size: (usize, usize),
     ) -> Result<Self> {
@@ -200,12 +202,13 @@ impl Pipeline {
         let numbers = Numbers::of(device, chain, job.chain.float)?;
         let source = Source::Frame(job.colour, job.depth);
         let packer = Packer::new(device, chain, numbers, size, source)?;
-        let end = End::Field(network.head());
+        let end = End::Field(network.head(), network.input());
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
         let mean = MeanPhase::new(device, &chain.partial, chain.parts)?;
-        // The first to read the field turns it.
-        let mut turn = Some(&mean.turn);
+        // The first to read the field turns it. A pre-filter was trained on its phase as it is.
+        let keeps_phase = matches!(job.encoding, Encoding::Deep(_));
+        let mut turn = (!keeps_phase).then_some(&mean.turn);
         let offset = match job.display.offset_m() {
             0.0 => None,
             offset_m => {
@@ -235,7 +238,8 @@ impl Pipeline {
             device,
             &chain.field,
             size,
-            job.encoding,
+            &job.encoding,
+            job.chain,
             job.scale,
             &job.response,
             turn,
@@ -300,7 +304,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// Bytes of another length than planned, too many frames in flight, or a device that is lost.
-    pub fn submit(&mut self, frame: &FrameBytes<'_>, deliver: Deliver) -> Result<Ticket> {
+    pub fn submit(&mut self, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
             return Err(crate::Error::Plan(format!(
                 "{FLIGHTS} frames are in flight; one must be collected first"
@@ -465,7 +469,7 @@ impl Pipeline {
     ///
     /// # Panics
     /// If `levels` has not 3·H·W values.
-    pub fn process(&mut self, frame: &FrameBytes<'_>, levels: &mut [u8]) -> Result<FrameReport> {
+    pub fn process(&mut self, frame: &Frame<'_>, levels: &mut [u8]) -> Result<FrameReport> {
         let ticket = self.submit(frame, Deliver::Levels)?;
         self.collect(ticket, levels)
     }

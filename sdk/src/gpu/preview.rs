@@ -173,7 +173,8 @@ impl Preview {
 
     fn transfers(&self, distance_m: f64) -> Vec<Complex32> {
         let pitch_m = self.display.pitch_m();
-        let pass = |mu: f64, nu: f64| aperture::passes(mu * pitch_m, nu * pitch_m, self.aperture_radius);
+        let pass =
+            |mu: f64, nu: f64| aperture::passes(mu * pitch_m, nu * pitch_m, self.aperture_radius);
         self.display
             .wavelengths_m()
             .into_iter()

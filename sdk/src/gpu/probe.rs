@@ -2,7 +2,7 @@
 
 use super::chain::Numbers;
 use super::device::Device;
-use super::input::FrameBytes;
+use super::input::Frame;
 use super::pipeline::{Job, Pipeline};
 use super::{Error, Result};
 use crate::frame::RgbdFrame;
@@ -19,7 +19,7 @@ const SIZE: (usize, usize) = (37, 43);
 /// # Errors
 /// [`Error::Wrong`] where they differ by more than the numbers' rounding, [`Error::Lost`] where no answer comes, and
 /// what [`Pipeline::new`] refuses.
-pub fn probe(device: &Arc<Device>, job: &Job<'_>) -> Result<()> {
+pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let (height, width) = SIZE;
     let job = Job {
         height,
@@ -32,9 +32,9 @@ pub fn probe(device: &Arc<Device>, job: &Job<'_>) -> Result<()> {
     let cpu = crate::Pipeline::new(
         height,
         width,
-        job.method,
+        job.method.clone(),
         &job.display,
-        job.encoding,
+        job.encoding.clone(),
         job.scale,
         job.response.clone(),
     )?;
@@ -45,7 +45,7 @@ pub fn probe(device: &Arc<Device>, job: &Job<'_>) -> Result<()> {
     let mut levels = vec![0; 3 * height * width];
     // Twice: what one frame leaves behind must not reach the next.
     for _ in 0..2 {
-        gpu.process(&FrameBytes::of(&frame), &mut levels)?;
+        gpu.process(&Frame::of(&frame), &mut levels)?;
         let apart = apart(&levels, &expected, &job.response);
         let most = match Numbers::of(device, job.network()?.chain(), job.chain.float)? {
             Numbers::F16 => 0.1,

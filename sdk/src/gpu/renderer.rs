@@ -2,10 +2,11 @@
 //! opened again.
 
 use super::device::{Device, DeviceOptions};
-use super::input::FrameBytes;
+use super::input::{Colour, Frame};
 use super::pipeline::{Deliver, FrameReport, Job, Pipeline, StageTimes, Ticket};
 use super::probe::probe;
 use super::{Error, Result};
+use crate::frame::Orientation;
 use num_complex::Complex32;
 use std::sync::Arc;
 
@@ -22,8 +23,8 @@ pub enum Otherwise {
 }
 
 /// Frames of one [`Job`], on a device that was found to be right.
-pub struct Renderer<'a> {
-    job: Job<'a>,
+pub struct Renderer {
+    job: Job,
     options: DeviceOptions,
     otherwise: Otherwise,
     place: Place,
@@ -59,12 +60,12 @@ enum Inside {
     Cpu { serial: u64 },
 }
 
-impl<'a> Renderer<'a> {
+impl Renderer {
     /// Opens a device, tries it out by [`probe`], and plans `job` on it.
     ///
     /// # Errors
     /// What the CPU refuses too; with [`Otherwise::Error`] also what only the GPU does.
-    pub fn new(options: DeviceOptions, job: Job<'a>, otherwise: Otherwise) -> Result<Self> {
+    pub fn new(options: DeviceOptions, job: Job, otherwise: Otherwise) -> Result<Self> {
         let mut renderer = Renderer {
             job,
             options,
@@ -116,7 +117,7 @@ impl<'a> Renderer<'a> {
     ///
     /// # Errors
     /// Bytes of another length than planned, or what [`Renderer::new`] refuses where a device was lost before.
-    pub fn submit(&mut self, frame: &FrameBytes<'_>) -> Result<Handed> {
+    pub fn submit(&mut self, frame: &Frame<'_>) -> Result<Handed> {
         loop {
             match &mut self.place {
                 Place::Gpu(pipeline) => match pipeline.submit(frame, Deliver::Levels) {
@@ -173,20 +174,20 @@ impl<'a> Renderer<'a> {
 }
 
 /// Opens a device and plans `job` on it, if it answers as the CPU does.
-fn trusted(options: &DeviceOptions, job: &Job<'_>) -> Result<Pipeline> {
+fn trusted(options: &DeviceOptions, job: &Job) -> Result<Pipeline> {
     let device = Arc::new(Device::open(options)?);
     probe(&device, job)?;
     Pipeline::new(&device, job)
 }
 
 impl Cpu {
-    fn new(job: &Job<'_>) -> Result<Self> {
+    fn new(job: &Job) -> Result<Self> {
         let pipeline = crate::Pipeline::new(
             job.height,
             job.width,
-            job.method,
+            job.method.clone(),
             &job.display,
-            job.encoding,
+            job.encoding.clone(),
             job.scale,
             job.response.clone(),
         )?;
@@ -199,8 +200,12 @@ impl Cpu {
         })
     }
 
-    fn process(&mut self, frame: &FrameBytes<'_>, job: &Job<'_>) -> Result<Handed> {
-        let frame = frame.read(job.colour, job.depth, (job.height, job.width))?;
+    fn process(&mut self, frame: &Frame<'_>, job: &Job) -> Result<Handed> {
+        let orientation = match job.colour {
+            Colour::Camera { orientation, .. } => orientation,
+            Colour::Planar => Orientation::default(),
+        };
+        let frame = frame.read(orientation, job.height, job.width)?;
         let mut levels = vec![0; self.field.len()];
         let made =
             self.pipeline
@@ -233,7 +238,7 @@ impl Cpu {
 }
 
 #[cfg(test)]
-impl Renderer<'_> {
+impl Renderer {
     /// Takes the device away, as drivers do.
     pub(super) fn lose(&self) {
         if let Place::Gpu(pipeline) = &self.place {
@@ -255,15 +260,16 @@ mod tests {
 
     const SIZE: (usize, usize) = (21, 34);
 
-    fn network() -> Network {
-        Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx")).unwrap()
+    fn network() -> Arc<Network> {
+        let bytes = include_bytes!("../../../models/rgbd-8-int8.onnx");
+        Arc::new(Network::from_onnx(bytes).unwrap())
     }
 
-    fn job(network: &Network) -> Job<'_> {
+    fn job(network: &Arc<Network>) -> Job {
         let display = Display::default();
         let response = Response::linear(8).unwrap();
         let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Fixed(1.0));
-        let method = Method::Network(network);
+        let method = Method::Network(network.clone());
         Job::new(SIZE.0, SIZE.1, method, &display, encoding, scale, response)
     }
 
@@ -283,12 +289,15 @@ mod tests {
         };
         assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
         let frame = frame();
-        let bytes = FrameBytes::of(&frame);
+        let bytes = Frame::of(&frame);
         let mut before = vec![0; 3 * SIZE.0 * SIZE.1];
         let handed = renderer.submit(&bytes).unwrap();
         renderer.collect(handed, &mut before).unwrap();
 
-        let flying = [renderer.submit(&bytes).unwrap(), renderer.submit(&bytes).unwrap()];
+        let flying = [
+            renderer.submit(&bytes).unwrap(),
+            renderer.submit(&bytes).unwrap(),
+        ];
         renderer.lose();
         let mut levels = vec![0; before.len()];
         for handed in flying {
@@ -314,13 +323,18 @@ mod tests {
             name: Some("no such card".into()),
             programs: None,
         };
-        let refused = Renderer::new(none.clone(), job(&network), Otherwise::Error).err().unwrap();
+        let refused = Renderer::new(none.clone(), job(&network), Otherwise::Error)
+            .err()
+            .unwrap();
         assert!(matches!(refused, Error::None(_)), "{refused}");
         let mut renderer = Renderer::new(none.clone(), job(&network), Otherwise::Cpu).unwrap();
         assert!(matches!(renderer.reason(), Some(Error::None(_))));
         let frame = frame();
-        let bytes = FrameBytes::of(&frame);
-        let handed = [renderer.submit(&bytes).unwrap(), renderer.submit(&bytes).unwrap()];
+        let bytes = Frame::of(&frame);
+        let handed = [
+            renderer.submit(&bytes).unwrap(),
+            renderer.submit(&bytes).unwrap(),
+        ];
         let mut levels = vec![0; 3 * SIZE.0 * SIZE.1];
         for handed in handed {
             renderer.collect(handed, &mut levels).unwrap();
@@ -346,7 +360,7 @@ mod tests {
         };
         let device = Arc::new(device);
         let bytes = include_bytes!("../../../models/rgbd-8.onnx");
-        let network = Network::from_onnx(bytes).unwrap();
+        let network = Arc::new(Network::from_onnx(bytes).unwrap());
         let halves = ChainOptions {
             float: Float::F16,
             ..Default::default()
@@ -357,7 +371,10 @@ mod tests {
         };
         let refused = Pipeline::new(&device, &wanted).err().unwrap();
         assert!(refused.to_string().contains("shader-f16"), "{refused}");
-        assert_eq!(Pipeline::new(&device, &job(&network)).unwrap().numbers(), "f32");
+        assert_eq!(
+            Pipeline::new(&device, &job(&network)).unwrap().numbers(),
+            "f32"
+        );
         let wide = Job {
             width: 40_000,
             height: 600,
@@ -370,7 +387,7 @@ mod tests {
         renderer.losses = ATTEMPTS;
         renderer.place = Place::Lost;
         let frame = frame();
-        let handed = renderer.submit(&FrameBytes::of(&frame)).unwrap();
+        let handed = renderer.submit(&Frame::of(&frame)).unwrap();
         let mut levels = vec![0; 3 * SIZE.0 * SIZE.1];
         renderer.collect(handed, &mut levels).unwrap();
         assert!(renderer.pipeline().is_none());
