@@ -3,6 +3,32 @@
 //!
 //! Each stage is a .wgsl file beside its Rust, and has its CPU twin as oracle: f32 agrees with it to 1e-4, int8 chains
 //! to the bit. A device is not trusted before a small frame came out of it as out of the CPU.
+//!
+//! ```no_run
+//! use phasefront::encode::{Encoding, Scale};
+//! use phasefront::gpu::{DeviceOptions, Error, Frame, Job, Otherwise, Renderer};
+//! use phasefront::slm::Response;
+//! use phasefront::{Display, Method, Network, RgbdFrame};
+//! use std::sync::Arc;
+//!
+//! fn levels(network: Arc<Network>, frames: &[RgbdFrame]) -> Result<Vec<Vec<u8>>, Error> {
+//!     let (method, response) = (Method::Network(network), Response::linear(8)?);
+//!     let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Fixed(1.0));
+//!     let job = Job::new(1080, 1920, method, &Display::default(), encoding, scale, response);
+//!     let mut renderer = Renderer::new(DeviceOptions::default(), job, Otherwise::Cpu)?;
+//!     if let Some(why) = renderer.reason() {
+//!         println!("on the CPU: {why}");
+//!     }
+//!     let mut all = Vec::new();
+//!     for frame in frames {
+//!         let handed = renderer.submit(&Frame::of(frame))?;
+//!         let mut levels = vec![0; 3 * 1080 * 1920];
+//!         renderer.collect(handed, &mut levels)?;
+//!         all.push(levels);
+//!     }
+//!     Ok(all)
+//! }
+//! ```
 
 mod chain;
 mod device;

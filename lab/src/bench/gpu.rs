@@ -1,11 +1,13 @@
 //! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
 //! measured in the same run.
 
-use super::{Case, median, test_frame};
+use super::{Case, median};
 use crate::error::Result;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
 use phasefront::gpu::{
-    ChainOptions, Deliver, Device, FLIGHTS, Frame, Job, Pipeline, StageTimes, probe,
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, Job,
+    Pipeline, StageTimes, probe,
 };
 use phasefront::slm::Response;
 use phasefront::{Display, Method};
@@ -71,18 +73,39 @@ pub fn measure(
     );
     job.chain = chain;
     probe(device, &job)?;
+    // As phones give frames: luma, chroma at half the resolution, depth of 16 bits.
+    let format = ColourFormat::Nv12(YuvEncoding::default());
+    job.colour = Colour::Camera {
+        format,
+        height,
+        width,
+        orientation: Orientation::default(),
+    };
+    job.depth = Depth::U16;
     let mut pipeline = Pipeline::new(device, &job)?;
-    let frame = test_frame(height, width)?;
-    let bytes = Frame::of(&frame);
+    let byte = |i: usize| (i * 7 % 256) as u8;
+    let luma: Vec<u8> = (0..height * width).map(byte).collect();
+    let chroma: Vec<u8> = (0..2 * height.div_ceil(2) * width.div_ceil(2))
+        .map(byte)
+        .collect();
+    let depth: Vec<u16> = (0..height * width).map(|i| (i / 8 * 257) as u16).collect();
+    let planes = [
+        Plane::new(&luma, width, 1),
+        Plane::new(&chroma, 2 * width.div_ceil(2), 2),
+    ];
+    let frame = Frame {
+        colour: ColourData::Camera(ColourImage::new(format, width, height, &planes)?),
+        depth: DepthData::U16(&depth),
+    };
     let mut levels = vec![0; 3 * height * width];
     let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let mut totals = Vec::new();
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    pipeline.process(&bytes, &mut levels)?;
+    pipeline.process(&frame, &mut levels)?;
     let start = Instant::now();
     while totals.len() < 5 || start.elapsed() < budget {
         let begin = Instant::now();
-        let report = pipeline.process(&bytes, &mut levels)?;
+        let report = pipeline.process(&frame, &mut levels)?;
         totals.push(ms(begin.elapsed()));
         if let Some(times) = report.times {
             let StageTimes {
@@ -109,7 +132,7 @@ pub fn measure(
             pipeline.finish(flying.pop_front().expect("not empty"))?;
             flown += 1;
         }
-        flying.push_back(pipeline.submit(&bytes, Deliver::Shown)?);
+        flying.push_back(pipeline.submit(&frame, Deliver::Shown)?);
     }
     for ticket in flying {
         pipeline.finish(ticket)?;

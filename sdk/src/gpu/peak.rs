@@ -39,19 +39,19 @@ pub(super) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
             Numbers::F32 => (
                 "fn lane(v: vec4u) -> vec4f { return vec4f(v) * 1e-9; }
                 fn bits(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
-                fn step(v: vec4f, x: vec4f) -> vec4f { return fma(v, x, x); }\n",
+                fn more(v: vec4f, x: vec4f) -> vec4f { return fma(v, x, x); }\n",
                 4,
             ),
             Numbers::F16 => (
                 "fn lane(v: vec4u) -> vec4<f16> { return vec4<f16>(vec4f(v) * 1e-9); }
                 fn bits(v: vec4<f16>) -> vec4u { return bitcast<vec4u>(vec4f(v)); }
-                fn step(v: vec4<f16>, x: vec4<f16>) -> vec4<f16> { return fma(v, x, x); }\n",
+                fn more(v: vec4<f16>, x: vec4<f16>) -> vec4<f16> { return fma(v, x, x); }\n",
                 4,
             ),
             Numbers::Int8 => (
                 "fn lane(v: vec4u) -> vec4i { return vec4i(v); }
                 fn bits(v: vec4i) -> vec4u { return vec4u(v); }
-                fn step(v: vec4i, x: vec4i) -> vec4i {
+                fn more(v: vec4i, x: vec4i) -> vec4i {
                     let w = vec4u(x);
                     let u = vec4u(v);
                     return v + vec4i(

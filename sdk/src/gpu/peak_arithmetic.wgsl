@@ -13,14 +13,14 @@ fn compute(@builtin(global_invocation_id) at: vec3u) {
     var g = lane(seed + 7u);
     var h = lane(seed + 8u);
     for (var k = 0u; k < ROUNDS; k++) {
-        a = step(a, x);
-        b = step(b, x);
-        c = step(c, x);
-        d = step(d, x);
-        e = step(e, x);
-        f = step(f, x);
-        g = step(g, x);
-        h = step(h, x);
+        a = more(a, x);
+        b = more(b, x);
+        c = more(c, x);
+        d = more(d, x);
+        e = more(e, x);
+        f = more(f, x);
+        g = more(g, x);
+        h = more(h, x);
     }
     result[at.x % 16u] = bits(a) + bits(b) + bits(c) + bits(d) + bits(e) + bits(f) + bits(g) + bits(h);
 }

@@ -145,7 +145,8 @@ pub struct Pipeline {
     numbers: Numbers,
     packer: Packer,
     chain: ChainPlan,
-    mean: MeanPhase,
+    /// None for an encoding that was trained on the field's phase as it is.
+    mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
     offset: Option<Convolution>,
     encoder: Encoder,
@@ -205,10 +206,12 @@ impl Pipeline {
         let end = End::Field(network.head(), network.input());
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
-        let mean = MeanPhase::new(device, &chain.partial, chain.parts)?;
-        // The first to read the field turns it. A pre-filter was trained on its phase as it is.
-        let keeps_phase = matches!(job.encoding, Encoding::Deep(_));
-        let mut turn = (!keeps_phase).then_some(&mean.turn);
+        let mean = match job.encoding {
+            Encoding::Deep(_) => None,
+            _ => Some(MeanPhase::new(device, &chain.partial, chain.parts)?),
+        };
+        // The first to read the field turns it.
+        let mut turn = mean.as_ref().map(|mean| &mean.turn);
         let offset = match job.display.offset_m() {
             0.0 => None,
             offset_m => {
@@ -347,7 +350,9 @@ impl Pipeline {
         stage(0, &|pass| self.packer.run(pass));
         stage(1, &|pass| {
             self.chain.run(pass);
-            self.mean.run(pass);
+            if let Some(mean) = &self.mean {
+                mean.run(pass);
+            }
         });
         stage(2, &|pass| {
             if let Some(offset) = &self.offset {
