@@ -18,6 +18,7 @@ pub mod point_based;
 pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;
+pub mod seeds;
 pub mod sm_lbm;
 pub mod study;
 pub mod video;

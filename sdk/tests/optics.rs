@@ -16,6 +16,7 @@ use phasefront::{Display, Modulator, Network, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 130)];
 const RED: f64 = 638e-9;
@@ -235,7 +236,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         Encoding::ANTI_ALIAS,
         Encoding::BAND_LIMIT,
     ] {
-        let encoder = Encoder::new(h, w, encoding).unwrap();
+        let encoder = Encoder::new(h, w, encoding.clone()).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, Scale::Max, &mut phase, &mut encoder.scratch());
@@ -299,12 +300,12 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
 
 #[test]
 fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
-    let network = Network::from_onnx(&Model::prefilter("6").bytes()).unwrap();
+    let network = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
     let display = Display::default().with_offset_m(6e-3).unwrap();
     let (h, w) = (40, 33);
     let response = || Response::linear(8).unwrap();
-    let plan = |display: &Display, network| {
-        let encoding = Encoding::Deep(network);
+    let plan = |display: &Display, network: &Arc<Network>| {
+        let encoding = Encoding::Deep(network.clone());
         Modulator::new(h, w, display, encoding, Scale::Max, response())
     };
     let modulator = plan(&display, &network).unwrap();
@@ -331,6 +332,6 @@ fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
     let why = |display: &Display, network| plan(display, network).err().unwrap().to_string();
     let elsewhere = Display::default().with_offset_m(5.9e-3).unwrap();
     assert!(why(&elsewhere, &network).contains("offset of 6.000 mm"));
-    let hologram = Network::from_onnx(&Model::new(3, 8).bytes()).unwrap();
+    let hologram = Arc::new(Network::from_onnx(&Model::new(3, 8).bytes()).unwrap());
     assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
 }

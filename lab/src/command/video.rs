@@ -37,8 +37,8 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = MethodName::Network)]
     method: MethodName,
-    /// Layers of a network that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE", default_value = "8")]
+    /// Layers of a network that comes along (8, 15), or an ONNX file
+    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
     network: String,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]

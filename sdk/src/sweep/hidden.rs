@@ -3,7 +3,8 @@
 //! Behind a pixel lies what its deeper neighbours show: the hidden layers continue them under the nearer surface, as
 //! far as light can reach. Of a pixel's left, right, upper and lower side, each is searched for
 //!
-//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`], and
+//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`] that is not itself at the upper
+//!   end of such a jump, as pixels of blurred edges are, and
 //! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
 //!
 //! by a rule from pixel to pixel ([`Found::next`]), so that the search costs the same for any reach. The nearest source
@@ -66,6 +67,12 @@ impl Found {
             distance: 1,
         };
         let deeper = |source: Source| source.depth > least;
+        // A neighbour whose own neighbour is yet another jump deeper stands on a blurred edge, on neither surface.
+        let itself = if self.near.distance == 1 {
+            NONE
+        } else {
+            itself
+        };
         Found {
             near: if deeper(itself) {
                 itself
