@@ -1,10 +1,11 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::method::MethodPlan;
 use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
@@ -12,9 +13,10 @@ use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, models, sm_lbm};
+use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -48,6 +50,8 @@ pub(crate) struct Hologram {
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
+    #[command(flatten)]
+    backend: BackendFlags,
     #[command(flatten)]
     display: DisplayFlags,
     /// Write the complex field at the modulator there too, with a .json beside it
@@ -150,11 +154,21 @@ impl Hologram {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
+        let device = self.backend.device()?;
+        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+            return Err(Error::Input(
+                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                    .into(),
+            ));
+        }
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
                 let network = models::network(&self.network, self.precision.is_int8())?;
                 let method = phasefront::Method::Network(network);
-                self.by_pipeline("network", method, &display, encoding)?
+                match &device {
+                    Some(options) => self.on_gpu(method, &display, encoding, options)?,
+                    None => self.by_pipeline("network", method, &display, encoding)?,
+                }
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
@@ -233,6 +247,54 @@ impl Hologram {
                 ("encode", modulation.encode),
             ],
             engine: engine.map(|engine| format!("{} ({})", engine.name, engine.why)),
+        })
+    }
+
+    /// By a network on a GPU that was tried out before.
+    fn on_gpu(
+        &self,
+        method: phasefront::Method,
+        file: &DisplayFile,
+        encoding: Encoding,
+        options: &DeviceOptions,
+    ) -> Result<Made> {
+        if file.laser.is_some() || file.aberration.is_some() {
+            return Err(Error::Input(
+                "the display's laser map and aberration are heeded by --backend cpu alone".into(),
+            ));
+        }
+        let frame = &self.frame.read()?;
+        let (height, width) = frame.shape();
+        let scale = self.scale();
+        let response = file.response()?;
+        let job = Job::new(
+            height,
+            width,
+            method,
+            &file.display,
+            encoding,
+            scale,
+            response,
+        );
+        let device = Arc::new(Device::open(options)?);
+        phasefront::gpu::probe(&device, &job)?;
+        let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
+        let mut levels = Array3::zeros((3, height, width));
+        let bytes = levels.as_slice_mut().expect("standard layout");
+        let report = pipeline.process(&Frame::of(frame), bytes)?;
+        gpu::keep_programs(&device);
+        let times = report.times.unwrap_or_default();
+        Ok(Made {
+            field: None,
+            levels,
+            scale: report.scale,
+            stages: vec![
+                ("input", times.input),
+                ("network", times.network),
+                ("propagate", times.propagate),
+                ("encode", times.encode),
+            ],
+            engine: Some(pipeline.describe()),
         })
     }
 
