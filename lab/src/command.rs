@@ -12,9 +12,11 @@ mod occlusion;
 mod refocus;
 mod scene;
 mod study;
+mod video;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
+use std::num::NonZeroUsize;
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]
@@ -43,6 +45,7 @@ enum Command {
     Study(study::Study),
     #[command(subcommand)]
     Calibrate(calibrate::Calibrate),
+    Video(video::Video),
 }
 
 impl Phasefront {
@@ -66,6 +69,10 @@ impl Phasefront {
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),
             Command::Calibrate(command) => command.run(json),
+            Command::Video(command) => {
+                let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
+                command.run(threads, json)
+            }
         })
     }
 }

@@ -23,7 +23,8 @@ use phasefront::modulator::{Modulator, remove_mean_phase};
 use phasefront::network::InputKind;
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
-use phasefront::{Display, Network};
+use phasefront::sweep::SweepPlan;
+use phasefront::{Display, Network, RgbdFrame, Sweep};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cmp::Reverse;
@@ -86,6 +87,20 @@ impl<'a> Method<'a> {
         })
     }
 
+    /// The plane sweep on what is visible of scenes of `size`×`size` pixels.
+    ///
+    /// # Errors
+    /// A sweep that cannot be planned.
+    pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
+        let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
+        Ok(Self::new("sweep", move |ldi| {
+            let mut field = Array3::zeros((3, size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?;
+            Ok(field)
+        }))
+    }
+
     /// A network on scenes of `size`×`size` pixels, of RGB-D or as many layers as it takes.
     ///
     /// # Errors
@@ -97,7 +112,7 @@ impl<'a> Method<'a> {
         display: &Display,
     ) -> Result<Self> {
         let layers = match network.input() {
-            InputKind::Rgbd => 1,
+            InputKind::Rgbd | InputKind::RgbdXy => 1,
             InputKind::Ldi { layers } => layers,
             other => {
                 return Err(phasefront::Error::Network(format!(
@@ -108,14 +123,19 @@ impl<'a> Method<'a> {
         };
         check_display(network, display)?;
         let plan = network.plan(size, size)?;
-        let head = network.head();
+        let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
-            let input = network_input(ldi, layers);
+            let mut input = network_input(ldi, layers);
+            if kind == InputKind::RgbdXy {
+                let place = |at: usize| (at as f32 + 0.5) / size as f32 - 0.5;
+                input.extend((0..size * size).map(|i| place(i % size)));
+                input.extend((0..size * size).map(|i| place(i / size)));
+            }
             let mut output = vec![0.0; plan.channels().1 * size * size];
             plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            head.field(&output, &input, values)?;
+            head.field(kind, &output, &input, values)?;
             remove_mean_phase(values);
             Ok(field)
         }))
@@ -131,6 +151,14 @@ fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
             false => front.rgb[(c, y, x)],
         }
     })
+}
+
+/// The front layer as a frame: black and farthest where nothing is.
+fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
+    let depth = ldi.layers[0]
+        .depth
+        .mapv(|d| if d.is_nan() { 1.0 } else { d });
+    Ok(RgbdFrame::new(visible_rgb(ldi), depth)?)
 }
 
 /// A network's input of `layers` layers, (4·layers, H, W): colour and depth of each, minus ½; black and farthest
@@ -157,7 +185,7 @@ fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
 }
 
 /// How a field is shown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,
@@ -266,7 +294,7 @@ impl Viewer {
     ) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
-        let refocus = match shown.encoding {
+        let refocus = match shown.encoding.clone() {
             None => &self.complex,
             Some(encoding) => {
                 let response = Response::linear(self.display.bits())?;

@@ -4,9 +4,11 @@ pub mod bench;
 pub mod calibrate;
 pub mod corrected;
 pub mod dataset;
+pub mod depth_study;
 pub mod error;
 pub mod evaluate;
 pub mod files;
+pub mod flicker;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
@@ -19,5 +21,6 @@ pub mod scene;
 pub mod simulated_display;
 pub mod sm_lbm;
 pub mod study;
+pub mod video;
 
 pub use error::{Error, Result};

@@ -206,6 +206,20 @@ impl Display {
         Ok(display)
     }
 
+    /// The same display with (`height`, `width`) pixels.
+    ///
+    /// # Errors
+    /// A side outside 1..=65536.
+    pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
+        let display = Display {
+            height,
+            width,
+            ..self
+        };
+        display.check()?;
+        Ok(display)
+    }
+
     /// z of a point of normalized depth d (0 nearest, 1 farthest): V/2 − V·d, metres.
     pub fn z_of_depth(&self, d: f64) -> f64 {
         self.volume_depth_m / 2.0 - self.volume_depth_m * d

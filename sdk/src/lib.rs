@@ -16,9 +16,13 @@ pub mod illumination;
 pub mod method;
 pub mod modulator;
 pub mod network;
+pub mod output;
 pub mod pipeline;
+pub mod preview;
 pub mod refocus;
+pub mod session;
 pub mod slm;
+pub mod sweep;
 pub mod wave;
 
 pub use display::Display;
@@ -29,6 +33,8 @@ pub use method::Method;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};
 pub use pipeline::Pipeline;
+pub use session::Session;
+pub use sweep::Sweep;
 
 /// The README's code compiles.
 #[cfg(doctest)]

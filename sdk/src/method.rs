@@ -1,54 +1,76 @@
-//! How the midpoint hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
+//! How the hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
 
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
-use crate::network::{Engine, Head, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::sweep::{self, Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
+use std::sync::Arc;
 
 /// How far a display may lie from what a network was trained for, relative.
 const DISPLAY_TOLERANCE: f64 = 0.02;
 
-/// What makes the midpoint hologram.
-#[derive(Clone, Copy)]
+/// What makes the hologram.
+#[derive(Debug, Clone)]
 #[non_exhaustive]
-pub enum Method<'a> {
+pub enum Method {
     /// A trained network for RGB-D frames.
-    Network(&'a Network),
+    Network(Arc<Network>),
+    /// The plane sweep, for any display.
+    Sweep(Sweep),
 }
 
 /// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
 pub struct MethodPlan {
     shape: (usize, usize),
-    network: NetworkPlan,
-    head: Head,
+    way: Way,
+}
+
+enum Way {
+    Network(Box<NetworkPlan>),
+    Sweep(Box<SweepPlan>),
 }
 
 /// Working memory of a [`MethodPlan`] for one frame at a time.
-pub struct MethodScratch {
-    input: Vec<f32>,
-    output: Vec<f32>,
-    network: NetworkScratch,
+pub struct MethodScratch(Scratch);
+
+enum Scratch {
+    Network(NetworkScratch),
+    Sweep(SweepScratch),
 }
 
 impl MethodPlan {
     /// Plans `method` for (`height`, `width`) frames and the volume of `display`.
     ///
     /// # Errors
-    /// A network for layered input or for another display, or one that cannot be planned for this shape.
+    /// A network for layered input or for another display, or a method that cannot be planned for this shape.
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
-        let Method::Network(network) = method;
-        if network.input() != InputKind::Rgbd {
-            return Err(Error::Network(format!(
-                "it takes {} planes of a layered depth image; a network for RGB-D frames is needed",
-                network.input().channels()
-            )));
-        }
-        check_display(network, display)?;
+        let way = match method {
+            Method::Network(network) => {
+                if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
+                    return Err(Error::Network(format!(
+                        "it takes {} planes of a layered depth image; a network for RGB-D frames is needed",
+                        network.input().channels()
+                    )));
+                }
+                check_display(&network, display)?;
+                Way::Network(Box::new(network.plan(height, width)?))
+            }
+            Method::Sweep(sweep) => {
+                let offset_m = display.offset_m();
+                let z_m = match sweep::reaches(display, offset_m) {
+                    true => offset_m,
+                    false => 0.0,
+                };
+                Way::Sweep(Box::new(SweepPlan::new(
+                    height, width, display, sweep, z_m,
+                )?))
+            }
+        };
         Ok(MethodPlan {
             shape: (height, width),
-            network: network.plan(height, width)?,
-            head: network.head(),
+            way,
         })
     }
 
@@ -57,48 +79,50 @@ impl MethodPlan {
         self.shape
     }
 
+    /// Where the hologram stands, metres from the midpoint toward the viewer: a sweep goes on to a display that is not
+    /// far away, all else ends at the midpoint.
+    pub fn z_m(&self) -> f64 {
+        match &self.way {
+            Way::Network(_) => 0.0,
+            Way::Sweep(plan) => plan.z_m(),
+        }
+    }
+
     /// What runs the network, and why; None for a method without one.
     pub fn engine(&self) -> Option<&Engine> {
-        Some(self.network.engine())
+        match &self.way {
+            Way::Network(plan) => Some(plan.engine()),
+            Way::Sweep(_) => None,
+        }
     }
 
     /// Working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
-        let size = self.shape.0 * self.shape.1;
-        let (inputs, outputs) = self.network.channels();
-        MethodScratch {
-            input: vec![0.0; inputs * size],
-            output: vec![0.0; outputs * size],
-            network: self.network.scratch(),
-        }
+        MethodScratch(match &self.way {
+            Way::Network(plan) => Scratch::Network(plan.scratch()),
+            Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
+        })
     }
 
-    /// The midpoint hologram of `frame`, carrier-free, at z = 0, into `field`, (3, H, W).
+    /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (3, H, W).
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// A frame of another shape, or a `field` that has not 3·H·W values.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `scratch` is another plan's.
     pub fn field(
         &self,
         frame: &RgbdFrame,
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
-        if frame.shape() != self.shape {
-            return Err(Error::Frame(format!(
-                "the frame is {}×{}; this plan takes {}×{}",
-                frame.shape().1,
-                frame.shape().0,
-                self.shape.1,
-                self.shape.0
-            )));
+        frame.check_shape(self.shape)?;
+        match (&self.way, &mut scratch.0) {
+            (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
+            (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
+            _ => panic!("the scratch is another plan's"),
         }
-        frame.network_input(&mut scratch.input);
-        self.network
-            .run(&scratch.input, &mut scratch.output, &mut scratch.network)?;
-        self.head.field(&scratch.output, &scratch.input, field)
     }
 }
 

@@ -4,7 +4,7 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::display::Display;
-use crate::encode::{Encoder, EncoderScratch, Encoding, Scale};
+use crate::encode::{Encoder, EncoderScratch, Encoding, Scale, deep};
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
@@ -22,8 +22,8 @@ pub struct Modulator {
     display: Display,
     /// None where the modulator stands at the midpoint and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
-    illumination: Option<Illumination>,
     encoder: Encoder,
+    keeps_phase: bool,
     scale: Scale,
     response: Response,
 }
@@ -48,8 +48,8 @@ impl Modulator {
     /// `response`.
     ///
     /// # Errors
-    /// An offset, shape or encoding that cannot be planned, a fixed scale that is not positive, or a response
-    /// made for another shape.
+    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, a fixed scale that is
+    /// not positive, or a response made for a smaller modulator.
     pub fn new(
         height: usize,
         width: usize,
@@ -65,13 +65,10 @@ impl Modulator {
                 "a scale of {scale} cannot stand for full light; it must be above 0"
             )));
         }
-        if let Some((rows, columns)) = response.shape()
-            && (rows, columns) != (height, width)
-        {
-            return Err(Error::Plan(format!(
-                "the per-pixel table is for {columns}×{rows} pixels, the hologram is {width}×{height}; both must be of one size"
-            )));
+        if let Encoding::Deep(network) = &encoding {
+            deep::check(network, display)?;
         }
+        let response = response.centred(height, width)?;
         let offset = match display.offset_m() {
             0.0 => None,
             offset_m => Some(Propagator::for_colours(
@@ -88,7 +85,7 @@ impl Modulator {
             width,
             display: display.clone(),
             offset,
-            illumination: None,
+            keeps_phase: matches!(encoding, Encoding::Deep(_)),
             encoder: Encoder::new(height, width, encoding)?,
             scale,
             response,
@@ -96,9 +93,11 @@ impl Modulator {
     }
 
     /// The same for a display whose lasers light it as `illumination` says: what a pixel shall send is divided by what
-    /// it gets, after the offset, where the light falls.
+    /// it gets, where the light falls and nothing filters it any more. A hologram smaller than the modulator stands in its
+    /// middle.
     pub fn with_illumination(mut self, illumination: Illumination) -> Self {
-        self.illumination = Some(illumination);
+        let modulator = (self.display.height(), self.display.width());
+        self.encoder = self.encoder.with_illumination(illumination, modulator);
         self
     }
 
@@ -115,13 +114,15 @@ impl Modulator {
             self.display.wavelengths_m(),
             self.display.offset_m(),
             correction,
+            self.display.pitch_m(),
         )?);
         Ok(self)
     }
 
-    /// (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
+    /// take from it what it knows.
+    pub fn keeps_phase(&self) -> bool {
+        self.keeps_phase
     }
 
     /// Working memory for one call at a time.
@@ -149,8 +150,8 @@ impl Modulator {
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): divided by the light that falls there, then
-    /// double phase. `field` is left divided and as the encoder's filter made it. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): `field` is left as the
+    /// encoder's filter made it, and divided by the light that falls there. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -160,17 +161,24 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
+        self.modulate_at(field, self.scale, levels, scratch)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
         let start = Instant::now();
-        if let Some(illumination) = &self.illumination {
-            illumination.divide(field, (self.height, self.width));
-        }
-        let scale = self.encoder.encode_levels(
-            field,
-            self.scale,
-            &self.response,
-            levels,
-            &mut scratch.encoder,
-        );
+        let scale =
+            self.encoder
+                .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),

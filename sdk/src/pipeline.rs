@@ -5,9 +5,11 @@ use crate::display::Display;
 use crate::encode::{Encoding, Scale};
 use crate::error::Result;
 use crate::frame::RgbdFrame;
+use crate::illumination::Illumination;
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use std::time::{Duration, Instant};
 
@@ -26,9 +28,9 @@ pub struct PipelineScratch {
 /// How long each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageTimes {
-    /// From the frame to the midpoint hologram.
+    /// From the frame to the hologram where the method ends.
     pub method: Duration,
-    /// From the midpoint to the modulator.
+    /// From there to the modulator.
     pub propagate: Duration,
     /// From the field to levels.
     pub encode: Duration,
@@ -64,25 +66,29 @@ impl Pipeline {
         scale: Scale,
         response: Response,
     ) -> Result<Self> {
+        let method = MethodPlan::new(height, width, method, display)?;
+        // The modulator does the rest of the way.
+        let left_m = display.offset_m() - method.z_m();
+        let display = display.clone().with_offset_m(left_m)?;
         Ok(Pipeline {
-            method: MethodPlan::new(height, width, method, display)?,
-            modulator: Modulator::new(height, width, display, encoding, scale, response)?,
+            method,
+            modulator: Modulator::new(height, width, &display, encoding, scale, response)?,
         })
     }
 
-    /// A method and a modulator of one shape, as a calibrated display's.
+    /// [`Modulator::with_illumination`].
+    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
+        self.modulator = self.modulator.with_illumination(illumination);
+        self
+    }
+
+    /// [`Modulator::with_correction`].
     ///
     /// # Errors
-    /// Shapes that differ.
-    pub fn from_parts(method: MethodPlan, modulator: Modulator) -> Result<Self> {
-        let (of_method, of_modulator) = (method.shape(), modulator.shape());
-        if of_method != of_modulator {
-            return Err(crate::Error::Plan(format!(
-                "the method is planned for {}×{}, the modulator for {}×{}; both must be of one size",
-                of_method.1, of_method.0, of_modulator.1, of_modulator.0
-            )));
-        }
-        Ok(Pipeline { method, modulator })
+    /// As that.
+    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
+        self.modulator = self.modulator.with_correction(correction)?;
+        Ok(self)
     }
 
     /// (H, W).
@@ -90,7 +96,7 @@ impl Pipeline {
         self.method.shape()
     }
 
-    /// The plan of the midpoint hologram.
+    /// The plan of the method.
     pub fn method(&self) -> &MethodPlan {
         &self.method
     }
@@ -103,8 +109,8 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): midpoint hologram, mean phase taken out,
-    /// offset. Gives the times of the midpoint hologram and of the offset.
+    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out (but for an
+    /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -116,7 +122,9 @@ impl Pipeline {
     ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
         self.method.field(frame, field, &mut scratch.method)?;
-        remove_mean_phase(field);
+        if !self.modulator.keeps_phase() {
+            remove_mean_phase(field);
+        }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))
@@ -134,6 +142,21 @@ impl Pipeline {
     ) -> Modulation {
         self.modulator
             .modulate(field, levels, &mut scratch.modulator)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one: a session chooses it for each frame.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .modulate_at(field, scale, levels, &mut scratch.modulator)
     }
 
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as

@@ -1,13 +1,19 @@
 //! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
 #![allow(unsafe_code, clippy::unwrap_used)]
 
+mod network_models;
+
+use network_models::Model;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::slm::Response;
+use phasefront::slm::per_pixel::{self, PerPixel};
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::{Display, Modulator};
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Modulator, Network};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 struct Counting;
@@ -48,6 +54,7 @@ fn hot_calls_allocate_nothing() {
     let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
+    let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -64,9 +71,11 @@ fn hot_calls_allocate_nothing() {
                 Encoding::DoublePhase,
                 Encoding::ANTI_ALIAS,
                 Encoding::BAND_LIMIT,
+                Encoding::Deep(prefilter.clone()),
             ] {
                 let response = Response::linear(8).unwrap();
-                let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response).unwrap();
+                let plan =
+                    Modulator::new(h, w, &display, encoding.clone(), Scale::Max, response).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
@@ -74,6 +83,26 @@ fn hot_calls_allocate_nothing() {
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
+            let (rows, columns) = per_pixel::nodes(h, w, 8);
+            let levels_of = |i: usize| (i % 9) as f32 * 32.0;
+            let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
+            let turns = vec![6.0; 3 * rows * columns];
+            let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
+            let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
+            let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
+            let response = Response::PerPixel(table.into());
+            let encoding = Encoding::DoublePhase;
+            let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
+                .unwrap()
+                .with_illumination(laser)
+                .with_correction(&correction)
+                .unwrap();
+            let mut scratch = plan.scratch();
+            let frame = || {
+                plan.propagate(&mut field, &mut scratch);
+                plan.modulate(&mut field, &mut levels, &mut scratch);
+            };
+            assert_eq!(count(frame), 0, "a calibrated display");
         });
     }
 }

@@ -1,19 +1,23 @@
 //! The optics against the paper's equations in f64, and what physics demands of them.
 #![allow(clippy::unwrap_used)]
 
+mod network_models;
 #[path = "../../tests/reference.rs"]
 mod reference;
 
 use ndarray::{Array2, Array3};
+use network_models::Model;
 use phasefront::encode::{Encoder, Encoding, Scale};
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{self, Padding, Propagator};
-use phasefront::{Display, wave};
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Modulator, Network, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 130)];
 const RED: f64 = 638e-9;
@@ -233,7 +237,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         Encoding::ANTI_ALIAS,
         Encoding::BAND_LIMIT,
     ] {
-        let encoder = Encoder::new(h, w, encoding).unwrap();
+        let encoder = Encoder::new(h, w, encoding.clone()).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, Scale::Max, &mut phase, &mut encoder.scratch());
@@ -293,4 +297,128 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
         }
         assert!(plan.focal_stack(&hologram, &[0.5]).is_err());
     }
+}
+
+#[test]
+fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
+    let network = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let (h, w) = (40, 33);
+    let response = || Response::linear(8).unwrap();
+    let plan = |display: &Display, network: &Arc<Network>| {
+        let encoding = Encoding::Deep(network.clone());
+        Modulator::new(h, w, display, encoding, Scale::Max, response())
+    };
+    let modulator = plan(&display, &network).unwrap();
+    assert!(modulator.keeps_phase());
+    let mut field: Vec<_> = (0..3 * h * w)
+        .map(|i| Complex32::from_polar(0.5 + 0.3 * (i as f32).sin(), i as f32 * 0.01))
+        .collect();
+    let mut filtered = field.clone();
+    let filter = network.filter_plan(h, w).unwrap();
+    filter.filter(&mut filtered, &mut filter.scratch());
+    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let mut expected = vec![0; 3 * h * w];
+    let scale = encoder.encode_levels(
+        &mut filtered,
+        Scale::Max,
+        &response(),
+        &mut expected,
+        &mut encoder.scratch(),
+    );
+    let mut levels = vec![0; 3 * h * w];
+    let modulation = modulator.modulate(&mut field, &mut levels, &mut modulator.scratch());
+    assert_eq!((modulation.scale, levels), (scale, expected));
+
+    let why = |display: &Display, network| plan(display, network).err().unwrap().to_string();
+    let elsewhere = Display::default().with_offset_m(5.9e-3).unwrap();
+    assert!(why(&elsewhere, &network).contains("offset of 6.000 mm"));
+    let hologram = Arc::new(Network::from_onnx(&Model::new(3, 8).bytes()).unwrap());
+    assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
+}
+
+/// The correction is one more phase in the offset's transfer function: against Eq. 2 with it, in f64.
+#[test]
+fn a_correction_is_part_of_the_offset() {
+    let a = Aberration::new([
+        [0.5, -1.2, 0.7, 0.4, -0.9],
+        [0.6, -1.5, 0.8, 0.5, -1.1],
+        [0.7, -1.7, 0.9, 0.6, -1.3],
+    ])
+    .unwrap();
+    for (offset_m, shape) in [(0.0, (61, 47)), (4e-3, (40, 72))] {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let (h, w) = shape;
+        let response = Response::linear(8).unwrap();
+        let encoding = Encoding::DoublePhase;
+        let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
+            .unwrap()
+            .with_correction(&a)
+            .unwrap();
+        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+        let given = field.clone();
+        plan.propagate(&mut field, &mut plan.scratch());
+        for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
+            let size = h * w;
+            // Room for all that moves, so that nothing comes back around.
+            let (ph, pw) = (4 * h, 4 * w);
+            let mut plane = Array2::zeros((ph, pw));
+            let source = widen(&given[c * size..][..size], shape);
+            plane.slice_mut(ndarray::s![..h, ..w]).assign(&source);
+            let mut spectrum = reference::fft2(&plane, false);
+            for ((ky, kx), value) in spectrum.indexed_iter_mut() {
+                let bin = |k: usize, n: usize| {
+                    (if 2 * k < n {
+                        k as f64
+                    } else {
+                        k as f64 - n as f64
+                    }) / (n as f64 * PITCH)
+                };
+                let (mu, nu) = (bin(kx, pw), bin(ky, ph));
+                let root = (lambda.powi(-2) - mu * mu - nu * nu).sqrt();
+                let phase = 2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
+                *value *= Complex64::from_polar(1.0, phase);
+            }
+            let expected = reference::fft2(&spectrum, true);
+            let expected = expected.slice(ndarray::s![..h, ..w]).to_owned();
+            let error = relative_error(&widen(&field[c * size..][..size], shape), &expected);
+            // Tails of the kernel at the corner frequencies reach beyond what rays do.
+            assert!(error < 0.02, "{offset_m} {shape:?} {c}: {error}");
+        }
+    }
+}
+
+/// A hologram smaller than the modulator is lit by the middle of the beam, after the filter.
+#[test]
+fn what_a_pixel_sends_is_divided_by_what_it_gets() {
+    let display = Display::from_toml("width = 60\nheight = 50").unwrap();
+    let (h, w) = (40, 33);
+    let beam = Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
+        1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
+    });
+    let laser = Illumination::new(beam.view()).unwrap();
+    let response = || Response::linear(8).unwrap();
+    let scale = Scale::Fixed(2.5);
+    let plan = Modulator::new(h, w, &display, Encoding::ANTI_ALIAS, scale, response())
+        .unwrap()
+        .with_illumination(laser.clone());
+    let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
+    let mut filtered = field.clone();
+    let mut levels = vec![0; 3 * h * w];
+    plan.modulate(&mut field, &mut levels, &mut plan.scratch());
+    let filter = phasefront::encode::anti_alias::AntiAlias::new(0.7, 3).unwrap();
+    for plane in filtered.chunks_exact_mut(h * w) {
+        filter.filter(plane, w, &mut filter.scratch(w));
+    }
+    laser.divide(&mut filtered, (h, w), (50, 60));
+    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let mut expected = vec![0; 3 * h * w];
+    encoder.encode_levels(
+        &mut filtered,
+        scale,
+        &response(),
+        &mut expected,
+        &mut encoder.scratch(),
+    );
+    assert_eq!(levels, expected);
 }

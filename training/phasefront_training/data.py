@@ -115,6 +115,7 @@ class Scenes:
         self.ldi_layers = ldi_layers
         self.damaged = []
         self.origin = {key: manifest.table[key] for key in ("seed", "planes")}
+        self.corrected = bool(manifest.table.get("aberration"))
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
         if len(present) < len(numbers):
@@ -178,10 +179,17 @@ def _gather(parts, k, device):
     return whole
 
 
-def network_input(colour, depth):
-    """The network's input (..., 4·L, H, W): colour and depth of each layer in turn, each minus 0.5."""
-    colour = colour.unflatten(-3, (-1, 3))
-    return torch.cat([colour, depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
+def network_input(colour, depth, coordinates=False):
+    """The network's input (..., 4·L, H, W): colour and depth of each layer in turn, each minus 0.5; with `coordinates`
+    of a whole frame (4·L, H, W) two more channels, its `place`."""
+    given = torch.cat([colour.unflatten(-3, (-1, 3)), depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
+    return torch.cat([given, place(*depth.shape[-2:]).to(given)], -3) if coordinates else given
+
+
+def place(height, width):
+    """x and y (2, H, W) of the pixels of a frame, from -0.5 at the first pixel's outer edge to 0.5 at the last one's."""
+    x, y = ((torch.arange(n) + 0.5) / n - 0.5 for n in (width, height))
+    return torch.stack([x.expand(height, width), y[:, None].expand(height, width)])
 
 
 @dataclass(frozen=True)
@@ -199,9 +207,13 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before."""
+    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before.
 
-    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0):
+    With `coordinates` inputs say where in the frame they lie. Samples of holograms that correct an aberration are
+    neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates.
+    """
+
+    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, coordinates=False):
         if degraded and scenes.ldi_layers > 1:
             raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
         height, width = scenes.shape
@@ -212,6 +224,8 @@ class Sampler:
         if 4 * margin > self.crop[0] and self.crop != scenes.shape:
             raise ValueError(f"a margin of {margin} px leaves too little of crops of {crop} px")
         self.margin, self.seed, self.rank = margin, seed, rank
+        self.place = place(height, width) if coordinates else None
+        self.flips = not (scenes.corrected or coordinates)
 
     def draw(self, step):
         rng = np.random.default_rng([self.seed, self.rank, step])
@@ -238,7 +252,9 @@ class Sampler:
         ] = 1
         seen = degrade_depth(colour, depth[0], rng)[None] if rng.random() < self.degraded else depth
         members = [network_input(colour, seen), target, depth[:1], valid]
-        flip_y, flip_x, transpose = rng.random(3) < 0.5
+        if self.place is not None:
+            members[0] = torch.cat([members[0], self.place[window].to(members[0])])
+        flip_y, flip_x, transpose = rng.random(3) < (0.5 if self.flips else 0)
         axes = [axis for axis, flip in ((-2, flip_y), (-1, flip_x)) if flip]
         if axes:
             members = [member.flip(axes) for member in members]

@@ -35,7 +35,8 @@ def torch_predictor(network, autocast=False):
     device = next(network.parameters()).device
 
     def predict(colour, depth):
-        x = network_input(colour, depth)[None].to(device).contiguous(memory_format=torch.channels_last)
+        x = network_input(colour, depth, network.architecture.coordinates)[None]
+        x = x.to(device).contiguous(memory_format=torch.channels_last)
         with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=autocast):
             output = network(x)
         return head_field(network.architecture, output, x)[0]
@@ -57,7 +58,7 @@ def onnx_predictor(path, threads=None):
     meaning = Architecture(layers=3, input=description["input"], head=description["head"])
 
     def predict(colour, depth):
-        x = network_input(colour.cpu(), depth.cpu())[None]
+        x = network_input(colour.cpu(), depth.cpu(), meaning.coordinates)[None]
         output = torch.from_numpy(session.run(None, {name: x.numpy()})[0])
         return head_field(meaning, output, x)[0]
 

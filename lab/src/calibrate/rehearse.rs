@@ -139,7 +139,7 @@ pub fn run(
         }
         maps.push(laser::mixture(&laser::map(&photo, &registration, shape)?, 1)?.0);
     }
-    let views: Vec<_> = maps.iter().map(Array2::view).collect();
+    let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
     let laser_map = stack(Axis(0), &views).map_err(|e| Error::Input(e.to_string()))?;
     table::write_laser(&folder.join("laser.png"), laser_map.view())?;
 
@@ -263,11 +263,12 @@ fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {
 
 /// The display's file, which refers to the others.
 fn write_display(path: &Path, display: &Display) -> Result<()> {
-    let table = toml::Table::try_from(display).map_err(|e| Error::file(path, e))?;
-    let mut text: String = table
-        .iter()
-        .map(|(key, value)| format!("{key} = {value}\n"))
-        .collect();
+    // Numbers and lists of them are written alike in JSON and TOML.
+    let values = serde_json::to_value(display).map_err(|e| Error::file(path, e))?;
+    let mut text = String::new();
+    for (key, value) in values.as_object().into_iter().flatten() {
+        text.push_str(&format!("{key} = {value}\n"));
+    }
     text.push_str(
         "per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n",
     );

@@ -1,8 +1,11 @@
 //! `phasefront evaluate`: the paper's Table 2 on a data set.
 
+use super::flags::EncoderName;
 use super::flags::progress_bar;
-use super::hologram::{EncoderName, PrecisionName};
+use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
+use phasefront::sweep::MAX_HIDDEN_LAYERS;
+use phasefront::{Display, Sweep};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Method, Row, Shown};
 use phasefront_lab::{Error, Result, models};
@@ -40,9 +43,18 @@ pub(crate) struct Evaluate {
     /// Only the first so many of them
     #[arg(long, value_name = "N")]
     scenes: Option<usize>,
-    /// Planes of SM-LBM [default: the data set's]
+    /// Planes of SM-LBM [default: the data set's] and of the sweep [default: what suits the display]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
+    /// Taps of the sweep's filter [default: what suits its planes and the display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
+    /// Hidden layers of the sweep
+    #[arg(long, value_name = "N", default_value_t = MAX_HIDDEN_LAYERS)]
+    hidden_layers: usize,
+    /// Pixels along each side of the sweep's tiles
+    #[arg(long, value_name = "N", default_value_t = Sweep::TILE)]
+    tile: usize,
     /// Chooses the random depths of the focal stacks
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
     seed: u64,
@@ -60,6 +72,8 @@ enum MethodName {
     Rgb,
     /// SM-LBM of what is visible
     Visible,
+    /// The plane sweep of what is visible
+    Sweep,
     /// SM-LBM of all layers
     Layers,
     /// A sub-hologram for each visible point (Maimone et al.)
@@ -86,10 +100,18 @@ impl Evaluate {
             .collect();
         let methods = self.methods(&manifest)?;
         let mut shown = vec![Shown::complex()];
-        shown.extend(self.encoder.iter().map(|encoder| Shown {
-            name: encoder.name().into(),
-            encoding: Some(encoder.encoding()),
-        }));
+        for encoder in &self.encoder {
+            let encoding = encoder.encoding(None).map_err(|_| {
+                Error::Input(format!(
+                    "--encoder {} needs the network that its pre-filter was trained with: `python -m phasefront_training evaluate-encoding` judges the pair",
+                    encoder.name()
+                ))
+            })?;
+            shown.push(Shown {
+                name: encoder.name().into(),
+                encoding: Some(encoding),
+            });
+        }
         if let Some(dir) = &self.pictures {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }
@@ -137,16 +159,30 @@ impl Evaluate {
         Ok(())
     }
 
+    fn sweep(&self, display: &Display) -> Sweep {
+        Sweep {
+            hidden_layers: self.hidden_layers,
+            tile: self.tile,
+            ..sweep_for(display, self.planes.map(|n| n as usize), self.taps)
+        }
+    }
+
     fn methods<'a>(&self, manifest: &'a Manifest) -> Result<Vec<Method<'a>>> {
         let planes = self.planes.map_or(manifest.planes, |n| n as usize);
+        let display = &manifest.display;
         let mut methods: Vec<_> = (self.method.iter())
-            .map(|name| match name {
-                MethodName::Rgb => Method::rgb(),
-                MethodName::Visible => Method::visible(&manifest.display, planes),
-                MethodName::Layers => Method::layers(&manifest.display, planes),
-                MethodName::Points => Method::points(&manifest.display, planes),
+            .map(|name| {
+                Ok(match name {
+                    MethodName::Rgb => Method::rgb(),
+                    MethodName::Visible => Method::visible(display, planes),
+                    MethodName::Sweep => {
+                        Method::sweep(manifest.size, display, self.sweep(display))?
+                    }
+                    MethodName::Layers => Method::layers(display, planes),
+                    MethodName::Points => Method::points(display, planes),
+                })
             })
-            .collect();
+            .collect::<Result<_>>()?;
         for name in &self.network {
             let network = models::network(name, self.precision.is_int8())?;
             let label = format!("network {}", file_stem(name));

@@ -1,12 +1,11 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, FrameFlags, progress_bar};
+use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
-use phasefront::method::MethodPlan;
-use phasefront::{Pipeline, RgbdFrame};
+use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
@@ -34,15 +33,17 @@ pub(crate) struct Hologram {
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
-    /// Planes of --method layers and points
-    #[arg(long, value_name = "N", default_value_t = 256)]
-    planes: usize,
+    /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
+    #[arg(long, value_name = "N")]
+    planes: Option<usize>,
+    /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
     /// What keeps light from where it should not go, for --method points
     #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
     occlusion: OcclusionName,
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -60,6 +61,8 @@ pub(crate) struct Hologram {
 enum Method {
     /// A trained network on the RGB-D image
     Network,
+    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    Sweep,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -101,31 +104,21 @@ impl PrecisionName {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum EncoderName {
-    /// Double phase
-    Double,
-    /// Double phase after a small blur (AA-DPM)
-    AntiAlias,
-    /// Double phase after a cut of high frequencies (BL-DPM)
-    BandLimit,
-}
+/// Planes of the methods of exact waves.
+const DEFAULT_PLANES: usize = 256;
 
-impl EncoderName {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            EncoderName::Double => Encoding::DoublePhase,
-            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
-            EncoderName::BandLimit => Encoding::BAND_LIMIT,
-        }
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            EncoderName::Double => "double",
-            EncoderName::AntiAlias => "anti-alias",
-            EncoderName::BandLimit => "band-limit",
-        }
+/// The sweep that suits `display`, with these planes and taps where given.
+pub(super) fn sweep_for(
+    display: &phasefront::Display,
+    planes: Option<usize>,
+    taps: Option<usize>,
+) -> Sweep {
+    let usual = Sweep::for_display(display);
+    let planes = planes.unwrap_or(usual.planes);
+    Sweep {
+        planes,
+        taps: taps.unwrap_or_else(|| Sweep::taps_for(display, planes)),
+        ..usual
     }
 }
 
@@ -150,17 +143,27 @@ impl Hologram {
                 ));
             }
         }
+        let encoding = self.encoder.read()?;
         let display = self.display.read()?;
         let method = self.method.unwrap_or(match self.ldi {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
         let made = match (method, &self.ldi) {
-            (Method::Network, None) => self.by_network(&self.frame.read()?, &display)?,
-            (Method::Network, Some(dir)) => {
+            (Method::Network, None) => {
+                let network = models::network(&self.network, self.precision.is_int8())?;
+                let method = phasefront::Method::Network(network);
+                self.by_pipeline("network", method, &display, encoding)?
+            }
+            (Method::Sweep, None) => {
+                let sweep = sweep_for(&display.display, self.planes, self.taps);
+                let method = phasefront::Method::Sweep(sweep);
+                self.by_pipeline("sweep", method, &display, encoding)?
+            }
+            (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network takes --rgb and --depth; for a layered depth image use --method layers or points",
+                    "--method network and sweep take --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
             (Method::Layers | Method::Points, source) => {
@@ -168,7 +171,7 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display)?
+                self.by_physics(method, &ldi, &display, encoding)?
             }
         };
         let info = HologramInfo {
@@ -193,17 +196,31 @@ impl Hologram {
         Ok(())
     }
 
-    fn by_network(&self, frame: &RgbdFrame, display: &DisplayFile) -> Result<Made> {
-        let network = models::network(&self.network, self.precision.is_int8())?;
+    /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
+    fn by_pipeline(
+        &self,
+        stage: &'static str,
+        method: phasefront::Method,
+        file: &DisplayFile,
+        encoding: Encoding,
+    ) -> Result<Made> {
+        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let method = phasefront::Method::Network(&network);
-        let plan = MethodPlan::new(height, width, method, &display.display)?;
-        let mut modulator =
-            display.modulator((height, width), self.encoder.encoding(), self.scale())?;
-        if let Some(correction) = display.constant_correction()? {
-            modulator = modulator.with_correction(&correction)?;
+        let mut pipeline = Pipeline::new(
+            height,
+            width,
+            method,
+            &file.display,
+            encoding,
+            self.scale(),
+            file.response()?,
+        )?;
+        if let Some(laser) = &file.laser {
+            pipeline = pipeline.with_illumination(laser.clone());
         }
-        let pipeline = Pipeline::from_parts(plan, modulator)?;
+        if let Some(correction) = file.constant_correction()? {
+            pipeline = pipeline.with_correction(&correction)?;
+        }
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -218,7 +235,7 @@ impl Hologram {
             levels,
             scale: modulation.scale,
             stages: vec![
-                ("network", predict),
+                (stage, predict),
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
@@ -227,11 +244,17 @@ impl Hologram {
     }
 
     /// The methods that need no network, on a layered depth image.
-    fn by_physics(&self, method: Method, ldi: &Ldi, file: &DisplayFile) -> Result<Made> {
-        let (height, width) = ldi.shape();
+    fn by_physics(
+        &self,
+        method: Method,
+        ldi: &Ldi,
+        file: &DisplayFile,
+        encoding: Encoding,
+    ) -> Result<Made> {
+        let shape = ldi.shape();
+        let (height, width) = shape;
         let display = &file.display;
-        let mut modulator =
-            file.modulator((height, width), self.encoder.encoding(), self.scale())?;
+        let mut modulator = file.modulator(shape, encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (constant, varying) = match (method, file.constant_correction()) {
             (_, Ok(constant)) => (constant, None),
@@ -242,6 +265,7 @@ impl Hologram {
             modulator = modulator.with_correction(&correction)?;
         }
         let mut scratch = modulator.scratch();
+        let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
         let bar = progress_bar(0, "");
         let progress = |done: usize, total: usize| {
@@ -252,12 +276,11 @@ impl Hologram {
             Method::Points => {
                 bar.set_message("rows");
                 let occlusion = self.occlusion.occlusion();
-                let field = point_based::hologram(ldi, display, self.planes, occlusion, &progress)?;
+                let field = point_based::hologram(ldi, display, planes, occlusion, &progress)?;
                 ("points", field)
             }
             _ => {
                 bar.set_message("planes");
-                let (shape, planes) = (ldi.shape(), self.planes);
                 let field = match varying {
                     None => sm_lbm::hologram(ldi, display, planes, &progress)?,
                     Some(AberrationFile::Uniform(all)) => {

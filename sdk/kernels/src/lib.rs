@@ -8,9 +8,12 @@
 //! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
 //! against. `unsafe` lives in those files alone.
 //!
+//! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
+//!
 //! Nothing here knows ONNX, tract or optics.
 
 mod f32;
+pub mod fir;
 mod int8;
 mod isa;
 mod peak;
@@ -38,7 +41,7 @@ pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
 pub use peak::{f32_peak, int8_peak};
-pub use wavefront::{Scratch, Tiling};
+pub use wavefront::{Band, Rows, Scratch, Tiling};
 
 /// Planes of a hologram network's output: two a colour.
 pub const OUTPUTS: usize = 6;

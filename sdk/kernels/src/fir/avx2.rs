@@ -1,0 +1,58 @@
+//! AVX2 with FMA: 8 values to a register.
+#![allow(unsafe_code)]
+
+use super::{Kernel, Lanes, Run, Taps};
+use std::arch::x86_64::*;
+
+/// The kernel, where the processor has what it needs.
+pub(super) fn kernel() -> Option<Kernel> {
+    (is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")).then_some(run as Kernel)
+}
+
+/// # Safety
+/// As [`super::filter`].
+#[target_feature(enable = "avx2,fma")]
+unsafe fn run(taps: &Taps, run: Run) {
+    // SAFETY: the caller's.
+    unsafe { super::filter::<__m256, 2>(taps, run) }
+}
+
+// SAFETY of all below: they run inside `run` alone, which has the instructions.
+impl Lanes for __m256 {
+    const LANES: usize = 8;
+
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        unsafe { _mm256_set1_ps(value) }
+    }
+
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        unsafe { _mm256_loadu_ps(from) }
+    }
+
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        unsafe { _mm256_storeu_ps(to, self) }
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        unsafe { _mm256_add_ps(self, other) }
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        unsafe { _mm256_mul_ps(self, other) }
+    }
+
+    #[inline(always)]
+    fn plus(self, a: Self, b: Self) -> Self {
+        unsafe { _mm256_fmadd_ps(a, b, self) }
+    }
+
+    #[inline(always)]
+    fn minus(self, a: Self, b: Self) -> Self {
+        unsafe { _mm256_fnmadd_ps(a, b, self) }
+    }
+}

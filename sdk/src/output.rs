@@ -1,0 +1,324 @@
+//! A hologram's levels as the images that a modulator's driver takes: colours in one image or one after another,
+//! flipped, shifted, at the modulator's resolution with the hologram in its middle.
+//!
+//! Around the hologram the modulator shows amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light
+//! does not pass the aperture. One level everywhere would be a bright frame.
+//!
+//! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
+//! and a shifted hologram does not stand where the table takes it to be.
+
+use crate::display::Display;
+use crate::error::{Error, Result};
+use crate::slm::Response;
+use crate::slm::per_pixel::PerPixel;
+use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+/// How the levels of the colours lie in images. Levels of fewer bits than their place in the image stand in its upper
+/// bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Layout {
+    /// One image, bytes red, green, blue.
+    Rgb,
+    /// One image, bytes red, green, blue, alpha 255.
+    Rgba,
+    /// One image, bytes blue, green, red, alpha 255.
+    Bgra,
+    /// Three images, one after another: red, green, blue; a byte a pixel.
+    Grey,
+}
+
+impl Layout {
+    /// How many images a hologram becomes.
+    pub fn images(self) -> usize {
+        match self {
+            Layout::Grey => 3,
+            _ => 1,
+        }
+    }
+
+    /// Bytes of a pixel.
+    pub fn pixel_bytes(self) -> usize {
+        match self {
+            Layout::Rgb => 3,
+            Layout::Rgba | Layout::Bgra => 4,
+            Layout::Grey => 1,
+        }
+    }
+
+    /// The colour of each byte of a pixel of image `image`; None for alpha.
+    fn colours(self, image: usize) -> [Option<usize>; 4] {
+        match self {
+            Layout::Rgb | Layout::Rgba => [Some(0), Some(1), Some(2), None],
+            Layout::Bgra => [Some(2), Some(1), Some(0), None],
+            Layout::Grey => [Some(image), None, None, None],
+        }
+    }
+}
+
+/// How a hologram is put on its modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// How colours lie in images.
+    pub layout: Layout,
+    /// Whether left and right are exchanged, of the whole image.
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole image.
+    pub flip_y: bool,
+    /// How many pixels to the right of the middle the hologram stands, before flips. What leaves the modulator is cut.
+    pub shift_x: i32,
+    /// How many pixels below the middle it stands, before flips.
+    pub shift_y: i32,
+}
+
+impl Placement {
+    /// In the middle, not flipped.
+    pub fn centred(layout: Layout) -> Self {
+        Placement {
+            layout,
+            flip_x: false,
+            flip_y: false,
+            shift_x: 0,
+            shift_y: 0,
+        }
+    }
+}
+
+/// A plan for one modulator, hologram shape and placement. Immutable; shared between threads.
+#[derive(Debug, Clone)]
+pub struct Output {
+    modulator: (usize, usize),
+    hologram: (usize, usize),
+    placement: Placement,
+    /// Of the image's upper left pixel, its place in the hologram, which may lie outside.
+    from: (i64, i64),
+    /// How far levels are shifted into their upper bits.
+    lift: u32,
+    dark: Dark,
+}
+
+/// What is shown around the hologram: double phase of amplitude 0.
+#[derive(Debug, Clone)]
+enum Dark {
+    /// The levels where x + y of the hologram is even and where it is odd.
+    Everywhere([u8; 2]),
+    /// Those of each pixel of the modulator.
+    PerPixel(Arc<PerPixel>),
+}
+
+/// The phases of darkness where x + y is even and where it is odd.
+const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
+
+impl Output {
+    /// Plans images of `display`'s resolution for (`height`, `width`) holograms whose levels `response` made.
+    ///
+    /// # Errors
+    /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
+    pub fn new(
+        display: &Display,
+        (height, width): (usize, usize),
+        response: &Response,
+        placement: Placement,
+    ) -> Result<Self> {
+        let modulator = (display.height(), display.width());
+        if height > modulator.0 || width > modulator.1 {
+            return Err(Error::Plan(format!(
+                "a hologram of {width}×{height} does not fit the modulator of {}×{}",
+                modulator.1, modulator.0
+            )));
+        }
+        let from = |modulator: usize, hologram: usize, shift: i32| {
+            -(((modulator - hologram) / 2) as i64 + i64::from(shift))
+        };
+        Ok(Output {
+            modulator,
+            hologram: (height, width),
+            placement,
+            from: (
+                from(modulator.0, height, placement.shift_y),
+                from(modulator.1, width, placement.shift_x),
+            ),
+            lift: match response {
+                Response::Linear { bits } => 8 - bits,
+                Response::Lut { .. } | Response::PerPixel(_) => 0,
+            },
+            dark: match response.clone().centred(modulator.0, modulator.1)? {
+                Response::PerPixel(table) => Dark::PerPixel(table),
+                same => Dark::Everywhere(DARK.map(|phase| same.level(phase, 0))),
+            },
+        })
+    }
+
+    /// Bytes of an image.
+    pub fn image_bytes(&self) -> usize {
+        self.modulator.0 * self.modulator.1 * self.placement.layout.pixel_bytes()
+    }
+
+    /// (H, W) of an image.
+    pub fn shape(&self) -> (usize, usize) {
+        self.modulator
+    }
+
+    /// Image `image` of a hologram of `levels`, (3, H, W), into `bytes`, rows without gaps. Allocates nothing.
+    ///
+    /// # Errors
+    /// An image that the layout has not.
+    ///
+    /// # Panics
+    /// If `levels` or `bytes` has another length than planned.
+    pub fn write(&self, levels: &[u8], image: usize, bytes: &mut [u8]) -> Result<()> {
+        let layout = self.placement.layout;
+        let (height, width) = self.hologram;
+        let (out_height, out_width) = self.modulator;
+        assert_eq!(levels.len(), 3 * height * width);
+        assert_eq!(bytes.len(), self.image_bytes());
+        if image >= layout.images() {
+            return Err(Error::Plan(format!(
+                "there is no image {image}; {layout:?} has {}",
+                layout.images()
+            )));
+        }
+        let pixel_bytes = layout.pixel_bytes();
+        let colours = &layout.colours(image)[..pixel_bytes];
+        let flip = |at: usize, n: usize, flipped: bool| if flipped { n - 1 - at } else { at };
+        for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
+            let modulator_y = flip(y, out_height, self.placement.flip_y);
+            let y = self.from.0 + modulator_y as i64;
+            for (x, pixel) in row.chunks_exact_mut(pixel_bytes).enumerate() {
+                let modulator_x = flip(x, out_width, self.placement.flip_x);
+                let x = self.from.1 + modulator_x as i64;
+                let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
+                for (byte, colour) in pixel.iter_mut().zip(colours) {
+                    *byte = match colour {
+                        None => 255,
+                        Some(colour) if inside => {
+                            levels[(colour * height + y as usize) * width + x as usize] << self.lift
+                        }
+                        Some(colour) => {
+                            let odd = (x + y).rem_euclid(2) as usize;
+                            match &self.dark {
+                                Dark::Everywhere(levels) => levels[odd] << self.lift,
+                                Dark::PerPixel(table) => {
+                                    let row = colour * out_height + modulator_y;
+                                    table.level(DARK[odd], row * out_width + modulator_x)
+                                }
+                            }
+                        }
+                    };
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn display(width: usize, height: usize) -> Display {
+        Display::from_toml(&format!("width = {width}\nheight = {height}")).unwrap()
+    }
+
+    /// Levels that say colour, row and column.
+    fn levels(height: usize, width: usize) -> Vec<u8> {
+        (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                (100 + 50 * c + 10 * y + x) as u8
+            })
+            .collect()
+    }
+
+    fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
+        let mut bytes = vec![7; output.image_bytes()];
+        output.write(levels, image, &mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn each_layout_holds_each_colour_in_its_place() {
+        let response = Response::linear(8).unwrap();
+        let levels = levels(2, 3);
+        for (layout, expected) in [
+            (Layout::Rgb, vec![100, 150, 200, 101, 151, 201]),
+            (Layout::Rgba, vec![100, 150, 200, 255, 101, 151]),
+            (Layout::Bgra, vec![200, 150, 100, 255, 201, 151]),
+            (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
+        ] {
+            let output = Output::new(
+                &display(3, 2),
+                (2, 3),
+                &response,
+                Placement::centred(layout),
+            );
+            let output = output.unwrap();
+            assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
+            assert!(
+                output
+                    .write(&levels, layout.images(), &mut vec![0; output.image_bytes()])
+                    .is_err()
+            );
+            if layout == Layout::Grey {
+                assert_eq!(image(&output, &levels, 2), [200, 201, 202, 210, 211, 212]);
+            }
+        }
+    }
+
+    #[test]
+    fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
+        let response = Response::linear(8).unwrap();
+        let levels = levels(2, 3);
+        // In a 7×4 modulator two columns and one row are left of and above it.
+        let place = |x: usize, y: usize, p: &Placement| {
+            let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
+            let y = if p.flip_y { 3 - y } else { y } as i32 - 1 - p.shift_y;
+            match (0..3).contains(&x) && (0..2).contains(&y) {
+                true => (100 + 10 * y + x) as u8,
+                // π/2 and 3π/2 go on the hologram's checkerboard.
+                false => [64, 192][(x + y).rem_euclid(2) as usize],
+            }
+        };
+        for (flip_x, flip_y, shift_x, shift_y) in [
+            (false, false, 0, 0),
+            (true, false, 0, 0),
+            (false, true, 1, 0),
+            (true, true, -3, 2),
+            (false, false, 100, 0),
+        ] {
+            let placement = Placement {
+                flip_x,
+                flip_y,
+                shift_x,
+                shift_y,
+                ..Placement::centred(Layout::Grey)
+            };
+            let output = Output::new(&display(7, 4), (2, 3), &response, placement).unwrap();
+            for (i, byte) in image(&output, &levels, 0).into_iter().enumerate() {
+                assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
+            }
+        }
+        assert!(
+            Output::new(
+                &display(2, 4),
+                (2, 3),
+                &response,
+                Placement::centred(Layout::Rgb)
+            )
+            .is_err()
+        );
+    }
+
+    #[test]
+    fn few_bits_stand_in_the_upper_ones() {
+        for bits in 1..=8 {
+            let response = Response::linear(bits).unwrap();
+            let placement = Placement::centred(Layout::Grey);
+            let output = Output::new(&display(1, 1), (1, 1), &response, placement).unwrap();
+            let top = ((1u32 << bits) - 1) as u8;
+            assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! The plane sweep: holograms of RGB-D frames by waves, without training, for any display.
+//!
+//! As in the silhouette-mask layer-based method (SM-LBM, Eq. 1–4 of the paper) the scene is cut into planes and a wave
+//! carried over them from the back to the front, each plane's silhouette replacing what comes from behind it. What is
+//! new makes it fast and good:
+//!
+//! - [`hidden`] adds the surfaces that an RGB-D frame does not show, so that edges are lit from behind;
+//! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)), not a Fourier transform;
+//! - a tile of the frame does the planes that hold points in it and its halo, and crosses the others in one step;
+//! - the last step goes from the front straight to the midpoint, or on to the display.
+//!
+//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). [`reference`]
+//! is the naive oracle.
+
+mod filters;
+mod fit;
+pub mod hidden;
+pub mod reference;
+mod tile;
+mod workers;
+
+use crate::display::Display;
+use crate::error::{Error, Result};
+use crate::frame::RgbdFrame;
+use filters::{Filters, Optics};
+use hidden::{Hidden, HiddenScratch};
+use num_complex::Complex32;
+use phasefront_kernels::Isa;
+use phasefront_kernels::fir::Fir;
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+use tile::{Layout, Surfaces, Tile, TileScratch};
+use workers::Workers;
+
+/// Most planes of a sweep.
+pub const MAX_PLANES: usize = 1024;
+/// Most taps of a step.
+pub const MAX_TAPS: usize = 63;
+/// Most hidden layers.
+pub const MAX_HIDDEN_LAYERS: usize = 2;
+/// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
+/// from the midpoint by Fourier transforms.
+pub const MAX_HOME_REACH: usize = 96;
+
+/// How a sweep is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sweep {
+    /// Planes that the volume is cut into.
+    pub planes: usize,
+    /// Taps of the filter from plane to plane along each axis, an odd number.
+    pub taps: usize,
+    /// Hidden layers that are added, 0 to [`MAX_HIDDEN_LAYERS`].
+    pub hidden_layers: usize,
+    /// Pixels along each side of a tile, a multiple of 16.
+    pub tile: usize,
+}
+
+impl Sweep {
+    /// What suits `display`: planes so near each other that light spreads 5/8 of a pixel from one to the next, as far as
+    /// [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
+    pub fn for_display(display: &Display) -> Self {
+        let reach = reach_px(display, display.volume_depth_m());
+        let planes = (reach * 8.0 / 5.0).ceil() as usize;
+        let planes = planes.clamp(*Self::USUAL_PLANES.start(), *Self::USUAL_PLANES.end());
+        Sweep {
+            planes,
+            taps: Self::taps_for(display, planes),
+            hidden_layers: MAX_HIDDEN_LAYERS,
+            tile: Self::TILE,
+        }
+    }
+
+    /// Pixels along each side of the usual tile.
+    pub const TILE: usize = 256;
+
+    /// Planes that [`Sweep::for_display`] chooses from.
+    pub const USUAL_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
+
+    /// The taps that a step between `planes` planes needs: light's reach and three more on each side.
+    pub fn taps_for(display: &Display, planes: usize) -> usize {
+        let step_m = display.volume_depth_m() / planes.max(1) as f64;
+        let radius = reach_px(display, step_m).ceil() as usize + 3;
+        (2 * radius + 1).min(MAX_TAPS)
+    }
+
+    fn check(&self, display: &Display) -> Result<()> {
+        let refuse = |what: String| Err(Error::Plan(format!("sweep: {what}")));
+        if !(1..=MAX_PLANES).contains(&self.planes) {
+            return refuse(format!(
+                "{} planes; 1 to {MAX_PLANES} are right",
+                self.planes
+            ));
+        }
+        if !(3..=MAX_TAPS).contains(&self.taps) || self.taps.is_multiple_of(2) {
+            return refuse(format!(
+                "{} taps; an odd number from 3 to {MAX_TAPS} is right",
+                self.taps
+            ));
+        }
+        let reach = reach_px(display, display.volume_depth_m() / self.planes as f64);
+        if self.planes > 1 && self.taps / 2 < reach.ceil() as usize {
+            return refuse(format!(
+                "light spreads {reach:.1} pixels from plane to plane, farther than {} taps; {} taps or {} planes are right",
+                self.taps,
+                2 * reach.ceil() as usize + 1,
+                (reach * self.planes as f64 / (self.taps / 2) as f64).ceil(),
+            ));
+        }
+        if self.hidden_layers > MAX_HIDDEN_LAYERS {
+            return refuse(format!(
+                "{} hidden layers; 0 to {MAX_HIDDEN_LAYERS} are right",
+                self.hidden_layers
+            ));
+        }
+        if !(16..=4096).contains(&self.tile) || !self.tile.is_multiple_of(16) {
+            return refuse(format!(
+                "tiles of {} pixels; a multiple of 16 from 16 to 4096 is right",
+                self.tile
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// How far light of the longest wavelength spreads over `distance_m`, pixels.
+fn reach_px(display: &Display, distance_m: f64) -> f64 {
+    let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
+    crate::wave::asm::reach_m(distance_m, longest, display.pitch_m()) / display.pitch_m()
+}
+
+/// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall as
+/// the spectra of images do; 0 is perfect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitError {
+    /// Of one step.
+    pub step: f64,
+    /// Of all steps through the volume.
+    pub volume: f64,
+}
+
+/// A plan of the sweep for one frame shape and display. Immutable; shared between threads.
+pub struct SweepPlan {
+    height: usize,
+    width: usize,
+    sweep: Sweep,
+    z_m: f64,
+    fir: Fir,
+    filters: [Filters; 3],
+    hidden: Hidden,
+    layout: Layout,
+}
+
+/// Working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
+pub struct SweepScratch {
+    planes: Vec<u16>,
+    sources: Vec<u32>,
+    hidden: HiddenScratch,
+    tiles: Workers<TileScratch>,
+}
+
+impl SweepPlan {
+    /// Plans (`height`, `width`) frames for `display`; the hologram stands at `z_m`, 0 being the midpoint. The filters
+    /// are fitted here.
+    ///
+    /// # Errors
+    /// An empty or too large frame, numbers of `sweep` out of their range, or a hologram so far away that light spreads
+    /// over [`MAX_HOME_REACH`] from the front of the volume.
+    pub fn new(
+        height: usize,
+        width: usize,
+        display: &Display,
+        sweep: Sweep,
+        z_m: f64,
+    ) -> Result<Self> {
+        sweep.check(display)?;
+        if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
+            return Err(Error::Plan(format!(
+                "sweep: a frame of {width}×{height} pixels is empty or too large"
+            )));
+        }
+        let optics = optics(display, &sweep, z_m)?;
+        // Fitting is the plan's only slow part, and colours do not depend on each other.
+        let mut filters = optics.map(|_| None);
+        (filters.par_iter_mut().zip(&optics)).for_each(|(filters, optics)| {
+            *filters = Some(Filters::new(optics, sweep.taps / 2));
+        });
+        let [Some(red), Some(green), Some(blue)] = filters else {
+            unreachable!("all three were made");
+        };
+        let filters = [red, green, blue];
+        let way_m = |k: usize| optics[0].home_m.abs() + k as f64 * optics[0].step_m;
+        let layout = Layout::new(
+            sweep.tile,
+            sweep.planes,
+            |k| reach_px(display, way_m(k)).ceil() as usize,
+            &filters,
+        );
+        Ok(SweepPlan {
+            height,
+            width,
+            sweep,
+            z_m,
+            fir: Fir::fastest(),
+            filters,
+            hidden: Hidden::new(height, width, hidden_reach(display)),
+            layout,
+        })
+    }
+
+    /// The same plan on one instruction set; None where this processor lacks it. All give the same bits.
+    pub fn on(self, isa: Isa) -> Option<Self> {
+        Fir::new(isa).map(|fir| SweepPlan { fir, ..self })
+    }
+
+    /// The instruction set that the filters run on.
+    pub fn isa(&self) -> Isa {
+        self.fir.isa()
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// How it is done.
+    pub fn sweep(&self) -> Sweep {
+        self.sweep
+    }
+
+    /// Where the hologram stands, metres from the midpoint toward the viewer.
+    pub fn z_m(&self) -> f64 {
+        self.z_m
+    }
+
+    /// How well the filters of red, green and blue fit.
+    pub fn fit_errors(&self) -> [FitError; 3] {
+        self.filters.each_ref().map(|filters| FitError {
+            step: filters.errors[0],
+            volume: filters.errors[1],
+        })
+    }
+
+    /// Working memory for one frame at a time, for the current thread pool.
+    pub fn scratch(&self) -> SweepScratch {
+        let size = self.height * self.width;
+        let layers = self.sweep.hidden_layers;
+        SweepScratch {
+            planes: vec![0; size],
+            sources: vec![
+                0;
+                if layers > 0 {
+                    MAX_HIDDEN_LAYERS * size
+                } else {
+                    0
+                }
+            ],
+            hidden: self.hidden.scratch(),
+            tiles: Workers::new(|| {
+                let mut scratch = self.layout.scratch();
+                let all = (layers + 1) * size;
+                scratch.reserve(self.layout.most_points(layers + 1).min(all));
+                scratch
+            }),
+        }
+    }
+
+    /// The hologram of `frame`, carrier-free, at [`SweepPlan::z_m`], into `field`, (3, H, W). Allocates nothing.
+    ///
+    /// # Errors
+    /// A frame of another shape.
+    ///
+    /// # Panics
+    /// If `field` has not 3·H·W values or `scratch` is another plan's.
+    pub fn field(
+        &self,
+        frame: &RgbdFrame,
+        field: &mut [Complex32],
+        scratch: &mut SweepScratch,
+    ) -> Result<()> {
+        frame.check_shape(self.shape())?;
+        let size = self.height * self.width;
+        assert_eq!(field.len(), 3 * size);
+        let (rgb, depth) = frame.values();
+        const PART: usize = 1 << 14;
+        (scratch.planes.par_chunks_mut(PART))
+            .zip(depth.par_chunks(PART))
+            .for_each(|(planes, depth)| {
+                for (plane, d) in planes.iter_mut().zip(depth) {
+                    *plane = plane_of_depth(*d, self.sweep.planes) as u16;
+                }
+            });
+        let layers = self.sweep.hidden_layers;
+        if layers > 0 {
+            self.hidden
+                .find(depth, &mut scratch.sources, &mut scratch.hidden);
+        }
+        let surfaces = Surfaces {
+            rgb,
+            planes: &scratch.planes,
+            hidden: &scratch.sources[..layers * size],
+            height: self.height,
+            width: self.width,
+        };
+        let mut planes = field.chunks_exact_mut(size);
+        let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
+        let (down, across) = self.layout.count(self.height, self.width);
+        (0..down * across)
+            .into_par_iter()
+            .with_max_len(1)
+            .for_each(|index| {
+                let tile = Tile::of(&self.layout, self.fir, surfaces, index);
+                scratch.tiles.with(|scratch| {
+                    tile.gather(scratch);
+                    for (colour, filters) in self.filters.iter().enumerate() {
+                        tile.sweep(colour, filters, scratch);
+                        let mut plane = planes[colour]
+                            .lock()
+                            .unwrap_or_else(PoisonError::into_inner);
+                        tile.store(&mut plane, scratch);
+                    }
+                });
+            });
+        Ok(())
+    }
+}
+
+/// The plane of a pixel of depth `d` among `planes`, 0 the nearest.
+pub fn plane_of_depth(d: f32, planes: usize) -> usize {
+    ((f64::from(d) * planes as f64) as usize).min(planes - 1)
+}
+
+/// How far hidden surfaces are searched for: as far as light spreads through the volume.
+pub fn hidden_reach(display: &Display) -> usize {
+    (reach_px(display, display.volume_depth_m()).ceil() as usize).max(1)
+}
+
+/// Whether a sweep can end at `z_m`: not farther from the front of the volume than short filters reach.
+pub fn reaches(display: &Display, z_m: f64) -> bool {
+    reach_px(display, z_m.abs() + display.volume_depth_m() / 2.0) <= MAX_HOME_REACH as f64
+}
+
+fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
+    let step_m = display.volume_depth_m() / sweep.planes as f64;
+    let home_m = z_m - (display.volume_depth_m() - step_m) / 2.0;
+    let reach = reach_px(display, home_m);
+    // The volume itself may be wide; what ends at the midpoint is always served.
+    if z_m != 0.0 && !reaches(display, z_m) {
+        return Err(Error::Plan(format!(
+            "sweep: light spreads {reach:.0} pixels from the front of the volume to z = {:.3} mm, more than {MAX_HOME_REACH}; end at the midpoint and propagate from there",
+            z_m * 1e3
+        )));
+    }
+    Ok(display.wavelengths_m().map(|wavelength_m| Optics {
+        pitch_m: display.pitch_m(),
+        wavelength_m,
+        step_m,
+        planes: sweep.planes,
+        home_m,
+    }))
+}

@@ -1,0 +1,296 @@
+//! Hidden surfaces: what an RGB-D frame does not show and light still comes from.
+//!
+//! Behind a pixel lies what its deeper neighbours show: the hidden layers continue them under the nearer surface, as
+//! far as light can reach. Of a pixel's left, right, upper and lower side, each is searched for
+//!
+//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`], and
+//! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
+//!
+//! by a rule from pixel to pixel ([`Found::next`]), so that the search costs the same for any reach. The nearest source
+//! of the four sides is the first hidden layer, the nearest that lies deeper than it the second.
+
+use super::workers::Workers;
+use rayon::prelude::*;
+
+/// How much deeper, in normalized depth, a pixel must be to lie on another surface.
+pub const JUMP: f32 = 0.02;
+/// Where nothing is hidden.
+pub const NOTHING: u32 = u32::MAX;
+/// Rows of a task.
+const BAND: usize = 32;
+/// The depth of no source: not deeper than anything.
+const NO_DEPTH: f32 = -1.0;
+
+/// A source on one side of a pixel: its depth, and how far away it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Source {
+    depth: f32,
+    distance: u32,
+}
+
+/// The sources on one side of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Found {
+    near: Source,
+    far: Source,
+}
+
+const NONE: Source = Source {
+    depth: NO_DEPTH,
+    distance: 0,
+};
+
+impl Found {
+    const NOTHING: Found = Found {
+        near: NONE,
+        far: NONE,
+    };
+
+    /// From the sources of the neighbour on that side, and the neighbour's own depth, to those of a pixel of `depth`:
+    /// of the neighbour itself, its near source and its far source, the first that is deep enough and within `reach`,
+    /// and the one after it.
+    #[inline(always)]
+    fn next(self, neighbour: f32, depth: f32, reach: u32) -> Found {
+        let aged = |source: Source| Source {
+            depth: if source.distance < reach {
+                source.depth
+            } else {
+                NO_DEPTH
+            },
+            distance: source.distance + 1,
+        };
+        let (near, far) = (aged(self.near), aged(self.far));
+        let least = depth + JUMP;
+        let itself = Source {
+            depth: neighbour,
+            distance: 1,
+        };
+        let deeper = |source: Source| source.depth > least;
+        Found {
+            near: if deeper(itself) {
+                itself
+            } else if deeper(near) {
+                near
+            } else if deeper(far) {
+                far
+            } else {
+                NONE
+            },
+            far: if deeper(itself) {
+                if near.depth > neighbour + JUMP {
+                    near
+                } else {
+                    far_of(far, neighbour)
+                }
+            } else if deeper(near) {
+                far
+            } else {
+                NONE
+            },
+        }
+    }
+}
+
+/// `far`, if it is deeper than a surface at `depth`.
+#[inline(always)]
+fn far_of(far: Source, depth: f32) -> Source {
+    if far.depth > depth + JUMP { far } else { NONE }
+}
+
+/// The sources of a pixel's hidden layers, as sides are added one after the other.
+#[derive(Clone, Copy)]
+struct Layers {
+    source: [u32; 2],
+    depth: [f32; 2],
+    distance: [u32; 2],
+}
+
+impl Layers {
+    const NOTHING: Layers = Layers {
+        source: [NOTHING; 2],
+        depth: [NO_DEPTH; 2],
+        distance: [u32::MAX; 2],
+    };
+
+    /// Takes in what a side has found; `index` is the source's pixel at a distance on that side.
+    fn add(&mut self, found: Found, index: impl Fn(u32) -> usize) {
+        for Source { depth, distance } in [found.near, found.far] {
+            if depth == NO_DEPTH {
+                return;
+            }
+            if distance < self.distance[0] {
+                if self.depth[0] > depth + JUMP && self.distance[0] < self.distance[1] {
+                    self.move_back();
+                } else if self.depth[1] <= depth + JUMP {
+                    self.source[1] = NOTHING;
+                    self.depth[1] = NO_DEPTH;
+                    self.distance[1] = u32::MAX;
+                }
+                self.source[0] = index(distance) as u32;
+                self.depth[0] = depth;
+                self.distance[0] = distance;
+            } else if depth > self.depth[0] + JUMP && distance < self.distance[1] {
+                self.source[1] = index(distance) as u32;
+                self.depth[1] = depth;
+                self.distance[1] = distance;
+            }
+        }
+    }
+
+    fn move_back(&mut self) {
+        self.source[1] = self.source[0];
+        self.depth[1] = self.depth[0];
+        self.distance[1] = self.distance[0];
+    }
+}
+
+/// A search for one frame shape and reach. Immutable; shared between threads.
+#[derive(Debug, Clone)]
+pub struct Hidden {
+    height: usize,
+    width: usize,
+    reach: usize,
+}
+
+/// Working memory of [`Hidden::find`].
+pub struct HiddenScratch {
+    workers: Workers<Work>,
+}
+
+struct Work {
+    /// The sources above or below the current row, one a column.
+    columns: Vec<Found>,
+    /// (BAND, W).
+    layers: Vec<Layers>,
+}
+
+impl Hidden {
+    /// Plans the search in (`height`, `width`) frames as far as `reach` pixels.
+    pub fn new(height: usize, width: usize, reach: usize) -> Self {
+        Hidden {
+            height,
+            width,
+            reach,
+        }
+    }
+
+    /// Working memory for one call at a time, for the current thread pool.
+    pub fn scratch(&self) -> HiddenScratch {
+        HiddenScratch {
+            workers: Workers::new(|| Work {
+                columns: vec![Found::NOTHING; self.width],
+                layers: vec![Layers::NOTHING; BAND.min(self.height) * self.width],
+            }),
+        }
+    }
+
+    /// Finds, for each pixel of normalized `depth`, (H, W), the pixels that its hidden layers continue, into
+    /// `sources`, (2, H, W): indices into the frame, or [`NOTHING`]. Allocates nothing.
+    ///
+    /// # Panics
+    /// If a length is wrong.
+    pub fn find(&self, depth: &[f32], sources: &mut [u32], scratch: &mut HiddenScratch) {
+        let size = self.height * self.width;
+        assert!(depth.len() == size && sources.len() == 2 * size);
+        let (first, second) = sources.split_at_mut(size);
+        (first.par_chunks_mut(BAND * self.width))
+            .zip(second.par_chunks_mut(BAND * self.width))
+            .enumerate()
+            .for_each(|(band, (first, second))| {
+                scratch.workers.with(|work| {
+                    self.band(depth, band * BAND, first, second, work);
+                });
+            });
+    }
+
+    /// The rows from `top` on that `first` and `second` hold.
+    fn band(
+        &self,
+        depth: &[f32],
+        top: usize,
+        first: &mut [u32],
+        second: &mut [u32],
+        work: &mut Work,
+    ) {
+        let (width, reach) = (self.width, self.reach as u32);
+        let row = |y: usize| &depth[y * width..][..width];
+        let rows = first.len() / width;
+        let layers = &mut work.layers[..first.len()];
+        layers.fill(Layers::NOTHING);
+        for (y, layers) in layers.chunks_exact_mut(width).enumerate() {
+            let depth = row(top + y);
+            let at = (top + y) * width;
+            let mut found = Found::NOTHING;
+            for x in 1..width {
+                found = found.next(depth[x - 1], depth[x], reach);
+                layers[x].add(found, |distance| at + x - distance as usize);
+            }
+            let mut found = Found::NOTHING;
+            for x in (0..width - 1).rev() {
+                found = found.next(depth[x + 1], depth[x], reach);
+                layers[x].add(found, |distance| at + x + distance as usize);
+            }
+        }
+        // Sources are at most `reach` rows away, so a walk that begins there with nothing finds the same.
+        work.columns.fill(Found::NOTHING);
+        for y in top.saturating_sub(self.reach) + 1..top + rows {
+            step(&mut work.columns, row(y - 1), row(y), reach);
+            if let Some(y_in_band) = y.checked_sub(top) {
+                let layers = &mut layers[y_in_band * width..][..width];
+                for (x, (layers, found)) in layers.iter_mut().zip(&work.columns).enumerate() {
+                    layers.add(*found, |distance| (y - distance as usize) * width + x);
+                }
+            }
+        }
+        work.columns.fill(Found::NOTHING);
+        let last = (top + rows - 1 + self.reach).min(self.height - 1);
+        for y in (top..last).rev() {
+            step(&mut work.columns, row(y + 1), row(y), reach);
+            if y < top + rows {
+                let layers = &mut layers[(y - top) * width..][..width];
+                for (x, (layers, found)) in layers.iter_mut().zip(&work.columns).enumerate() {
+                    layers.add(*found, |distance| (y + distance as usize) * width + x);
+                }
+            }
+        }
+        for ((first, second), layers) in first.iter_mut().zip(second).zip(layers) {
+            [*first, *second] = layers.source;
+        }
+    }
+}
+
+/// A row of columns one pixel on.
+fn step(columns: &mut [Found], neighbours: &[f32], depths: &[f32], reach: u32) {
+    for ((found, neighbour), depth) in columns.iter_mut().zip(neighbours).zip(depths) {
+        *found = found.next(*neighbour, *depth, reach);
+    }
+}
+
+/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from `reach` pixels away.
+pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Vec<u32> {
+    let size = height * width;
+    assert_eq!(depth.len(), size);
+    let mut sources = vec![NOTHING; 2 * size];
+    for y in 0..height {
+        for x in 0..width {
+            let mut layers = Layers::NOTHING;
+            let sides: [(isize, usize); 4] = [
+                (-1, x),
+                (1, width - 1 - x),
+                (-(width as isize), y),
+                (width as isize, height - 1 - y),
+            ];
+            for (step, room) in sides {
+                let at =
+                    |distance: usize| (y * width + x).wrapping_add_signed(step * distance as isize);
+                let mut found = Found::NOTHING;
+                for distance in (0..room.min(reach)).rev() {
+                    found = found.next(depth[at(distance + 1)], depth[at(distance)], reach as u32);
+                }
+                layers.add(found, |distance| at(distance as usize));
+            }
+            [sources[y * width + x], sources[size + y * width + x]] = layers.source;
+        }
+    }
+    sources
+}
