@@ -11,6 +11,7 @@ mod hologram;
 mod occlusion;
 mod refocus;
 mod scene;
+mod seeds;
 mod study;
 mod video;
 
@@ -39,6 +40,7 @@ enum Command {
     Compare(compare::Compare),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
+    Seeds(seeds::Seeds),
     Bench(bench::Bench),
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
@@ -64,6 +66,7 @@ impl Phasefront {
             Command::Compare(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
+            Command::Seeds(command) => command.run(json),
             Command::Bench(command) => command.run(self.threads.map(usize::from), json),
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),

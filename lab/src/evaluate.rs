@@ -143,7 +143,7 @@ impl<'a> Method<'a> {
 }
 
 /// The front layer's amplitudes, black where nothing is.
-fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
+pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     let front = &ldi.layers[0];
     Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| {
         match front.depth[(y, x)].is_nan() {

@@ -18,6 +18,7 @@ pub mod point_based;
 pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;
+pub mod seeds;
 pub mod simulated_display;
 pub mod sm_lbm;
 pub mod study;

@@ -186,6 +186,29 @@ impl Modulator {
     }
 }
 
+impl Modulator {
+    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
+    ///
+    /// # Panics
+    /// If `field` or `phases` has not 3·H·W values.
+    pub fn phases_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        phases: &mut [f32],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let start = Instant::now();
+        let scale = self
+            .encoder
+            .encode(field, scale, phases, &mut scratch.encoder);
+        Modulation {
+            scale,
+            encode: start.elapsed(),
+        }
+    }
+}
+
 /// Turns each colour of `field`, (3, H, W), by its mean phase arg Σu, so that its phase is centred on 0:
 /// a network's constant phase is arbitrary, and double phase wraps least around 0.
 pub fn remove_mean_phase(field: &mut [Complex32]) {

@@ -25,15 +25,29 @@ pub enum Layout {
     Rgba,
     /// One image, bytes blue, green, red, alpha 255.
     Bgra,
+    /// One image, 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
+    /// RGBA_1010102, Metal's rgb10a2.
+    Rgb10,
     /// Three images, one after another: red, green, blue; a byte a pixel.
     Grey,
+    /// Three images, one after another: red, green, blue; a 16-bit little-endian word a pixel.
+    Grey16,
+}
+
+/// A hologram's levels, (3, H, W).
+#[derive(Debug, Clone, Copy)]
+pub enum Levels<'a> {
+    /// As the planned response makes them, up to 8 bits.
+    Bytes(&'a [u8]),
+    /// Of the display's bits, 9 or 10.
+    Words(&'a [u16]),
 }
 
 impl Layout {
     /// How many images a hologram becomes.
     pub fn images(self) -> usize {
         match self {
-            Layout::Grey => 3,
+            Layout::Grey | Layout::Grey16 => 3,
             _ => 1,
         }
     }
@@ -42,17 +56,35 @@ impl Layout {
     pub fn pixel_bytes(self) -> usize {
         match self {
             Layout::Rgb => 3,
-            Layout::Rgba | Layout::Bgra => 4,
+            Layout::Rgba | Layout::Bgra | Layout::Rgb10 => 4,
             Layout::Grey => 1,
+            Layout::Grey16 => 2,
         }
     }
 
-    /// The colour of each byte of a pixel of image `image`; None for alpha.
-    fn colours(self, image: usize) -> [Option<usize>; 4] {
+    /// Bits of a level's place.
+    fn place_bits(self) -> u32 {
         match self {
-            Layout::Rgb | Layout::Rgba => [Some(0), Some(1), Some(2), None],
-            Layout::Bgra => [Some(2), Some(1), Some(0), None],
-            Layout::Grey => [Some(image), None, None, None],
+            Layout::Rgb10 => 10,
+            Layout::Grey16 => 16,
+            _ => 8,
+        }
+    }
+
+    /// A pixel of image `image` from `level` of each colour, levels being as wide as their place.
+    fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
+        let byte = |colour| level(colour) as u8;
+        match self {
+            Layout::Rgb => pixel.copy_from_slice(&[byte(0), byte(1), byte(2)]),
+            Layout::Rgba => pixel.copy_from_slice(&[byte(0), byte(1), byte(2), 255]),
+            Layout::Bgra => pixel.copy_from_slice(&[byte(2), byte(1), byte(0), 255]),
+            Layout::Rgb10 => {
+                let colours = (0..3).map(|c| u32::from(level(c)) << (10 * c));
+                let word = colours.fold(3 << 30, |word, colour| word | colour);
+                pixel.copy_from_slice(&word.to_le_bytes());
+            }
+            Layout::Grey => pixel[0] = byte(image),
+            Layout::Grey16 => pixel.copy_from_slice(&level(image).to_le_bytes()),
         }
     }
 }
@@ -93,8 +125,8 @@ pub struct Output {
     placement: Placement,
     /// Of the image's upper left pixel, its place in the hologram, which may lie outside.
     from: (i64, i64),
-    /// How far levels are shifted into their upper bits.
-    lift: u32,
+    /// Bits of a level in bytes, and of one in words.
+    bits: (u32, u32),
     dark: Dark,
 }
 
@@ -139,9 +171,9 @@ impl Output {
                 from(modulator.0, height, placement.shift_y),
                 from(modulator.1, width, placement.shift_x),
             ),
-            lift: match response {
-                Response::Linear { bits } => 8 - bits,
-                Response::Lut { .. } | Response::PerPixel(_) => 0,
+            bits: match response {
+                Response::Linear { bits } => (*bits, display.bits()),
+                Response::Lut { .. } | Response::PerPixel(_) => (8, display.bits()),
             },
             dark: match response.clone().centred(modulator.0, modulator.1)? {
                 Response::PerPixel(table) => Dark::PerPixel(table),
@@ -167,11 +199,44 @@ impl Output {
     ///
     /// # Panics
     /// If `levels` or `bytes` has another length than planned.
-    pub fn write(&self, levels: &[u8], image: usize, bytes: &mut [u8]) -> Result<()> {
+    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
+        let size = 3 * self.hologram.0 * self.hologram.1;
+        let (byte_bits, word_bits) = self.bits;
+        match levels {
+            Levels::Bytes(levels) => {
+                assert_eq!(levels.len(), size);
+                let level = |at: usize| u16::from(levels[at]);
+                let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.dark {
+                    Dark::Everywhere(levels) => levels[odd].into(),
+                    Dark::PerPixel(table) => {
+                        let (height, width) = self.modulator;
+                        let at = (colour * height + y) * width + x;
+                        table.level(DARK[odd], at).into()
+                    }
+                };
+                self.write_levels(level, byte_bits, dark, image, bytes)
+            }
+            Levels::Words(levels) => {
+                assert_eq!(levels.len(), size);
+                // Of π/2 and 3π/2.
+                let quarter = (1u16 << word_bits) / 4;
+                let dark = |odd: usize, _: usize, _: (usize, usize)| quarter * [1, 3][odd];
+                self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
+            }
+        }
+    }
+
+    fn write_levels(
+        &self,
+        level: impl Fn(usize) -> u16,
+        bits: u32,
+        dark: impl Fn(usize, usize, (usize, usize)) -> u16,
+        image: usize,
+        bytes: &mut [u8],
+    ) -> Result<()> {
         let layout = self.placement.layout;
         let (height, width) = self.hologram;
         let (out_height, out_width) = self.modulator;
-        assert_eq!(levels.len(), 3 * height * width);
         assert_eq!(bytes.len(), self.image_bytes());
         if image >= layout.images() {
             return Err(Error::Plan(format!(
@@ -179,8 +244,12 @@ impl Output {
                 layout.images()
             )));
         }
+        let place = layout.place_bits();
+        let placed = |level: u16| match bits <= place {
+            true => level << (place - bits),
+            false => level >> (bits - place),
+        };
         let pixel_bytes = layout.pixel_bytes();
-        let colours = &layout.colours(image)[..pixel_bytes];
         let flip = |at: usize, n: usize, flipped: bool| if flipped { n - 1 - at } else { at };
         for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
             let modulator_y = flip(y, out_height, self.placement.flip_y);
@@ -189,24 +258,14 @@ impl Output {
                 let modulator_x = flip(x, out_width, self.placement.flip_x);
                 let x = self.from.1 + modulator_x as i64;
                 let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
-                for (byte, colour) in pixel.iter_mut().zip(colours) {
-                    *byte = match colour {
-                        None => 255,
-                        Some(colour) if inside => {
-                            levels[(colour * height + y as usize) * width + x as usize] << self.lift
-                        }
-                        Some(colour) => {
-                            let odd = (x + y).rem_euclid(2) as usize;
-                            match &self.dark {
-                                Dark::Everywhere(levels) => levels[odd] << self.lift,
-                                Dark::PerPixel(table) => {
-                                    let row = colour * out_height + modulator_y;
-                                    table.level(DARK[odd], row * out_width + modulator_x)
-                                }
-                            }
-                        }
-                    };
-                }
+                let level = |colour: usize| match inside {
+                    true => placed(level((colour * height + y as usize) * width + x as usize)),
+                    false => {
+                        let odd = (x + y).rem_euclid(2) as usize;
+                        placed(dark(odd, colour, (modulator_y, modulator_x)))
+                    }
+                };
+                layout.write_pixel(image, level, pixel);
             }
         }
         Ok(())
@@ -234,7 +293,9 @@ mod tests {
 
     fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
         let mut bytes = vec![7; output.image_bytes()];
-        output.write(levels, image, &mut bytes).unwrap();
+        output
+            .write(Levels::Bytes(levels), image, &mut bytes)
+            .unwrap();
         bytes
     }
 
@@ -247,6 +308,7 @@ mod tests {
             (Layout::Rgba, vec![100, 150, 200, 255, 101, 151]),
             (Layout::Bgra, vec![200, 150, 100, 255, 201, 151]),
             (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
+            (Layout::Grey16, vec![0, 100, 0, 101, 0, 102]),
         ] {
             let output = Output::new(
                 &display(3, 2),
@@ -258,7 +320,11 @@ mod tests {
             assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
             assert!(
                 output
-                    .write(&levels, layout.images(), &mut vec![0; output.image_bytes()])
+                    .write(
+                        Levels::Bytes(&levels),
+                        layout.images(),
+                        &mut vec![0; output.image_bytes()]
+                    )
                     .is_err()
             );
             if layout == Layout::Grey {
@@ -320,5 +386,40 @@ mod tests {
             let top = ((1u32 << bits) - 1) as u8;
             assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
         }
+    }
+
+    #[test]
+    fn ten_bits_stand_in_words() {
+        let display = Display::from_toml("width = 2\nheight = 1\nbits = 10").unwrap();
+        let response = Response::linear(8).unwrap();
+        let words = [1023, 5, 512, 6, 256, 7];
+        for (layout, expected) in [
+            (
+                Layout::Rgb10,
+                (1023u32 | 512 << 10 | 256 << 20 | 3 << 30)
+                    .to_le_bytes()
+                    .to_vec(),
+            ),
+            (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
+            (Layout::Rgb, vec![255, 128, 64]),
+        ] {
+            let output =
+                Output::new(&display, (1, 2), &response, Placement::centred(layout)).unwrap();
+            let mut bytes = vec![0; output.image_bytes()];
+            output.write(Levels::Words(&words), 0, &mut bytes).unwrap();
+            assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
+        }
+        let around = Output::new(
+            &display,
+            (1, 1),
+            &response,
+            Placement::centred(Layout::Grey16),
+        )
+        .unwrap();
+        let mut bytes = vec![0; around.image_bytes()];
+        around
+            .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes)
+            .unwrap();
+        assert_eq!(bytes[..4], [0x80, 0, 0, 0xc0]);
     }
 }

@@ -159,6 +159,21 @@ impl Pipeline {
             .modulate_at(field, scale, levels, &mut scratch.modulator)
     }
 
+    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
+    ///
+    /// # Panics
+    /// If `field` or `phases` has not 3·H·W values.
+    pub fn phases_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        phases: &mut [f32],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .phases_at(field, scale, phases, &mut scratch.modulator)
+    }
+
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as
     /// the encoder's filter made it.
     ///

@@ -57,7 +57,7 @@ pub struct SessionOptions {
     pub target_rate_hz: Option<f64>,
     /// How the field becomes phases.
     pub encoding: Encoding,
-    /// What the modulator answers to a phase.
+    /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
     pub response: Response,
     /// The laser's light over the modulator, where it is calibrated.
     pub illumination: Option<Illumination>,
@@ -76,7 +76,7 @@ impl SessionOptions {
     /// brightness, near and far by percentiles, no target rate.
     ///
     /// # Errors
-    /// A display whose bits have no levels.
+    /// None for a display that could be made.
     pub fn new(display: Display, method: Method) -> Result<Self> {
         let rung = Rung {
             method,
@@ -88,7 +88,8 @@ impl SessionOptions {
             quality: Quality::Adaptive,
             target_rate_hz: None,
             encoding: Encoding::ANTI_ALIAS,
-            response: Response::linear(display.bits())?,
+            // Of levels with more bits the upper ones are what is looked at.
+            response: Response::linear(display.bits().min(8))?,
             illumination: None,
             correction: None,
             brightness: Brightness::default(),
@@ -109,6 +110,12 @@ impl SessionOptions {
         {
             return Err(Error::Plan(format!(
                 "a target rate of {rate} frames a second cannot be aimed at; it must lie in 0.01..=1000"
+            )));
+        }
+        if self.display.bits() > 8 && self.response != Response::linear(8)? {
+            return Err(Error::Plan(format!(
+                "a display of {} bits answers linearly; a table is for one of 8 bits",
+                self.display.bits()
             )));
         }
         self.brightness.check()?;
@@ -165,7 +172,7 @@ enum Mode {
 /// use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
 /// use phasefront::depth::image::{DepthFormat, DepthImage};
 /// use phasefront::session::{Event, RunningMode, SessionOptions};
-/// use phasefront::{Display, Network, Session};
+/// use phasefront::{Display, Method, Network, Session};
 /// use std::sync::Arc;
 ///
 /// # fn camera() -> (u64, Vec<u8>, Vec<u8>) { unimplemented!() }

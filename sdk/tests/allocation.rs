@@ -5,7 +5,10 @@ mod network_models;
 
 use network_models::Model;
 use num_complex::Complex32;
+use phasefront::depth::refine::Refiner;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
+use phasefront::preview::Preview;
 use phasefront::slm::Response;
 use phasefront::slm::per_pixel::{self, PerPixel};
 use phasefront::wave::aperture::Aperture;
@@ -45,6 +48,44 @@ fn count(mut call: impl FnMut()) -> usize {
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     call();
     ALLOCATIONS.load(Ordering::Relaxed) - before
+}
+
+/// Colour, depth and a preview, on the current thread pool.
+fn camera_frames_and_previews() {
+    let (h, w) = (30, 40);
+    let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
+    let image =
+        ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), h, w).unwrap();
+    let mut scratch = plan.scratch();
+    let mut rgb = vec![0.0; 3 * h * w];
+    let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
+    assert_eq!(count(convert), 0);
+    let plan = Refiner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w)).unwrap();
+    let mut scratch = plan.scratch();
+    let depth: Vec<f32> = (0..300)
+        .map(|i| {
+            if i % 7 == 0 {
+                f32::NAN
+            } else {
+                (i % 20) as f32 / 20.0
+            }
+        })
+        .collect();
+    let mut refined = vec![0.0; h * w];
+    let refine = || {
+        plan.refine(&depth, &[1.0; 300], &rgb, &mut refined, &mut scratch)
+            .unwrap()
+    };
+    assert_eq!(count(refine), 0);
+    let plan = Preview::new((h, w), &Display::default(), 2e-3, (20, 20)).unwrap();
+    let mut scratch = plan.scratch();
+    let response = Response::linear(8).unwrap();
+    let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
+    assert_eq!(
+        count(|| plan.look(&levels, &response, 1.0, &mut rgba, &mut scratch)),
+        0
+    );
 }
 
 #[test]
@@ -103,6 +144,7 @@ fn hot_calls_allocate_nothing() {
                 plan.modulate(&mut field, &mut levels, &mut scratch);
             };
             assert_eq!(count(frame), 0, "a calibrated display");
+            camera_frames_and_previews();
         });
     }
 }

@@ -9,10 +9,12 @@ use phasefront::depth::image::DepthFormat;
 use phasefront::frame::{
     Alignment, CameraFrame, ColourFormat, ColourImage, Orientation, Plane, Rotation,
 };
+use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{
-    Brightness, DropReason, Event, Quality, RunningMode, Submission, Thermal,
+    Brightness, DropReason, Event, Quality, RunningMode, SessionOptions, Submission, Thermal,
 };
-use phasefront::{Error, Session};
+use phasefront::slm::Response;
+use phasefront::{Display, Error, Session};
 use std::sync::mpsc;
 
 const W: usize = 64;
@@ -128,6 +130,41 @@ fn cameras_apart_are_aligned() {
     frame.alignment = Alignment::Cameras(cameras);
     let moved = session.process(&frame).unwrap();
     assert!(moved.z_at(0.65, 0.4) > 2.0e-3, "{}", moved.z_at(0.65, 0.4));
+}
+
+#[test]
+fn a_display_of_ten_bits_gets_words() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let eight = image_session().process(&frame(1, &scene, &metres)).unwrap();
+    let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 2\nbits = 10").unwrap();
+    let options = SessionOptions::new(display.clone(), options(W, H).ladder[0].method.clone());
+    let mut options = options.unwrap();
+    let session = Session::new(options.clone(), RunningMode::Image).unwrap();
+    let ten = session.process(&frame(1, &scene, &metres)).unwrap();
+    assert!(eight.words().is_none());
+    let words = ten.words().unwrap();
+    for ((word, upper), level) in words.iter().zip(ten.levels()).zip(eight.levels()) {
+        assert_eq!(word >> 2, u16::from(*upper));
+        // The rounding to 8 bits of the same phase, around the circle.
+        let apart = (i32::from(*word) - 4 * i32::from(*level)).rem_euclid(1024);
+        assert!(apart <= 3 || apart >= 1021, "{word} {level}");
+    }
+    let response = Response::linear(8).unwrap();
+    let output = Output::new(
+        &display,
+        (H, W),
+        &response,
+        Placement::centred(Layout::Grey16),
+    );
+    let mut bytes = vec![0; 2 * W * H];
+    output
+        .unwrap()
+        .write(ten.output_levels(), 1, &mut bytes)
+        .unwrap();
+    assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
+    options.response = Response::lut([0; 256]);
+    assert!(Session::new(options, RunningMode::Image).is_err());
 }
 
 /// Frames that cannot be used: each is named, and the next good frame works.

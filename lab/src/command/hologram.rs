@@ -27,8 +27,8 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Layers of a network that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE", default_value = "8")]
+    /// Layers of a network that comes along (8, 15), or an ONNX file
+    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
     network: String,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]

@@ -36,8 +36,8 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = MethodName::Network)]
     method: MethodName,
-    /// Layers of a network that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE", default_value = "8")]
+    /// Layers of a network that comes along (8, 15), or an ONNX file
+    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
     network: String,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -276,7 +276,6 @@ impl Video {
                 modulator.1, modulator.0
             )));
         }
-        let response = file.response()?;
         let display: Display = file.display.with_size(height, width)?;
         let method = match self.method {
             MethodName::Network => {
@@ -285,8 +284,10 @@ impl Video {
             MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
-        options.response = response;
-        options.illumination = file.laser;
+        if file.lut.is_some() || file.per_pixel.is_some() {
+            options.response = file.response()?;
+        }
+        options.illumination = file.laser.clone();
         options.correction = correction;
         options.encoding = self.encoder.read()?;
         options.brightness = match self.brightness {

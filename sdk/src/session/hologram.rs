@@ -6,6 +6,7 @@ use super::statistics::FrameTimes;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
+use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch};
 use crate::slm::Response;
 use crate::wave::zernike::Aberration;
@@ -92,6 +93,8 @@ pub struct Hologram {
     pub(super) timestamp_ns: u64,
     pub(super) shape: (usize, usize),
     pub(super) levels: Pooled<u8>,
+    /// Where the display has over 8 bits.
+    pub(super) words: Option<Pooled<u16>>,
     /// d·65535.
     pub(super) depth: Pooled<u16>,
     pub(super) scale: f32,
@@ -124,9 +127,22 @@ impl Hologram {
         self.shape
     }
 
-    /// The modulator levels, (3, H, W): red, green, blue.
+    /// The modulator levels, (3, H, W): red, green, blue; of a display of over 8 bits the upper 8.
     pub fn levels(&self) -> &[u8] {
         &self.levels.values
+    }
+
+    /// The levels of a display of over 8 bits, (3, H, W), whose upper 8 bits [`Self::levels`] has; None for others.
+    pub fn words(&self) -> Option<&[u16]> {
+        self.words.as_ref().map(|words| &words.values[..])
+    }
+
+    /// The levels as [`crate::output::Output`] takes them.
+    pub fn output_levels(&self) -> Levels<'_> {
+        match self.words() {
+            Some(words) => Levels::Words(words),
+            None => Levels::Bytes(self.levels()),
+        }
     }
 
     /// The levels of one colour, (H, W): 0 red, 1 green, 2 blue.

@@ -10,6 +10,7 @@ use crate::encode::Scale;
 use crate::error::{Error, Result};
 use crate::frame::{CameraFrame, ColourPlan, ColourScratch, RgbdFrame};
 use crate::pipeline::{Pipeline, PipelineScratch};
+use crate::slm;
 use num_complex::Complex32;
 use rayon::ThreadPool;
 use std::sync::Arc;
@@ -24,6 +25,8 @@ struct RungPlan {
     scratch: PipelineScratch,
     frame: RgbdFrame,
     field: Vec<Complex32>,
+    /// Where the display has over 8 bits.
+    phases: Vec<f32>,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
 }
@@ -38,6 +41,7 @@ pub(super) struct Stages {
     brightness: BrightnessTracker,
     viewer: Arc<Viewer>,
     levels: Pool<u8>,
+    words: Pool<u16>,
     depths: Pool<u16>,
     last_ns: Option<u64>,
 }
@@ -67,6 +71,7 @@ impl Stages {
             brightness: BrightnessTracker::new(options.brightness),
             viewer: Arc::new(Viewer::new(&options)),
             levels: Pool::default(),
+            words: Pool::default(),
             depths: Pool::default(),
             last_ns: None,
             pool,
@@ -101,6 +106,10 @@ impl Stages {
                 pipeline,
                 frame: RgbdFrame::black((height, width)),
                 field: vec![Complex32::ZERO; 3 * height * width],
+                phases: match self.options.display.bits() {
+                    0..=8 => Vec::new(),
+                    _ => vec![0.0; 3 * height * width],
+                },
                 depth,
                 colour: None,
             })
@@ -194,11 +203,15 @@ impl Stages {
             pool,
             brightness,
             levels,
+            words,
             depths,
+            options,
             ..
         } = self;
         let shape = plan.pipeline.shape();
         let mut levels = levels.take(3 * shape.0 * shape.1);
+        let bits = options.display.bits();
+        let mut words = (bits > 8).then(|| words.take(3 * shape.0 * shape.1));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {
@@ -226,12 +239,24 @@ impl Stages {
                     .field(&plan.frame, &mut plan.field, &mut plan.scratch)?;
             let start = Instant::now();
             let scale = brightness.next(&plan.field, elapsed);
-            let modulation = plan.pipeline.modulate_at(
-                &mut plan.field,
-                scale,
-                &mut levels.values,
-                &mut plan.scratch,
-            );
+            let RungPlan {
+                pipeline,
+                field,
+                phases,
+                scratch,
+                ..
+            } = plan;
+            let modulation = match &mut words {
+                None => pipeline.modulate_at(field, scale, &mut levels.values, scratch),
+                Some(words) => {
+                    let modulation = pipeline.phases_at(field, scale, phases, scratch);
+                    slm::linear_words(phases, bits, &mut words.values);
+                    for (level, word) in levels.values.iter_mut().zip(&words.values) {
+                        *level = (word >> (bits - 8)) as u8;
+                    }
+                    modulation
+                }
+            };
             times.encode = start.elapsed();
             Ok((report, modulation.scale))
         })?;
@@ -239,6 +264,7 @@ impl Stages {
             timestamp_ns: frame.timestamp_ns,
             shape,
             levels,
+            words,
             depth: depths,
             scale,
             times,
