@@ -434,7 +434,7 @@ impl DisplayFile {
         }
     }
 
-    /// The way of (3, `height`, `width`) holograms that stand at `z_m` to this display; the correction of aberrations is the caller's, as it
+    /// The way of (3, `height`, `width`) midpoint holograms to this display; the correction of aberrations is the caller's, as it
     /// knows whether the hologram has it already.
     ///
     /// # Errors
@@ -442,14 +442,11 @@ impl DisplayFile {
     pub fn modulator(
         &self,
         (height, width): (usize, usize),
-        z_m: f64,
         encoding: Encoding,
         scale: Scale,
     ) -> Result<Modulator> {
         let response = self.response()?;
-        let left_m = self.display.offset_m() - z_m;
-        let display = self.display.clone().with_offset_m(left_m)?;
-        let plan = Modulator::new(height, width, &display, encoding, scale, response)?;
+        let plan = Modulator::new(height, width, &self.display, encoding, scale, response)?;
         Ok(match &self.laser {
             Some(laser) => plan.with_illumination(laser.clone()),
             None => plan,

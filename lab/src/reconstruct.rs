@@ -7,7 +7,6 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::wave::asm::Propagator;
-use phasefront::wave::zernike::Aberration;
 
 /// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
 pub const APERTURE_RADIUS: f64 = 1.0;
@@ -41,19 +40,15 @@ impl Hologram {
     /// must be one for all depths.
     ///
     /// # Errors
-    /// As [`Self::views`]; a table made for another size; an aberration that changes over depth or over the frame.
+    /// As [`Self::views`]; a table made for fewer pixels; an aberration that changes over depth or over the frame.
     pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
-        let shape @ (height, width) = self.shape();
+        let shape = self.shape();
+        let (height, width) = shape;
         let info = self.info();
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::PhaseOnly(levels, _) => {
-                let response = file.response()?;
-                if response.shape().is_some_and(|of| of != shape) {
-                    return Err(Error::Input(format!(
-                        "a hologram of {width}×{height}, which is not the size of the display's per-pixel table"
-                    )));
-                }
+                let response = file.response()?.centred(height, width)?;
                 let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
                 let values = field.as_slice_mut().expect("standard layout");
                 phase_only_field(
@@ -63,7 +58,8 @@ impl Hologram {
                     values,
                 );
                 if let Some(laser) = &file.laser {
-                    laser.shine(values, shape);
+                    let modulator = (file.display.height(), file.display.width());
+                    laser.shine(values, shape, modulator);
                 }
                 (field, Some(APERTURE_RADIUS))
             }
@@ -72,14 +68,14 @@ impl Hologram {
             && let Some(correction) = all.constant()
         {
             let display = &info.display;
-            let minus = correction.coefficients().map(|a| a.map(|a| -a));
             let plans = Propagator::for_colours_corrected(
                 height,
                 width,
                 display.pitch_m(),
                 display.wavelengths_m(),
                 0.0,
-                &Aberration::new(minus)?,
+                &correction.reversed(),
+                display.pitch_m(),
             )?;
             let mut scratch = plans[0].scratch();
             let values = field.as_slice_mut().expect("standard layout");

@@ -2,13 +2,21 @@
 //! pixel.
 #![allow(clippy::unwrap_used)]
 
-use ndarray::Array2;
+use ndarray::Array3;
+use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::encode::{Encoding, Scale};
 use phasefront::slm::Response;
+use phasefront::wave::zernike::{Aberration, Aberrations};
 use phasefront_lab::calibrate::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_lab::calibrate::pattern::Pattern;
 use phasefront_lab::calibrate::photograph::Photograph;
+use phasefront_lab::calibrate::rehearse;
+use phasefront_lab::calibrate::table::AberrationFile;
+use phasefront_lab::corrected::{self, Correction};
+use phasefront_lab::files::{DisplayFile, Hologram, HologramInfo};
 use phasefront_lab::simulated_display::{self, SimulatedDisplay};
+use phasefront_lab::{metrics, scene, sm_lbm};
 use std::f64::consts::TAU;
 
 const SIZE: (usize, usize) = (80, 144);
@@ -32,46 +40,9 @@ fn measured(simulated: &SimulatedDisplay, colour: usize) -> Curves {
     lut::measure(&pattern, colour, &shoot, dir.path(), &|_, _| {}).unwrap()
 }
 
-/// The root mean square of what a response leaves of the phases it is asked for, by the display's true curves,
-/// over every pixel where they reach.
+/// By the display's true curves.
 fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
-    let (h, w) = SIZE;
-    let (mut square, mut count) = (0.0, 0.0);
-    for y in 0..h {
-        for x in 0..w {
-            for step in 0..64 {
-                let phase = f64::from(step) / 64.0 * TAU;
-                if phase > simulated.phase(colour, y, x, 255.0) {
-                    continue;
-                }
-                let level = response.level(phase as f32, (colour * h + y) * w + x);
-                let apart = (simulated.phase(colour, y, x, level.into()) - phase) / TAU;
-                square += ((apart - apart.round()) * TAU).powi(2);
-                count += 1.0;
-            }
-        }
-    }
-    f64::sqrt(square / count)
-}
-
-/// Fig. 11: the light that double phase leaves where the image is black, against white, dB.
-fn black_level(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
-    let (h, w) = SIZE;
-    let shown = |half: f32| {
-        let levels = Array2::from_shape_fn((h, w), |(y, x)| {
-            let phase = if (x + y) % 2 == 0 {
-                half
-            } else {
-                std::f32::consts::TAU - half
-            };
-            response.level(phase, (colour * h + y) * w + x)
-        });
-        let light = simulated.intensity(levels.view(), colour, 0.0).unwrap();
-        // Away from the rim, whose light is that of the edge.
-        let inner = light.slice(ndarray::s![16..2 * h - 16, 16..2 * w - 16]);
-        f64::from(inner.mean().unwrap())
-    };
-    10.0 * (shown(std::f32::consts::FRAC_PI_2) / shown(1e-3)).log10()
+    rehearse::phase_error(simulated, response, colour)
 }
 
 #[test]
@@ -89,8 +60,8 @@ fn per_pixel_calibration_brings_phases_and_black_back() {
         );
         let errors = lut::errors(curves, &table);
         let (grey, black) = (
-            black_level(&simulated, &factory, colour),
-            black_level(&simulated, &calibrated, colour),
+            rehearse::black_level(&simulated, &factory, colour).unwrap(),
+            rehearse::black_level(&simulated, &calibrated, colour).unwrap(),
         );
         eprintln!(
             "{colour}: {before:.3} rad to {after:.4}; black {grey:.1} dB to {black:.1}; {errors:?}; {bytes} bytes; silent {}",
@@ -268,4 +239,86 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
         Err(Refusal::Other(e)) => assert!(e.to_string().contains("do not answer"), "{e}"),
         other => panic!("{other:?}"),
     }
+}
+
+/// Fig. 8: what a cylinder of 200 mm before an eyepiece of 21 mm does to the wave, by the correction for it. The eyepiece
+/// brings frequency µ to λfµ in its pupil, where the cylinder bends by −kx²/2f; so along x alone it is as if
+/// z were another by f²/f₁ = 2.2 mm.
+fn cylinder() -> Aberration {
+    let display = Display::default();
+    let shift_m = 21e-3 * 21e-3 / 200e-3;
+    let coefficients = display.wavelengths_m().map(|lambda| {
+        // πλ·shift·µ² = K·x², and x² = (2ρ² − 1)/4 + ρ²·cos 2θ/2 + 1/4.
+        let k = std::f64::consts::PI * lambda * shift_m / (4.0 * display.pitch_m().powi(2));
+        [k / 4.0, k / 2.0, 0.0, 0.0, 0.0]
+    });
+    Aberration::new(coefficients).unwrap()
+}
+
+#[test]
+fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
+    let display = Display::default();
+    let size @ (h, w) = (128, 160);
+    let scene = scene::random_scene(4, h, w);
+    let ldi = scene::render_ldi_reference(&scene, h, w, 3).unwrap();
+    let all = Aberrations::new(vec![(0.0, cylinder())]).unwrap();
+    let plain = sm_lbm::hologram(&ldi, &display, 24, &|_, _| {}).unwrap();
+    let correction = Correction::of_aberrations(&all, size, 24, &display).unwrap();
+    let corrected = corrected::hologram(&ldi, &display, 24, &correction, &|_, _| {}).unwrap();
+    let bare = DisplayFile::from(display.clone());
+    let aberrated = DisplayFile {
+        aberration: Some(AberrationFile::Uniform(all)),
+        ..bare.clone()
+    };
+    let encoded = |field: &Array3<Complex32>, correct: bool| {
+        let mut plan = bare
+            .modulator(size, Encoding::ANTI_ALIAS, Scale::Max)
+            .unwrap();
+        if correct {
+            plan = plan.with_correction(&cylinder()).unwrap();
+        }
+        let mut field = field.clone();
+        let mut levels = Array3::zeros((3, h, w));
+        let mut scratch = plan.scratch();
+        plan.propagate(field.as_slice_mut().unwrap(), &mut scratch);
+        let modulation = plan.modulate(
+            field.as_slice_mut().unwrap(),
+            levels.as_slice_mut().unwrap(),
+            &mut scratch,
+        );
+        let info = HologramInfo {
+            display: display.clone(),
+            encoder: None,
+            scale: Some(modulation.scale),
+            lut: None,
+            calibrated: Vec::new(),
+        };
+        (levels, info)
+    };
+    let z_m = [2e-3, 0.0, -2e-3];
+    let info = encoded(&plain, false).1;
+    let truth = Hologram::Complex(plain.clone(), info).views(&z_m).unwrap();
+    let quality = |(levels, info): (Array3<u8>, HologramInfo), file: &DisplayFile| -> f64 {
+        let views = Hologram::PhaseOnly(levels, info)
+            .views_on(file, &z_m)
+            .unwrap();
+        // Away from the rim, over which the cylinder spreads light out of the frame.
+        let inner = ndarray::s![.., 16..h - 16, 16..w - 16];
+        let psnr = (views.iter().zip(&truth)).map(|(view, truth)| {
+            metrics::compare(view.slice(inner), truth.slice(inner))
+                .unwrap()
+                .psnr_overall
+        });
+        psnr.sum::<f64>() / z_m.len() as f64
+    };
+    let without = quality(encoded(&plain, false), &bare);
+    let uncorrected = quality(encoded(&plain, false), &aberrated);
+    let by_layers = quality(encoded(&corrected, false), &aberrated);
+    let by_offset = quality(encoded(&plain, true), &aberrated);
+    eprintln!(
+        "without {without:.2} dB, uncorrected {uncorrected:.2}, corrected {by_layers:.2} and {by_offset:.2}"
+    );
+    assert!(by_layers > without - 1.0, "{without} {by_layers}");
+    assert!(by_offset > without - 1.0, "{without} {by_offset}");
+    assert!(uncorrected < without - 3.0, "{without} {uncorrected}");
 }

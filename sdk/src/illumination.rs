@@ -83,48 +83,57 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field`, (3, H, W) of `shape`, by the laser's amplitude. Allocates nothing.
+    /// Divides `field`, (3, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's amplitude. An
+    /// axis of the modulator shorter than the field's counts as that. Allocates nothing.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.
-    pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize)) {
-        self.each_row(field, shape, |value, gain| *value *= gain);
+    pub fn divide(
+        &self,
+        field: &mut [Complex32],
+        shape: (usize, usize),
+        modulator: (usize, usize),
+    ) {
+        self.each_row(field, shape, modulator, |value, gain| *value *= gain);
     }
 
-    /// Multiplies `field`, (3, H, W) of `shape`, by the laser's amplitude: what becomes of light on its way over the
+    /// Multiplies by the laser's amplitude as [`Self::divide`] divides: what becomes of light on its way over the
     /// modulator.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.
-    pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize)) {
-        self.each_row(field, shape, |value, gain| *value /= gain);
+    pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
+        self.each_row(field, shape, modulator, |value, gain| *value /= gain);
     }
 
     fn each_row(
         &self,
         field: &mut [Complex32],
         (height, width): (usize, usize),
+        modulator: (usize, usize),
         change: impl Fn(&mut Complex32, f32) + Sync,
     ) {
         assert_eq!(field.len(), 3 * height * width);
-        let rows = field.par_chunks_exact_mut(width).enumerate();
-        rows.for_each(|(row, values)| {
-            let (colour, y) = (row / height, row % height);
-            let (i, fy) = split(y, height, self.nodes.0);
+        let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));
+        let (top, left) = ((rows - height) / 2, (columns - width) / 2);
+        let lines = field.par_chunks_exact_mut(width).enumerate();
+        lines.for_each(|(row, values)| {
+            let (colour, y) = (row / height, row % height + top);
+            let (i, fy) = split(y, rows, self.nodes.0);
             let mut at = 0;
             while at < width {
                 // All pixels that lie between the same two nodes.
-                let (j, _) = split(at, width, self.nodes.1);
-                let (left, right) = (
+                let (j, _) = split(at + left, columns, self.nodes.1);
+                let (near, far) = (
                     self.column(colour, i, j, fy),
                     self.column(colour, i, j + 1, fy),
                 );
                 while at < width {
-                    let (k, fx) = split(at, width, self.nodes.1);
+                    let (k, fx) = split(at + left, columns, self.nodes.1);
                     if k != j {
                         break;
                     }
-                    change(&mut values[at], left + (right - left) * fx);
+                    change(&mut values[at], near + (far - near) * fx);
                     at += 1;
                 }
             }
@@ -165,12 +174,14 @@ mod tests {
                 let plane = |i: usize| Complex32::new(1.0 + i as f32, -0.5);
                 let field: Vec<_> = (0..3 * h * w).map(plane).collect();
                 let mut divided = field.clone();
-                map.divide(&mut divided, shape);
+                map.divide(&mut divided, shape, (h + 5, w + 8));
                 for (i, value) in divided.iter().enumerate() {
-                    let gain = map.gain(i / (h * w), i / w % h, i % w, shape);
+                    // Five rows and eight columns more: two above, four on the left.
+                    let (y, x) = (i / w % h + 2, i % w + 4);
+                    let gain = map.gain(i / (h * w), y, x, (h + 5, w + 8));
                     assert_eq!(*value, field[i] * gain, "{shape:?} {nodes:?} {i}");
                 }
-                map.shine(&mut divided, shape);
+                map.shine(&mut divided, shape, (h + 5, w + 8));
                 for (a, b) in divided.iter().zip(&field) {
                     assert!((a - b).norm() < 1e-5 * b.norm());
                 }

@@ -22,7 +22,6 @@ pub struct Modulator {
     display: Display,
     /// None where the modulator stands at the midpoint and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
-    illumination: Option<Illumination>,
     encoder: Encoder,
     keeps_phase: bool,
     scale: Scale,
@@ -50,7 +49,7 @@ impl Modulator {
     ///
     /// # Errors
     /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, a fixed scale that is
-    /// not positive, or a response made for another shape.
+    /// not positive, or a response made for a smaller modulator.
     pub fn new(
         height: usize,
         width: usize,
@@ -69,13 +68,7 @@ impl Modulator {
         if let Encoding::Deep(network) = &encoding {
             deep::check(network, display)?;
         }
-        if let Some((rows, columns)) = response.shape()
-            && (rows, columns) != (height, width)
-        {
-            return Err(Error::Plan(format!(
-                "the per-pixel table is for {columns}×{rows} pixels, the hologram is {width}×{height}; both must be of one size"
-            )));
-        }
+        let response = response.centred(height, width)?;
         let offset = match display.offset_m() {
             0.0 => None,
             offset_m => Some(Propagator::for_colours(
@@ -92,7 +85,6 @@ impl Modulator {
             width,
             display: display.clone(),
             offset,
-            illumination: None,
             keeps_phase: matches!(encoding, Encoding::Deep(_)),
             encoder: Encoder::new(height, width, encoding)?,
             scale,
@@ -100,16 +92,12 @@ impl Modulator {
         })
     }
 
-    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
-    /// take from it what it knows.
-    pub fn keeps_phase(&self) -> bool {
-        self.keeps_phase
-    }
-
     /// The same for a display whose lasers light it as `illumination` says: what a pixel shall send is divided by what
-    /// it gets, after the offset, where the light falls.
+    /// it gets, where the light falls and nothing filters it any more. A hologram smaller than the modulator stands in its
+    /// middle.
     pub fn with_illumination(mut self, illumination: Illumination) -> Self {
-        self.illumination = Some(illumination);
+        let modulator = (self.display.height(), self.display.width());
+        self.encoder = self.encoder.with_illumination(illumination, modulator);
         self
     }
 
@@ -126,13 +114,15 @@ impl Modulator {
             self.display.wavelengths_m(),
             self.display.offset_m(),
             correction,
+            self.display.pitch_m(),
         )?);
         Ok(self)
     }
 
-    /// (H, W).
-    pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
+    /// take from it what it knows.
+    pub fn keeps_phase(&self) -> bool {
+        self.keeps_phase
     }
 
     /// Working memory for one call at a time.
@@ -160,8 +150,8 @@ impl Modulator {
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): divided by the light that falls there, then
-    /// double phase. `field` is left divided and as the encoder's filter made it. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): `field` is left as the
+    /// encoder's filter made it, and divided by the light that falls there. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -186,7 +176,6 @@ impl Modulator {
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
-        self.illuminate(field);
         let scale =
             self.encoder
                 .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
@@ -195,7 +184,9 @@ impl Modulator {
             encode: start.elapsed(),
         }
     }
+}
 
+impl Modulator {
     /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
     ///
     /// # Panics
@@ -208,19 +199,12 @@ impl Modulator {
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
-        self.illuminate(field);
         let scale = self
             .encoder
             .encode(field, scale, phases, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),
-        }
-    }
-
-    fn illuminate(&self, field: &mut [Complex32]) {
-        if let Some(illumination) = &self.illumination {
-            illumination.divide(field, (self.height, self.width));
         }
     }
 }

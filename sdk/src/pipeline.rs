@@ -5,9 +5,11 @@ use crate::display::Display;
 use crate::encode::{Encoding, Scale};
 use crate::error::Result;
 use crate::frame::RgbdFrame;
+use crate::illumination::Illumination;
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use std::time::{Duration, Instant};
 
@@ -74,19 +76,19 @@ impl Pipeline {
         })
     }
 
-    /// A method and a modulator of one shape, as a calibrated display's.
+    /// [`Modulator::with_illumination`].
+    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
+        self.modulator = self.modulator.with_illumination(illumination);
+        self
+    }
+
+    /// [`Modulator::with_correction`].
     ///
     /// # Errors
-    /// Shapes that differ.
-    pub fn from_parts(method: MethodPlan, modulator: Modulator) -> Result<Self> {
-        let (of_method, of_modulator) = (method.shape(), modulator.shape());
-        if of_method != of_modulator {
-            return Err(crate::Error::Plan(format!(
-                "the method is planned for {}×{}, the modulator for {}×{}; both must be of one size",
-                of_method.1, of_method.0, of_modulator.1, of_modulator.0
-            )));
-        }
-        Ok(Pipeline { method, modulator })
+    /// As that.
+    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
+        self.modulator = self.modulator.with_correction(correction)?;
+        Ok(self)
     }
 
     /// (H, W).

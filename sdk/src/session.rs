@@ -59,9 +59,9 @@ pub struct SessionOptions {
     pub encoding: Encoding,
     /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
     pub response: Response,
-    /// How the lasers light the modulator, where that was measured; then every rung has the display's resolution.
+    /// The laser's light over the modulator, where it is calibrated.
     pub illumination: Option<Illumination>,
-    /// What corrects the display's aberration, where it has one.
+    /// What corrects the display's aberration, where it is calibrated and one for all depths.
     pub correction: Option<Aberration>,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
@@ -116,16 +116,6 @@ impl SessionOptions {
             return Err(Error::Plan(format!(
                 "a display of {} bits answers linearly; a table is for one of 8 bits",
                 self.display.bits()
-            )));
-        }
-        let (height, width) = (self.display.height(), self.display.width());
-        if self.illumination.is_some()
-            && let Some(rung) =
-                (self.ladder.iter()).find(|r| (r.height, r.width) != (height, width))
-        {
-            return Err(Error::Plan(format!(
-                "the illumination was measured over {width}×{height} pixels, a rung has {}×{}; all must have the display's",
-                rung.width, rung.height
             )));
         }
         self.brightness.check()?;

@@ -69,6 +69,19 @@ impl Response {
         }
     }
 
+    /// The response of the (`height`, `width`) pixels in the middle of the modulator, where a smaller hologram stands.
+    ///
+    /// # Errors
+    /// A table for fewer pixels.
+    pub fn centred(self, height: usize, width: usize) -> Result<Self> {
+        match self {
+            Response::PerPixel(table) if table.shape() != (height, width) => {
+                Ok(Response::PerPixel(table.centred(height, width)?.into()))
+            }
+            same => Ok(same),
+        }
+    }
+
     /// The shape that the response is made for, (H, W); None where it suits any.
     pub fn shape(&self) -> Option<(usize, usize)> {
         match self {

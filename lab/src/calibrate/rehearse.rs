@@ -263,11 +263,12 @@ fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {
 
 /// The display's file, which refers to the others.
 fn write_display(path: &Path, display: &Display) -> Result<()> {
-    let table = toml::Table::try_from(display).map_err(|e| Error::file(path, e))?;
-    let mut text: String = table
-        .iter()
-        .map(|(key, value)| format!("{key} = {value}\n"))
-        .collect();
+    // Numbers and lists of them are written alike in JSON and TOML.
+    let values = serde_json::to_value(display).map_err(|e| Error::file(path, e))?;
+    let mut text = String::new();
+    for (key, value) in values.as_object().into_iter().flatten() {
+        text.push_str(&format!("{key} = {value}\n"));
+    }
     text.push_str(
         "per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n",
     );
@@ -364,7 +365,7 @@ fn black_pictures(
 fn flat_grey(simulated: &SimulatedDisplay, file: &DisplayFile, colour: usize) -> Result<f64> {
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
     // Where the laser is weakest the modulator must be able to make up for it.
-    let plan = file.modulator(shape, 0.0, Encoding::DoublePhase, Scale::Fixed(1.0))?;
+    let plan = file.modulator(shape, Encoding::DoublePhase, Scale::Fixed(1.0))?;
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((3, h, w));
     plan.modulate(

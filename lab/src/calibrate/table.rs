@@ -23,7 +23,7 @@ use ndarray::{Array3, ArrayView3};
 use phasefront::Illumination;
 use phasefront::slm::per_pixel::PerPixel;
 use phasefront::wave::zernike::{Aberration, Aberrations, Coefficients};
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;
 
@@ -103,14 +103,16 @@ pub fn write_laser(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
 }
 
 /// One `[[at]]`.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
     /// z against the midpoint, mm.
     pub z_mm: f64,
     /// Where in the frame, from its left, 0 to 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<f64>,
     /// From its top.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub y: Option<f64>,
     /// a₃ to a₇ of red, radians.
     #[serde(default)]
@@ -151,6 +153,32 @@ pub enum AberrationFile {
     Uniform(Aberrations),
     /// Different from place to place: for the laboratory's methods.
     Spatial(SpatialAberrations),
+}
+
+impl AberrationFile {
+    /// What the file says, entry by entry.
+    pub fn entries(&self) -> Vec<Entry> {
+        let entries = |all: &Aberrations, place: Option<[f64; 2]>| -> Vec<Entry> {
+            let entry = |(z_m, a): &(f64, Aberration)| {
+                let [red, green, blue] = *a.coefficients();
+                Entry {
+                    z_mm: z_m * 1e3,
+                    x: place.map(|p| p[0]),
+                    y: place.map(|p| p[1]),
+                    red,
+                    green,
+                    blue,
+                }
+            };
+            all.calibrated().iter().map(entry).collect()
+        };
+        match self {
+            AberrationFile::Uniform(all) => entries(all, None),
+            AberrationFile::Spatial(all) => (all.points())
+                .flat_map(|(place, all)| entries(all, Some(place)))
+                .collect(),
+        }
+    }
 }
 
 /// Reads the entries of a file of aberrations.

@@ -6,7 +6,6 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
-use phasefront::method::MethodPlan;
 use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
@@ -216,18 +215,26 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
-        display: &DisplayFile,
+        file: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let plan = MethodPlan::new(height, width, method, &display.display)?;
-        let mut modulator =
-            display.modulator((height, width), plan.z_m(), encoding, self.scale())?;
-        if let Some(correction) = display.constant_correction()? {
-            modulator = modulator.with_correction(&correction)?;
+        let mut pipeline = Pipeline::new(
+            height,
+            width,
+            method,
+            &file.display,
+            encoding,
+            self.scale(),
+            file.response()?,
+        )?;
+        if let Some(laser) = &file.laser {
+            pipeline = pipeline.with_illumination(laser.clone());
         }
-        let pipeline = Pipeline::from_parts(plan, modulator)?;
+        if let Some(correction) = file.constant_correction()? {
+            pipeline = pipeline.with_correction(&correction)?;
+        }
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -306,9 +313,10 @@ impl Hologram {
         file: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
-        let (height, width) = ldi.shape();
+        let shape = ldi.shape();
+        let (height, width) = shape;
         let display = &file.display;
-        let mut modulator = file.modulator((height, width), 0.0, encoding, self.scale())?;
+        let mut modulator = file.modulator(shape, encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (constant, varying) = match (method, file.constant_correction()) {
             (_, Ok(constant)) => (constant, None),
@@ -335,7 +343,6 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
-                let shape = ldi.shape();
                 let field = match varying {
                     None => sm_lbm::hologram(ldi, display, planes, &progress)?,
                     Some(AberrationFile::Uniform(all)) => {

@@ -73,6 +73,13 @@ impl SpatialAberrations {
         }
     }
 
+    /// The calibrated points, row by row, and their corrections.
+    pub fn points(&self) -> impl Iterator<Item = ([f64; 2], &Aberrations)> {
+        let columns = self.x.len();
+        let place = move |i: usize| [self.x[i % columns], self.y[i / columns]];
+        self.at.iter().enumerate().map(move |(i, a)| (place(i), a))
+    }
+
     /// The correction at (`x`, `y`), parts of the frame, and `z_m`.
     pub fn at(&self, x: f64, y: f64, z_m: f64) -> Aberration {
         let split = |axis: &[f64], v: f64| {

@@ -9,8 +9,6 @@ use crate::depth::stream::DepthStream;
 use crate::encode::Scale;
 use crate::error::{Error, Result};
 use crate::frame::{CameraFrame, ColourPlan, ColourScratch, RgbdFrame};
-use crate::method::MethodPlan;
-use crate::modulator::Modulator;
 use crate::pipeline::{Pipeline, PipelineScratch};
 use crate::slm;
 use num_complex::Complex32;
@@ -71,10 +69,7 @@ impl Stages {
             ladder: Ladder::new(options.ladder.len(), start),
             plan: None,
             brightness: BrightnessTracker::new(options.brightness),
-            viewer: Arc::new(Viewer::new(
-                options.display.clone(),
-                options.response.clone(),
-            )),
+            viewer: Arc::new(Viewer::new(&options)),
             levels: Pool::default(),
             words: Pool::default(),
             depths: Pool::default(),
@@ -91,26 +86,21 @@ impl Stages {
         let (height, width) = (rung.height, rung.width);
         let depth = DepthStream::new(self.options.depth, (height, width))?;
         self.pool.install(|| {
-            let SessionOptions {
-                display, encoding, ..
-            } = &self.options;
-            let method = MethodPlan::new(height, width, rung.method.clone(), display)?;
-            let left_m = display.offset_m() - method.z_m();
-            let mut modulator = Modulator::new(
+            let mut pipeline = Pipeline::new(
                 height,
                 width,
-                &display.clone().with_offset_m(left_m)?,
-                encoding.clone(),
+                rung.method.clone(),
+                &self.options.display,
+                self.options.encoding.clone(),
                 Scale::Max,
                 self.options.response.clone(),
             )?;
             if let Some(illumination) = &self.options.illumination {
-                modulator = modulator.with_illumination(illumination.clone());
+                pipeline = pipeline.with_illumination(illumination.clone());
             }
             if let Some(correction) = &self.options.correction {
-                modulator = modulator.with_correction(correction)?;
+                pipeline = pipeline.with_correction(correction)?;
             }
-            let pipeline = Pipeline::from_parts(method, modulator)?;
             Ok(RungPlan {
                 scratch: pipeline.scratch(),
                 pipeline,

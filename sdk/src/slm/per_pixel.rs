@@ -38,8 +38,12 @@ pub const MAX_INTERVALS: usize = 64;
 /// The levels of every pixel. Immutable; shared between threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerPixel {
+    /// Of the modulator.
     height: usize,
     width: usize,
+    /// The part of it that a stack (3, H, W) covers: its upper left pixel, and its size.
+    corner: (usize, usize),
+    window: (usize, usize),
     spacing: usize,
     intervals: usize,
     /// (Gh, Gw).
@@ -127,6 +131,8 @@ impl PerPixel {
         Ok(PerPixel {
             height,
             width,
+            corner: (0, 0),
+            window: (height, width),
             spacing,
             intervals,
             nodes,
@@ -187,9 +193,35 @@ impl PerPixel {
         bytes
     }
 
-    /// (H, W) of the modulator.
+    /// The table of the (`height`, `width`) pixels in the middle of this one's: for a hologram smaller than the modulator.
+    ///
+    /// # Errors
+    /// More pixels than there are.
+    pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
+        let (rows, columns) = self.window;
+        if height > rows || width > columns {
+            return Err(Error::Plan(format!(
+                "per-pixel table: for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
+            )));
+        }
+        Ok(PerPixel {
+            corner: (
+                self.corner.0 + (rows - height) / 2,
+                self.corner.1 + (columns - width) / 2,
+            ),
+            window: (height, width),
+            ..self.clone()
+        })
+    }
+
+    /// (H, W) of the stacks that it is for.
     pub fn shape(&self) -> (usize, usize) {
-        (self.height, self.width)
+        self.window
+    }
+
+    /// The first row and column of the modulator that its stacks cover.
+    pub fn corner(&self) -> (usize, usize) {
+        self.corner
     }
 
     /// Pixels from node to node.
@@ -242,11 +274,13 @@ impl PerPixel {
         left + (right - left) * fx
     }
 
-    /// (colour, y, x) of value `at` of a stack.
+    /// Colour and pixel (y, x) of the modulator of value `at` of a stack.
     fn place(&self, at: usize) -> (usize, usize, usize) {
-        let plane = self.height * self.width;
+        let (height, width) = self.window;
+        let plane = height * width;
         assert!(at < 3 * plane, "a place outside the modulator");
-        (at / plane, at % plane / self.width, at % self.width)
+        let (y, x) = (at % plane / width, at % width);
+        (at / plane, y + self.corner.0, x + self.corner.1)
     }
 
     /// The node before pixel `n` of an axis, and how far it is to the next.
@@ -271,7 +305,8 @@ impl PerPixel {
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         let (colour, y, x) = self.place(first);
-        assert!(x + phases.len() <= self.width, "a run beyond its row");
+        let end = self.corner.1 + self.window.1;
+        assert!(x + phases.len() <= end, "a run beyond its row");
         let knots = self.intervals + 1;
         let (i, fy) = self.split(y);
         // A node's curve and its turn, interpolated in y.
@@ -448,6 +483,25 @@ mod tests {
         assert_eq!(table.level(TAU * 0.8, 5), 255);
         assert_eq!(table.level(TAU * 0.87, 5), 255);
         assert_eq!(table.level(TAU * 0.88, 5), 0);
+    }
+
+    #[test]
+    fn a_centred_table_is_the_middle_of_the_whole() {
+        let whole = table((33, 65), 16, 32, true);
+        let part = whole.centred(20, 41).unwrap();
+        assert_eq!((part.shape(), part.corner()), ((20, 41), (6, 12)));
+        let phases = phases(41, 1);
+        let mut levels = vec![0; 41];
+        for row in [0, 19, 20, 45, 59] {
+            part.levels(&phases, row * 41, &mut levels);
+            for (x, level) in levels.iter().enumerate() {
+                let at = (row / 20 * 33 + row % 20 + 6) * 65 + x + 12;
+                assert_eq!(*level, whole.level(phases[x], at));
+                assert_eq!(*level, part.level(phases[x], row * 41 + x));
+            }
+        }
+        assert_eq!(part.centred(2, 41).unwrap().corner(), (15, 12));
+        assert!(part.centred(21, 3).is_err());
     }
 
     #[test]

@@ -314,7 +314,8 @@ impl Propagator {
         }))
     }
 
-    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration` on its way.
+    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is that of a
+    /// modulator of `modulator_pitch_m`, on its way.
     ///
     /// # Errors
     /// As [`padded_shape`], the light that the correction moves counted in.
@@ -325,9 +326,10 @@ impl Propagator {
         wavelengths_m: [f64; 3],
         distance_m: f64,
         aberration: &Aberration,
+        modulator_pitch_m: f64,
     ) -> Result<[Self; 3]> {
         let longest = wavelengths_m.into_iter().fold(0.0, f64::max);
-        let more = (aberration.reach_m(pitch_m) / pitch_m).ceil() as usize;
+        let more = (aberration.reach_m(modulator_pitch_m) / pitch_m).ceil() as usize;
         let (h, w) = (height.saturating_add(more), width.saturating_add(more));
         let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
         let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
@@ -337,7 +339,7 @@ impl Propagator {
                 pitch_m,
                 wavelengths_m[colour],
                 distance_m,
-                |mu, nu| aberration.phase(colour, mu, nu, pitch_m),
+                |mu, nu| aberration.phase(colour, mu, nu, modulator_pitch_m),
             );
             Propagator {
                 shape: (height, width),

@@ -103,6 +103,13 @@ impl Aberration {
         steepest / (2.0 * PI) * 2.0 * pitch_m
     }
 
+    /// What this corrects: the aberration itself.
+    pub fn reversed(&self) -> Self {
+        Aberration {
+            coefficients: self.coefficients.map(|a| a.map(|a| -a)),
+        }
+    }
+
     /// `1 − t` of this one and `t` of `other`.
     pub fn mix(&self, other: &Self, t: f64) -> Self {
         let mix = |c: usize, j: usize| {
