@@ -9,6 +9,7 @@ pub mod error;
 pub mod evaluate;
 pub mod files;
 pub mod flicker;
+pub mod gpu;
 pub mod ldi;
 pub mod metrics;
 pub mod models;

@@ -13,6 +13,8 @@ mod resample;
 pub use camera::{Alignment, CameraFrame};
 pub(crate) use colour::check_size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
+#[cfg(feature = "gpu")]
+pub(crate) use convert::yuv_constants;
 pub use convert::{ColourPlan, ColourScratch};
 pub use plane::{Orientation, Plane, Rotation};
 pub(crate) use resample::Axis;

@@ -12,6 +12,8 @@ pub mod display;
 pub mod encode;
 pub mod error;
 pub mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod illumination;
 pub mod method;
 pub mod modulator;

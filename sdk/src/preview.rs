@@ -228,3 +228,103 @@ impl Preview {
             });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::encode::{Encoding, Scale};
+    use crate::modulator::Modulator;
+    use crate::refocus::{Refocus, phase_only_field};
+
+    const SHAPE: (usize, usize) = (96, 128);
+
+    /// The levels of soft blobs of each colour that lie at z = 1 mm.
+    fn hologram(display: &Display, response: &Response) -> (Vec<u8>, f32) {
+        let (height, width) = SHAPE;
+        let mut field: Vec<Complex32> = (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                let square =
+                    (x as f32 - 40.0 - 20.0 * c as f32).powi(2) + (y as f32 - 48.0).powi(2);
+                Complex32::new(0.1 + 0.8 * (-square / 400.0).exp(), 0.0)
+            })
+            .collect();
+        // From where they lie to the midpoint, and to the modulator.
+        let home = display
+            .clone()
+            .with_offset_m(display.offset_m() - 1e-3)
+            .unwrap();
+        let plan = |display: &Display| {
+            let encoding = Encoding::DoublePhase;
+            Modulator::new(
+                height,
+                width,
+                display,
+                encoding,
+                Scale::Max,
+                response.clone(),
+            )
+            .unwrap()
+        };
+        let home = plan(&home);
+        let mut scratch = home.scratch();
+        home.propagate(&mut field, &mut scratch);
+        let mut levels = vec![0; 3 * height * width];
+        let modulation = home.modulate(&mut field, &mut levels, &mut scratch);
+        (levels, modulation.scale)
+    }
+
+    #[test]
+    fn the_small_view_is_the_full_one_made_small() {
+        let response = Response::linear(8).unwrap();
+        let (height, width) = SHAPE;
+        for offset_m in [0.0, 3e-3] {
+            let display = Display::default().with_offset_m(offset_m).unwrap();
+            let (levels, scale) = hologram(&display, &response);
+            let mut shown = vec![Complex32::ZERO; levels.len()];
+            phase_only_field(&levels, &response, scale, &mut shown);
+            for z_m in [1e-3, -2e-3, offset_m] {
+                let full = Refocus::new(height, width, &display, &[z_m], Some(1.0)).unwrap();
+                let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
+                for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
+                    let plan = Preview::new(SHAPE, &display, z_m, screen).unwrap();
+                    assert_eq!(plan.factor(), factor);
+                    let mut rgba = vec![0; 4 * screen.0 * screen.1];
+                    plan.look(&levels, &response, scale, &mut rgba, &mut plan.scratch());
+                    let mut squares = 0.0;
+                    for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
+                        assert_eq!(pixel[3], 255);
+                        let (y, x) = (i / screen.1 * factor, i % screen.1 * factor);
+                        for (c, byte) in pixel[..3].iter().enumerate() {
+                            let row = |dy| &full[(c * height + y + dy) * width + x..][..factor];
+                            let sum: f32 = (0..factor).flat_map(row).map(|a| a.min(1.0)).sum();
+                            let mean = sum / (factor * factor) as f32;
+                            squares += (mean - f32::from(*byte) / 255.0).powi(2);
+                        }
+                    }
+                    let error = (squares / (3 * screen.0 * screen.1) as f32).sqrt();
+                    assert!(
+                        error < 0.03,
+                        "offset {offset_m} z {z_m} {screen:?}: {error}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_views_are_refused() {
+        let display = Display::default();
+        assert!(Preview::new((1, 50), &display, 0.0, (10, 10)).is_err());
+        assert!(Preview::new(SHAPE, &display, 0.0, (0, 10)).is_err());
+        assert!(Preview::new(SHAPE, &display, f64::NAN, (10, 10)).is_err());
+        // A screen larger than the hologram has a view too.
+        assert_eq!(
+            Preview::new((5, 7), &display, 1e-3, (300, 200))
+                .unwrap()
+                .factor(),
+            2
+        );
+    }
+}

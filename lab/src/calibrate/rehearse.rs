@@ -365,7 +365,7 @@ fn black_pictures(
 fn flat_grey(simulated: &SimulatedDisplay, file: &DisplayFile, colour: usize) -> Result<f64> {
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
     // Where the laser is weakest the modulator must be able to make up for it.
-    let plan = file.modulator(shape, Encoding::DoublePhase, Scale::Fixed(1.0))?;
+    let plan = file.modulator(shape, 0.0, Encoding::DoublePhase, Scale::Fixed(1.0))?;
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((3, h, w));
     plan.modulate(

@@ -1,19 +1,21 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, models, sm_lbm};
+use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -47,6 +49,8 @@ pub(crate) struct Hologram {
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
+    #[command(flatten)]
+    backend: BackendFlags,
     #[command(flatten)]
     display: DisplayFlags,
     /// Write the complex field at the modulator there too, with a .json beside it
@@ -149,11 +153,21 @@ impl Hologram {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
+        let device = self.backend.device()?;
+        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+            return Err(Error::Input(
+                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                    .into(),
+            ));
+        }
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
                 let network = models::network(&self.network, self.precision.is_int8())?;
                 let method = phasefront::Method::Network(network);
-                self.by_pipeline("network", method, &display, encoding)?
+                match &device {
+                    Some(options) => self.on_gpu(method, &display, encoding, options)?,
+                    None => self.by_pipeline("network", method, &display, encoding)?,
+                }
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
@@ -201,7 +215,7 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
-        file: &DisplayFile,
+        display: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
@@ -210,15 +224,15 @@ impl Hologram {
             height,
             width,
             method,
-            &file.display,
+            &display.display,
             encoding,
             self.scale(),
-            file.response()?,
+            display.response()?,
         )?;
-        if let Some(laser) = &file.laser {
+        if let Some(laser) = &display.laser {
             pipeline = pipeline.with_illumination(laser.clone());
         }
-        if let Some(correction) = file.constant_correction()? {
+        if let Some(correction) = display.constant_correction()? {
             pipeline = pipeline.with_correction(&correction)?;
         }
         let mut scratch = pipeline.scratch();
@@ -243,6 +257,54 @@ impl Hologram {
         })
     }
 
+    /// By a network on a GPU that was tried out before.
+    fn on_gpu(
+        &self,
+        method: phasefront::Method,
+        file: &DisplayFile,
+        encoding: Encoding,
+        options: &DeviceOptions,
+    ) -> Result<Made> {
+        if file.laser.is_some() || file.aberration.is_some() {
+            return Err(Error::Input(
+                "the display's laser map and aberration are heeded by --backend cpu alone".into(),
+            ));
+        }
+        let frame = &self.frame.read()?;
+        let (height, width) = frame.shape();
+        let scale = self.scale();
+        let response = file.response()?;
+        let job = Job::new(
+            height,
+            width,
+            method,
+            &file.display,
+            encoding,
+            scale,
+            response,
+        );
+        let device = Arc::new(Device::open(options)?);
+        phasefront::gpu::probe(&device, &job)?;
+        let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
+        let mut levels = Array3::zeros((3, height, width));
+        let bytes = levels.as_slice_mut().expect("standard layout");
+        let report = pipeline.process(&Frame::of(frame), bytes)?;
+        gpu::keep_programs(&device);
+        let times = report.times.unwrap_or_default();
+        Ok(Made {
+            field: None,
+            levels,
+            scale: report.scale,
+            stages: vec![
+                ("input", times.input),
+                ("network", times.network),
+                ("propagate", times.propagate),
+                ("encode", times.encode),
+            ],
+            engine: Some(pipeline.describe()),
+        })
+    }
+
     /// The methods that need no network, on a layered depth image.
     fn by_physics(
         &self,
@@ -251,10 +313,9 @@ impl Hologram {
         file: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
-        let shape = ldi.shape();
-        let (height, width) = shape;
+        let (height, width) = ldi.shape();
         let display = &file.display;
-        let mut modulator = file.modulator(shape, encoding, self.scale())?;
+        let mut modulator = file.modulator((height, width), encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (constant, varying) = match (method, file.constant_correction()) {
             (_, Ok(constant)) => (constant, None),
@@ -281,6 +342,7 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
+                let shape = ldi.shape();
                 let field = match varying {
                     None => sm_lbm::hologram(ldi, display, planes, &progress)?,
                     Some(AberrationFile::Uniform(all)) => {

@@ -179,6 +179,13 @@ impl Transfer {
         }
     }
 
+    /// One quadrant, (W'/2 + 1, H'/2 + 1), of a transfer function without a correction.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn quadrant(&self) -> &[Complex32] {
+        debug_assert!(self.even);
+        &self.factors
+    }
+
     /// Multiplies column `x` of a spectrum by the transfer function.
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
         if !self.even {
@@ -350,6 +357,12 @@ impl Propagator {
     /// (H', W').
     pub fn padded_shape(&self) -> (usize, usize) {
         self.fft.padded_shape()
+    }
+
+    /// The transfer function.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn transfer(&self) -> &Transfer {
+        &self.transfer
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.
