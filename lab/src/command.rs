@@ -45,9 +45,9 @@ enum Command {
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
+    Video(video::Video),
     #[command(subcommand)]
     Calibrate(calibrate::Calibrate),
-    Video(video::Video),
 }
 
 impl Phasefront {
@@ -71,11 +71,11 @@ impl Phasefront {
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),
-            Command::Calibrate(command) => command.run(json),
             Command::Video(command) => {
                 let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
+            Command::Calibrate(command) => command.run(json),
         })
     }
 }

@@ -210,7 +210,7 @@ pub fn make(
                 manifest.ldi_layers,
             )?
             .quantized();
-            let quiet = |_, _| {};
+            let quiet = |_: usize, _: usize| {};
             let hologram = match &ground_truth {
                 GroundTruth::Plain => sm_lbm::hologram(&ldi, display, planes, &quiet)?,
                 GroundTruth::Corrected(correction) => {

@@ -125,6 +125,11 @@ impl Modulator {
         self.keeps_phase
     }
 
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
     /// Working memory for one call at a time.
     pub fn scratch(&self) -> ModulatorScratch {
         ModulatorScratch {
@@ -184,9 +189,7 @@ impl Modulator {
             encode: start.elapsed(),
         }
     }
-}
 
-impl Modulator {
     /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
     ///
     /// # Panics

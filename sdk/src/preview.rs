@@ -178,7 +178,9 @@ impl Preview {
                             sums.iter_mut().zip(row.chunks_exact(factor)).enumerate()
                         {
                             *sum += match table {
-                                None => pixels.iter().map(|l| shown[*l as usize]).sum(),
+                                None => {
+                                    pixels.iter().map(|l| shown[*l as usize]).sum::<Complex32>()
+                                }
                                 Some(table) => (pixels.iter().enumerate())
                                     .map(|(i, l)| {
                                         let phase = table.phase(*l, first + x * factor + i);

@@ -338,7 +338,7 @@ impl Aberration {
             true => table::read_entries(&self.output)?,
             false => Vec::new(),
         };
-        let mut now = match state.exists() {
+        let now = match state.exists() {
             false => {
                 let start = self
                     .entry(&entries)
@@ -392,7 +392,7 @@ impl Aberration {
             let levels = spot::levels(&file.display, &response, self.index(), z_m, place, trial)?;
             grey(levels, &round.join(format!("trial_{i:02}.png")))?;
         }
-        write_state(&state, &mut now)?;
+        write_state(&state, &now)?;
         super::print(
             json,
             &json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": round, "best": now.search.best}),
@@ -489,7 +489,7 @@ impl Aberration {
     }
 }
 
-fn write_state(path: &Path, now: &mut SearchFile) -> Result<()> {
+fn write_state(path: &Path, now: &SearchFile) -> Result<()> {
     let text = serde_json::to_string_pretty(now).map_err(|e| Error::file(path, e))?;
     files::write_atomically(path, |file| writeln!(file, "{text}"))
 }

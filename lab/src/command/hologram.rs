@@ -215,7 +215,7 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
-        file: &DisplayFile,
+        display: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
@@ -224,15 +224,15 @@ impl Hologram {
             height,
             width,
             method,
-            &file.display,
+            &display.display,
             encoding,
             self.scale(),
-            file.response()?,
+            display.response()?,
         )?;
-        if let Some(laser) = &file.laser {
+        if let Some(laser) = &display.laser {
             pipeline = pipeline.with_illumination(laser.clone());
         }
-        if let Some(correction) = file.constant_correction()? {
+        if let Some(correction) = display.constant_correction()? {
             pipeline = pipeline.with_correction(&correction)?;
         }
         let mut scratch = pipeline.scratch();
@@ -313,10 +313,9 @@ impl Hologram {
         file: &DisplayFile,
         encoding: Encoding,
     ) -> Result<Made> {
-        let shape = ldi.shape();
-        let (height, width) = shape;
+        let (height, width) = ldi.shape();
         let display = &file.display;
-        let mut modulator = file.modulator(shape, encoding, self.scale())?;
+        let mut modulator = file.modulator((height, width), encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (constant, varying) = match (method, file.constant_correction()) {
             (_, Ok(constant)) => (constant, None),
@@ -343,6 +342,7 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
+                let shape = ldi.shape();
                 let field = match varying {
                     None => sm_lbm::hologram(ldi, display, planes, &progress)?,
                     Some(AberrationFile::Uniform(all)) => {

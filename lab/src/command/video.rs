@@ -263,17 +263,16 @@ impl Video {
         width: usize,
         threads: Option<NonZeroUsize>,
     ) -> Result<(SessionOptions, HologramInfo)> {
-        let mut file = self.display.read()?;
+        let file = self.display.read()?;
         let (width, height) = self.size.unwrap_or((width, height));
-        let modulator = (file.display.height(), file.display.width());
-        if let Some(table) = &file.per_pixel {
-            file.per_pixel = Some(Arc::new(table.centred(height, width)?));
-        }
-        let (calibrated, correction) = (file.calibrated(true), file.constant_correction()?);
-        if file.laser.is_some() && modulator != (height, width) {
+        if let Some(laser) = &file.laser
+            && (height, width) != (file.display.height(), file.display.width())
+        {
+            let (rows, columns) = laser.nodes();
             return Err(Error::Input(format!(
-                "the display's laser map is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
-                modulator.1, modulator.0
+                "the display's laser map ({columns}×{rows} nodes) is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
+                file.display.width(),
+                file.display.height()
             )));
         }
         let display: Display = file.display.clone().with_size(height, width)?;
@@ -284,11 +283,11 @@ impl Video {
             MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
-        if file.lut.is_some() || file.per_pixel.is_some() {
+        if display.bits() <= 8 {
             options.response = file.response()?;
         }
         options.illumination = file.laser.clone();
-        options.correction = correction;
+        options.correction = file.constant_correction()?;
         options.encoding = self.encoder.read()?;
         options.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
@@ -321,7 +320,7 @@ impl Video {
             encoder: Some(self.encoder.name().into()),
             scale: None,
             lut: file.lut.map(Vec::from),
-            calibrated,
+            calibrated: file.calibrated(true),
         };
         Ok((options, info))
     }
