@@ -67,7 +67,7 @@ pub enum ConfidenceFormat {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum Rotation {
     /// Not at all.
-    None,
+    Upright,
     /// A quarter turn.
     Clockwise90,
     /// Half a turn.
@@ -262,7 +262,7 @@ impl FrameInfo {
         let mut frame = CameraFrame::new(self.timestamp_ns, colour, depth);
         frame.orientation = frame::Orientation {
             rotation: match self.orientation.rotation {
-                Rotation::None => frame::Rotation::None,
+                Rotation::Upright => frame::Rotation::None,
                 Rotation::Clockwise90 => frame::Rotation::Clockwise90,
                 Rotation::Half => frame::Rotation::Half,
                 Rotation::Clockwise270 => frame::Rotation::Clockwise270,

@@ -84,7 +84,7 @@ pub enum DepthRange {
 #[derive(Debug, Clone, uniffi::Enum)]
 pub enum Method {
     /// A trained network.
-    Network {
+    Trained {
         /// The network, for the session's display.
         network: Arc<Network>,
     },
@@ -215,7 +215,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let display = phasefront::Display::try_from(&options.display)?;
         let sweep = Sweep::for_display(&display);
         let method = |rung: &Rung| match &rung.method {
-            Method::Network { network } => phasefront::Method::Network(network.core.clone()),
+            Method::Trained { network } => phasefront::Method::Network(network.core.clone()),
             Method::Sweep => phasefront::Method::Sweep(sweep),
         };
         let mut to = session::SessionOptions::new(display, method(best))?;

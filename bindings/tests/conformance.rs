@@ -56,7 +56,7 @@ fn options(case: &Value) -> SessionOptions {
     SessionOptions {
         ladder: vec![Rung {
             method: match case["method"].as_str().unwrap() {
-                "network" => Method::Network {
+                "network" => Method::Trained {
                     network: Network::built_in().unwrap(),
                 },
                 "sweep" => Method::Sweep,
@@ -165,7 +165,7 @@ fn info(frame: &Value) -> FrameInfo {
         },
         orientation: Orientation {
             rotation: match frame["rotation"].as_u64().unwrap() {
-                0 => Rotation::None,
+                0 => Rotation::Upright,
                 90 => Rotation::Clockwise90,
                 180 => Rotation::Half,
                 270 => Rotation::Clockwise270,
@@ -374,7 +374,7 @@ mod write {
         }
 
         fn depth(&mut self, format: &str, width: usize, height: usize, t: f64) -> Value {
-            let hole = |x: usize, y: usize| (x * 7 + y * 3) % 19 == 0;
+            let hole = |x: usize, y: usize| (x * 7 + y * 3).is_multiple_of(19);
             let pixel = if format.ends_with("f32") {
                 4
             } else if format.ends_with("u8") {

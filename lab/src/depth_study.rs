@@ -71,8 +71,8 @@ pub const DEGRADATIONS: [Degradation; 5] = [
 const EDGE: f32 = 0.1;
 /// The share of readings at edges that is missing.
 const EDGE_HOLES: f64 = 0.4;
-/// Blobs without readings, and their radius in readings.
-const BLOBS: usize = 12;
+/// Readings for each blob that has none, and the blob's radius in readings.
+const READINGS_A_BLOB: usize = 4096;
 const BLOB_RADIUS: f64 = 7.0;
 
 /// `depth`, (4h, 4w), as a sensor of (h, w) gives it: NaN where there is no reading.
@@ -109,7 +109,7 @@ pub fn degrade(depth: ArrayView2<'_, f32>, how: &Degradation, seed: u64) -> Arra
                 }
             }
         }
-        for _ in 0..BLOBS {
+        for _ in 0..(h * w).div_ceil(READINGS_A_BLOB) {
             let (y0, x0) = (dice.range(0.0, h as f64), dice.range(0.0, w as f64));
             for ((y, x), value) in readings.indexed_iter_mut() {
                 if (y as f64 - y0).hypot(x as f64 - x0) < BLOB_RADIUS {
@@ -285,8 +285,8 @@ mod tests {
     fn each_fault_is_what_it_says() {
         let (depth, _) = steps();
         let plain = degrade(depth.view(), &DEGRADATIONS[0], 1);
-        assert_eq!(plain[(5, 5)], 0.7);
-        assert_eq!(plain[(20, 22)], 0.3);
+        assert!((plain[(5, 5)] - 0.7).abs() < 1e-6);
+        assert!((plain[(20, 22)] - 0.3).abs() < 1e-6);
         let noisy = degrade(depth.view(), &DEGRADATIONS[1], 1);
         let spread = (noisy.iter().zip(&plain))
             .map(|(a, b)| (a - b).powi(2))
@@ -294,7 +294,7 @@ mod tests {
         assert!(((spread / 2000.0).sqrt() - 0.005).abs() < 5e-4);
         let holes = degrade(depth.view(), &DEGRADATIONS[2], 1);
         let missing = holes.iter().filter(|d| d.is_nan()).count();
-        assert!((300..1600).contains(&missing), "{missing}");
+        assert!((80..400).contains(&missing), "{missing}");
         let shifted = degrade(depth.view(), &DEGRADATIONS[3], 1);
         // The disc's left edge, at pixel 45, is a reading farther right.
         assert!(shifted[(20, 11)] > plain[(20, 11)]);

@@ -1,22 +1,28 @@
-//! From the midpoint hologram to the modulator's levels: offset, phase encoding, look-up table.
+//! From the midpoint hologram to the modulator's levels: offset, correction of what the display does to the
+//! wave, phase encoding, look-up table.
 //!
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::display::Display;
 use crate::encode::{Encoder, EncoderScratch, Encoding, Scale, deep};
 use crate::error::{Error, Result};
+use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
 use crate::wave::fft::Scratch;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
 /// A plan for one shape, display and encoding. Immutable; shared between threads.
 pub struct Modulator {
-    size: usize,
-    /// None where the modulator stands at the midpoint.
+    height: usize,
+    width: usize,
+    display: Display,
+    /// None where the modulator stands at the midpoint and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
+    illumination: Option<Illumination>,
     encoder: Encoder,
     keeps_phase: bool,
     scale: Scale,
@@ -43,8 +49,8 @@ impl Modulator {
     /// `response`.
     ///
     /// # Errors
-    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, or a fixed scale that
-    /// is not positive.
+    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, a fixed scale that is
+    /// not positive, or a response made for another shape.
     pub fn new(
         height: usize,
         width: usize,
@@ -63,6 +69,13 @@ impl Modulator {
         if let Encoding::Deep(network) = &encoding {
             deep::check(network, display)?;
         }
+        if let Some((rows, columns)) = response.shape()
+            && (rows, columns) != (height, width)
+        {
+            return Err(Error::Plan(format!(
+                "the per-pixel table is for {columns}×{rows} pixels, the hologram is {width}×{height}; both must be of one size"
+            )));
+        }
         let offset = match display.offset_m() {
             0.0 => None,
             offset_m => Some(Propagator::for_colours(
@@ -75,8 +88,11 @@ impl Modulator {
             )?),
         };
         Ok(Modulator {
-            size: height * width,
+            height,
+            width,
+            display: display.clone(),
             offset,
+            illumination: None,
             keeps_phase: matches!(encoding, Encoding::Deep(_)),
             encoder: Encoder::new(height, width, encoding)?,
             scale,
@@ -90,6 +106,35 @@ impl Modulator {
         self.keeps_phase
     }
 
+    /// The same for a display whose lasers light it as `illumination` says: what a pixel shall send is divided by what
+    /// it gets, after the offset, where the light falls.
+    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
+        self.illumination = Some(illumination);
+        self
+    }
+
+    /// The same for a display with an aberration that is one for all depths: its correction Φ is part of the offset's
+    /// transfer function, so that it costs nothing beside it.
+    ///
+    /// # Errors
+    /// A correction that moves light farther than can be padded.
+    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
+        self.offset = Some(Propagator::for_colours_corrected(
+            self.height,
+            self.width,
+            self.display.pitch_m(),
+            self.display.wavelengths_m(),
+            self.display.offset_m(),
+            correction,
+        )?);
+        Ok(self)
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
     /// Working memory for one call at a time.
     pub fn scratch(&self) -> ModulatorScratch {
         ModulatorScratch {
@@ -99,21 +144,24 @@ impl Modulator {
     }
 
     /// Takes a midpoint hologram, (3, H, W), to the modulator: ASM(H, offset)·exp(−i2π·offset/λ), Eq. 6,
-    /// whose second factor takes back the carrier that propagation here leaves out from the start.
-    /// Allocates nothing.
+    /// whose second factor takes back the carrier that propagation here leaves out from the start; with the
+    /// correction of an aberration, where there is one. Allocates nothing.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
-            for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.size)) {
+            for (plan, plane) in plans
+                .iter()
+                .zip(field.chunks_exact_mut(self.height * self.width))
+            {
                 plan.propagate(plane, scratch);
             }
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W). `field` is left as the
-    /// encoder's filter made it. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): divided by the light that falls there, then
+    /// double phase. `field` is left divided and as the encoder's filter made it. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -138,6 +186,7 @@ impl Modulator {
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
+        self.illuminate(field);
         let scale =
             self.encoder
                 .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
@@ -146,9 +195,7 @@ impl Modulator {
             encode: start.elapsed(),
         }
     }
-}
 
-impl Modulator {
     /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
     ///
     /// # Panics
@@ -161,12 +208,19 @@ impl Modulator {
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
+        self.illuminate(field);
         let scale = self
             .encoder
             .encode(field, scale, phases, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),
+        }
+    }
+
+    fn illuminate(&self, field: &mut [Complex32]) {
+        if let Some(illumination) = &self.illumination {
+            illumination.divide(field, (self.height, self.width));
         }
     }
 }

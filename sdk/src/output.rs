@@ -157,9 +157,10 @@ impl Output {
             ),
             bits: match response {
                 Response::Linear { bits } => (*bits, display.bits()),
-                Response::Lut { .. } => (8, display.bits()),
+                Response::Lut { .. } | Response::PerPixel(_) => (8, display.bits()),
             },
-            dark: [FRAC_PI_2, 3.0 * FRAC_PI_2].map(|phase| response.level(phase)),
+            // A table for each pixel has none for those around the hologram: its first pixel's serves.
+            dark: [FRAC_PI_2, 3.0 * FRAC_PI_2].map(|phase| response.level(phase, 0)),
         })
     }
 

@@ -74,6 +74,21 @@ impl Pipeline {
         })
     }
 
+    /// A method and a modulator of one shape, as a calibrated display's.
+    ///
+    /// # Errors
+    /// Shapes that differ.
+    pub fn from_parts(method: MethodPlan, modulator: Modulator) -> Result<Self> {
+        let (of_method, of_modulator) = (method.shape(), modulator.shape());
+        if of_method != of_modulator {
+            return Err(crate::Error::Plan(format!(
+                "the method is planned for {}×{}, the modulator for {}×{}; both must be of one size",
+                of_method.1, of_method.0, of_modulator.1, of_modulator.0
+            )));
+        }
+        Ok(Pipeline { method, modulator })
+    }
+
     /// (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.method.shape()

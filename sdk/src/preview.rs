@@ -118,8 +118,11 @@ impl Preview {
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
         let factor = self.factor;
         let light = scale / (factor * factor) as f32;
-        let shown: [Complex32; 256] =
-            std::array::from_fn(|l| Complex32::from_polar(light, response.phase(l as u8)));
+        let wave = |level: u8, at: usize| Complex32::from_polar(light, response.phase(level, at));
+        // Where all pixels answer alike, one table serves them.
+        let alike = response.shape().is_none();
+        let shown: Option<[Complex32; 256]> =
+            alike.then(|| std::array::from_fn(|level| wave(level as u8, 0)));
         let planes = levels.chunks_exact(height * width);
         let amplitudes = scratch
             .amplitude
@@ -127,11 +130,20 @@ impl Preview {
         for (colour, (levels, amplitude)) in planes.zip(amplitudes).enumerate() {
             (scratch.field.par_chunks_exact_mut(small_width))
                 .zip(levels.par_chunks_exact(width * factor))
-                .for_each(|(sums, rows)| {
+                .enumerate()
+                .for_each(|(y, (sums, rows))| {
                     sums.fill(Complex32::ZERO);
-                    for row in rows.chunks_exact(width) {
-                        for (sum, pixels) in sums.iter_mut().zip(row.chunks_exact(factor)) {
-                            *sum += pixels.iter().map(|l| shown[*l as usize]).sum::<Complex32>();
+                    for (r, row) in rows.chunks_exact(width).enumerate() {
+                        let first = (colour * height + y * factor + r) * width;
+                        for (x, (sum, pixels)) in
+                            sums.iter_mut().zip(row.chunks_exact(factor)).enumerate()
+                        {
+                            *sum += match &shown {
+                                Some(shown) => pixels.iter().map(|l| shown[*l as usize]).sum(),
+                                None => (pixels.iter().zip(first + x * factor..))
+                                    .map(|(level, at)| wave(*level, at))
+                                    .sum::<Complex32>(),
+                            };
                         }
                     }
                 });

@@ -29,8 +29,10 @@ use crate::display::Display;
 use crate::encode::Encoding;
 use crate::error::{Error, Result};
 use crate::frame::CameraFrame;
+use crate::illumination::Illumination;
 use crate::method::Method;
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
 use queue::{Gate, Queue};
@@ -57,6 +59,10 @@ pub struct SessionOptions {
     pub encoding: Encoding,
     /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
     pub response: Response,
+    /// How the lasers light the modulator, where that was measured; then every rung has the display's resolution.
+    pub illumination: Option<Illumination>,
+    /// What corrects the display's aberration, where it has one.
+    pub correction: Option<Aberration>,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
     /// What becomes of depth.
@@ -84,6 +90,8 @@ impl SessionOptions {
             encoding: Encoding::ANTI_ALIAS,
             // Of levels with more bits the upper ones are what is looked at.
             response: Response::linear(display.bits().min(8))?,
+            illumination: None,
+            correction: None,
             brightness: Brightness::default(),
             depth: DepthOptions::default(),
             threads: None,
@@ -108,6 +116,16 @@ impl SessionOptions {
             return Err(Error::Plan(format!(
                 "a display of {} bits answers linearly; a table is for one of 8 bits",
                 self.display.bits()
+            )));
+        }
+        let (height, width) = (self.display.height(), self.display.width());
+        if self.illumination.is_some()
+            && let Some(rung) =
+                (self.ladder.iter()).find(|r| (r.height, r.width) != (height, width))
+        {
+            return Err(Error::Plan(format!(
+                "the illumination was measured over {width}×{height} pixels, a rung has {}×{}; all must have the display's",
+                rung.width, rung.height
             )));
         }
         self.brightness.check()?;

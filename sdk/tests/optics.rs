@@ -247,7 +247,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         );
         let response = Response::linear(8).unwrap();
         let mut levels = vec![0; phase.len()];
-        response.levels(&phase, &mut levels);
+        response.levels(&phase, 0, &mut levels);
         let mut shown = vec![Complex32::ZERO; phase.len()];
         phase_only_field(&levels, &response, scale, &mut shown);
         let aperture = Aperture::new(h, w, 0.7).unwrap();

@@ -207,7 +207,7 @@ class Frame:
             ),
             depth=depth_info,
             confidence=confidence_info,
-            orientation=orientation or Orientation(rotation=Rotation.NONE, mirrored=False),
+            orientation=orientation or Orientation(rotation=Rotation.UPRIGHT, mirrored=False),
             cameras=cameras,
         )
 
@@ -307,7 +307,7 @@ def session_options(method: Network | Method, display: Display | None = None, **
     """What is usual: holograms of the display's resolution by a network or another method; AA-DPM, levels in equal steps, steady
     brightness, near and far by percentiles. `changes` are fields of `SessionOptions`."""
     display = display or Display()
-    method = Method.NETWORK(network=method) if isinstance(method, Network) else method
+    method = Method.TRAINED(network=method) if isinstance(method, Network) else method
     usual = {
         "display": display,
         "ladder": [Rung(method=method, width=display.width, height=display.height)],

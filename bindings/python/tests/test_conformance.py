@@ -38,7 +38,7 @@ DEPTH = {
     "normalized-u8": (DepthFormat.NORMALIZED_U8, "u1"),
     "normalized-u16": (DepthFormat.NORMALIZED_U16, "<u2"),
 }
-TURN = {0: Rotation.NONE, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
+TURN = {0: Rotation.UPRIGHT, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
 ENCODING = {
     "double-phase": Encoding.DOUBLE_PHASE(),
     "anti-alias": Encoding.ANTI_ALIAS(sigma=0.7, width=3),

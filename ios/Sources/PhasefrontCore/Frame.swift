@@ -121,7 +121,7 @@ extension DepthFormat {
 
 extension Orientation {
     /// As the sensor gives it.
-    public static let upright = Orientation(rotation: .none, mirrored: false)
+    public static let upright = Orientation(rotation: .upright, mirrored: false)
 }
 
 /// Colour and depth of one moment.

@@ -93,7 +93,7 @@ extension SessionOptions {
     /// What is usual: holograms of `display`'s resolution by `network`; AA-DPM, levels in equal steps, steady brightness,
     /// near and far by percentiles. Change what is not.
     public init(display: Display = Display(), network: Network) {
-        self.init(display: display, method: .network(network: network))
+        self.init(display: display, method: .trained(network: network))
     }
 
     /// The same by `method`.

@@ -59,7 +59,7 @@ final class ConformanceTests: XCTestCase {
     ]
     private static let confidences: [String: ConfidenceFormat] = ["low-medium-high": .lowMediumHigh, "u8": .u8]
     private static let matrices: [String: YuvMatrix] = ["bt601": .bt601, "bt709": .bt709]
-    private static let rotations: [Int: Rotation] = [0: .none, 90: .clockwise90, 180: .half, 270: .clockwise270]
+    private static let rotations: [Int: Rotation] = [0: .upright, 90: .clockwise90, 180: .half, 270: .clockwise270]
     private static let encodings: [String: Encoding] = [
         "double-phase": .doublePhase, "anti-alias": .antiAlias(sigma: 0.7, width: 3), "band-limit": .bandLimit(k: 1),
     ]
@@ -86,7 +86,7 @@ final class ConformanceTests: XCTestCase {
 
     private func levels(_ one: Case, _ frames: Data) throws -> Data {
         let method = try XCTUnwrap([String: Method](
-            uniqueKeysWithValues: [("network", .network(network: try network.get())), ("sweep", .sweep)])[one.method])
+            uniqueKeysWithValues: [("network", .trained(network: try network.get())), ("sweep", .sweep)])[one.method])
         var options = SessionOptions(display: try displayFromToml(text: one.display), method: method)
         options.encoding = try XCTUnwrap(Self.encodings[one.encoding])
         if let lut = one.lut { options.response = .lut(levels: Data(lut)) }

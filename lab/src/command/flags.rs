@@ -27,10 +27,7 @@ impl DisplayFlags {
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(path) => files::read_display(path)?,
-            None => DisplayFile {
-                display: phasefront::Display::default(),
-                lut: None,
-            },
+            None => phasefront::Display::default().into(),
         };
         if let Some(mm) = self.offset_mm {
             file.display = file.display.with_offset_m(mm / 1e3)?;

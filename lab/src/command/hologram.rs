@@ -6,10 +6,11 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
-use phasefront::modulator::Modulator;
-use phasefront::slm::Response;
+use phasefront::method::MethodPlan;
 use phasefront::{Pipeline, RgbdFrame, Sweep};
-use phasefront_lab::files::{self, HologramInfo};
+use phasefront_lab::calibrate::table::AberrationFile;
+use phasefront_lab::corrected::{self, Correction};
+use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
@@ -149,10 +150,6 @@ impl Hologram {
         }
         let encoding = self.encoder.read()?;
         let display = self.display.read()?;
-        let response = match display.lut {
-            Some(lut) => Response::lut(lut),
-            None => Response::linear(display.display.bits())?,
-        };
         let method = self.method.unwrap_or(match self.ldi {
             Some(_) => Method::Layers,
             None => Method::Network,
@@ -169,18 +166,14 @@ impl Hologram {
                 let network = models::network(&self.network, self.precision.is_int8())?;
                 let method = phasefront::Method::Network(network);
                 match &device {
-                    Some(options) => {
-                        self.on_gpu(method, &display.display, encoding, response, options)?
-                    }
-                    None => {
-                        self.by_pipeline("network", method, &display.display, encoding, response)?
-                    }
+                    Some(options) => self.on_gpu(method, &display, encoding, options)?,
+                    None => self.by_pipeline("network", method, &display, encoding)?,
                 }
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display.display, encoding, response)?
+                self.by_pipeline("sweep", method, &display, encoding)?
             }
             (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
@@ -193,11 +186,12 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, encoding, response)?
+                self.by_physics(method, &ldi, &display, encoding)?
             }
         };
         let info = HologramInfo {
-            display: display.display,
+            calibrated: display.calibrated(true),
+            display: display.display.clone(),
             encoder: Some(self.encoder.name().into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
@@ -207,6 +201,7 @@ impl Hologram {
                 encoder: None,
                 scale: None,
                 lut: None,
+                calibrated: display.calibrated(false),
                 ..info.clone()
             };
             files::write_complex(path, field.view(), &info)?;
@@ -221,21 +216,18 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
-        display: &phasefront::Display,
+        display: &DisplayFile,
         encoding: Encoding,
-        response: Response,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let pipeline = Pipeline::new(
-            height,
-            width,
-            method,
-            display,
-            encoding,
-            self.scale(),
-            response,
-        )?;
+        let plan = MethodPlan::new(height, width, method, &display.display)?;
+        let mut modulator =
+            display.modulator((height, width), plan.z_m(), encoding, self.scale())?;
+        if let Some(correction) = display.constant_correction()? {
+            modulator = modulator.with_correction(&correction)?;
+        }
+        let pipeline = Pipeline::from_parts(plan, modulator)?;
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -262,15 +254,24 @@ impl Hologram {
     fn on_gpu(
         &self,
         method: phasefront::Method,
-        display: &phasefront::Display,
+        display: &DisplayFile,
         encoding: Encoding,
-        response: Response,
         options: &DeviceOptions,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let scale = self.scale();
-        let job = Job::new(height, width, method, display, encoding, scale, response);
+        let (scale, response) = (self.scale(), display.response()?);
+        let mut job = Job::new(
+            height,
+            width,
+            method,
+            &display.display,
+            encoding,
+            scale,
+            response,
+        );
+        job.illumination = display.laser.clone();
+        job.correction = display.constant_correction()?;
         let device = Arc::new(Device::open(options)?);
         phasefront::gpu::probe(&device, &job)?;
         let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
@@ -298,12 +299,21 @@ impl Hologram {
         &self,
         method: Method,
         ldi: &Ldi,
-        display: &phasefront::Display,
+        file: &DisplayFile,
         encoding: Encoding,
-        response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
+        let display = &file.display;
+        let mut modulator = file.modulator((height, width), 0.0, encoding, self.scale())?;
+        // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
+        let (constant, varying) = match (method, file.constant_correction()) {
+            (_, Ok(constant)) => (constant, None),
+            (Method::Layers, Err(_)) => (None, file.aberration.as_ref()),
+            (_, Err(e)) => return Err(e),
+        };
+        if let Some(correction) = constant {
+            modulator = modulator.with_correction(&correction)?;
+        }
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
@@ -321,7 +331,17 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
-                let field = sm_lbm::hologram(ldi, display, planes, &progress)?;
+                let shape = ldi.shape();
+                let field = match varying {
+                    None => sm_lbm::hologram(ldi, display, planes, &progress)?,
+                    Some(AberrationFile::Uniform(all)) => {
+                        let correction = Correction::of_aberrations(all, shape, planes, display)?;
+                        corrected::hologram(ldi, display, planes, &correction, &progress)?
+                    }
+                    Some(AberrationFile::Spatial(all)) => {
+                        corrected::spatial::hologram(ldi, display, planes, all, &progress)?
+                    }
+                };
                 ("layers", field)
             }
         };

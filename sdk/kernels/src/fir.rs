@@ -108,9 +108,9 @@ impl Fir {
         let last = places
             .as_flattened()
             .iter()
-            .max()
-            .map_or(0, |last| last + length);
-        assert!(source.iter().all(|part| last <= part.len()));
+            .fold(0, |last, at| last.max(*at))
+            + length;
+        assert!(last <= source[0].len() && last <= source[1].len());
         let [re, im] = out;
         let run = Run {
             source: source.map(<[f32]>::as_ptr),

@@ -2,17 +2,20 @@
 
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Device, copy_mapped};
-use super::encode::{Encoder, MeanPhase, Target};
+use super::encode::{Encoder, Light, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame, Packer, Source};
 use super::peak::Peak;
 use super::{Error, Result};
 use crate::display::Display;
 use crate::encode::{Encoding, Scale, deep};
-use crate::method::{Method, check_display};
+use crate::illumination::Illumination;
+use crate::method::{Method, MethodPlan, check_display};
+use crate::modulator::Modulator;
 use crate::network::{InputKind, Network};
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
+use crate::wave::zernike::Aberration;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,6 +45,10 @@ pub struct Job {
     pub scale: Scale,
     /// From phases to levels.
     pub response: Response,
+    /// The lasers' light over the modulator, where it is calibrated.
+    pub illumination: Option<Illumination>,
+    /// What corrects the display's aberration, where it is calibrated and one for all depths.
+    pub correction: Option<Aberration>,
     /// How colour comes.
     pub colour: Colour,
     /// How depth comes.
@@ -69,10 +76,33 @@ impl Job {
             encoding,
             scale,
             response,
+            illumination: None,
+            correction: None,
             colour: Colour::Planar,
             depth: Depth::F32,
             chain: ChainOptions::default(),
         }
+    }
+
+    /// The same on the CPU.
+    ///
+    /// # Errors
+    /// What [`crate::Pipeline::from_parts`] and what it is made from refuse.
+    pub fn on_cpu(&self) -> crate::Result<crate::Pipeline> {
+        let (height, width) = (self.height, self.width);
+        let plan = MethodPlan::new(height, width, self.method.clone(), &self.display)?;
+        let left_m = self.display.offset_m() - plan.z_m();
+        let display = self.display.clone().with_offset_m(left_m)?;
+        let (encoding, response) = (self.encoding.clone(), self.response.clone());
+        let mut modulator =
+            Modulator::new(height, width, &display, encoding, self.scale, response)?;
+        if let Some(illumination) = &self.illumination {
+            modulator = modulator.with_illumination(illumination.clone());
+        }
+        if let Some(correction) = &self.correction {
+            modulator = modulator.with_correction(correction)?;
+        }
+        crate::Pipeline::from_parts(plan, modulator)
     }
 
     pub(super) fn network(&self) -> Result<&Network> {
@@ -149,6 +179,7 @@ pub struct Pipeline {
     mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
     offset: Option<Convolution>,
+    light: Option<Light>,
     encoder: Encoder,
     targets: Vec<Target>,
     slots: Vec<Slot>,
@@ -190,6 +221,15 @@ impl Pipeline {
         if let Encoding::Deep(network) = &job.encoding {
             deep::check(network, &job.display)?;
         }
+        if let Some(shape) = job.response.shape()
+            && shape != size
+        {
+            return Err(crate::Error::Plan(format!(
+                "the per-pixel table is for {}×{} pixels, the hologram is {}×{}; both must be of one size",
+                shape.1, shape.0, size.1, size.0
+            ))
+            .into());
+        }
         device.guarded(|| Self::build(device, job, network, size))
     }
 
@@ -212,27 +252,43 @@ impl Pipeline {
         };
         // The first to read the field turns it.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
-        let offset = match job.display.offset_m() {
-            0.0 => None,
-            offset_m => {
-                let plans = Propagator::for_colours(
-                    size.0,
-                    size.1,
-                    job.display.pitch_m(),
-                    job.display.wavelengths_m(),
-                    offset_m,
-                    Padding::Reach,
-                )?;
-                let quadrants = plans.each_ref().map(|plan| plan.transfer().quadrant());
-                let planes = Planes {
+        let display = &job.display;
+        let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
+        let plans = match (display.offset_m(), &job.correction) {
+            (offset_m, Some(correction)) => Some(Propagator::for_colours_corrected(
+                size.0,
+                size.1,
+                pitch_m,
+                wavelengths_m,
+                offset_m,
+                correction,
+            )?),
+            (0.0, None) => None,
+            (offset_m, None) => Some(Propagator::for_colours(
+                size.0,
+                size.1,
+                pitch_m,
+                wavelengths_m,
+                offset_m,
+                Padding::Reach,
+            )?),
+        };
+        let offset = match &plans {
+            None => None,
+            Some(plans) => Some(Convolution::new(
+                device,
+                &Planes {
                     field: &chain.field,
                     size,
                     padded: plans[0].padded_shape(),
-                    quadrants: &quadrants,
+                    factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
                     turn: turn.take(),
-                };
-                Some(Convolution::new(device, &planes)?)
-            }
+                },
+            )?),
+        };
+        let light = match &job.illumination {
+            None => None,
+            Some(light) => Some(Light::new(device, &chain.field, size, light, turn.take())?),
         };
         let targets = (0..FLIGHTS)
             .map(|_| Target::new(device, size))
@@ -257,6 +313,7 @@ impl Pipeline {
             chain,
             mean,
             offset,
+            light,
             encoder,
             targets,
             slots,
@@ -359,7 +416,12 @@ impl Pipeline {
                 offset.run(pass);
             }
         });
-        stage(3, &|pass| self.encoder.run(pass, at));
+        stage(3, &|pass| {
+            if let Some(light) = &self.light {
+                light.run(pass);
+            }
+            self.encoder.run(pass, at);
+        });
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;

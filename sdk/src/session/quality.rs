@@ -94,6 +94,8 @@ pub struct QualityChange {
 const SLOW_FRAMES: u32 = 6;
 /// Frames with room before a step up; doubled with each step up that had to be taken back.
 const ROOMY_FRAMES: u32 = 60;
+/// Frames with room that one without outweighs.
+const TIGHT_FRAME: u32 = 20;
 /// The most frames with room that a step up may need.
 const MOST_ROOMY_FRAMES: u32 = 60 * 32;
 /// A step up is tried where frames take less than this share of their time.
@@ -143,7 +145,11 @@ impl Ladder {
         }
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
-        self.roomy = if used < ROOM { self.roomy + 1 } else { 0 };
+        // A frame that took long for another reason does not undo all room before it.
+        self.roomy = match used < ROOM {
+            true => self.roomy + 1,
+            false => self.roomy.saturating_sub(TIGHT_FRAME),
+        };
         if let Some(frames) = &mut self.since_up {
             *frames += 1;
             if *frames > self.roomy_needed {

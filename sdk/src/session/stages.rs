@@ -9,6 +9,8 @@ use crate::depth::stream::DepthStream;
 use crate::encode::Scale;
 use crate::error::{Error, Result};
 use crate::frame::{CameraFrame, ColourPlan, ColourScratch, RgbdFrame};
+use crate::method::MethodPlan;
+use crate::modulator::Modulator;
 use crate::pipeline::{Pipeline, PipelineScratch};
 use crate::slm;
 use num_complex::Complex32;
@@ -89,15 +91,26 @@ impl Stages {
         let (height, width) = (rung.height, rung.width);
         let depth = DepthStream::new(self.options.depth, (height, width))?;
         self.pool.install(|| {
-            let pipeline = Pipeline::new(
+            let SessionOptions {
+                display, encoding, ..
+            } = &self.options;
+            let method = MethodPlan::new(height, width, rung.method.clone(), display)?;
+            let left_m = display.offset_m() - method.z_m();
+            let mut modulator = Modulator::new(
                 height,
                 width,
-                rung.method.clone(),
-                &self.options.display,
-                self.options.encoding.clone(),
+                &display.clone().with_offset_m(left_m)?,
+                encoding.clone(),
                 Scale::Max,
                 self.options.response.clone(),
             )?;
+            if let Some(illumination) = &self.options.illumination {
+                modulator = modulator.with_illumination(illumination.clone());
+            }
+            if let Some(correction) = &self.options.correction {
+                modulator = modulator.with_correction(correction)?;
+            }
+            let pipeline = Pipeline::from_parts(method, modulator)?;
             Ok(RungPlan {
                 scratch: pipeline.scratch(),
                 pipeline,

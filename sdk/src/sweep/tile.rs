@@ -6,12 +6,13 @@
 //! leftmost to the rightmost pixel that light can be at, its [`Span`].
 
 use super::filters::Filters;
+use super::hidden::NOTHING;
 use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, RUN};
 use std::ops::Range;
 
 /// Pixels beyond light's reach that are computed, too: a fitted filter's light runs a little ahead.
-const MARGIN: usize = 4;
+const MARGIN: usize = 10;
 
 /// The pixels of a row from one to before another; none where the second is not the greater.
 type Span = [usize; 2];
@@ -89,17 +90,31 @@ impl Layout {
     pub(super) fn scratch(&self) -> TileScratch {
         let rows = self.rows();
         let plane = || Aligned::new(rows * self.stride);
-        let ring = || Aligned::new((2 * self.longest + 1) * self.stride);
+        let ring = || Aligned::new(self.ring_values());
+        let line = || Aligned::new(self.stride + 2 * self.longest);
+        let places = || vec![[0; 2]; self.longest + 1];
+        let kept = || vec![0.0; rows * self.longest];
         TileScratch {
             field: [plane(), plane()],
+            line: [line(), line()],
+            kept: [kept(), kept()],
             ring: [ring(), ring()],
-            places: vec![[0; 2]; self.longest + 1],
+            places: [places(), places()],
             starts: vec![0; self.halos.len() + 1],
+            found: Vec::new(),
             points: Vec::new(),
             point_spans: vec![NOWHERE; self.halos.len() * rows],
             lit: vec![NOWHERE; rows],
             wider: vec![NOWHERE; rows],
         }
+    }
+
+    /// Most values that a ring holds: all rows of the longest filter.
+    fn ring_values(&self) -> usize {
+        (1..=self.longest)
+            .map(|radius| (2 * radius + 1) * strip(radius))
+            .max()
+            .unwrap_or(RUN)
     }
 
     /// Rows of the buffer.
@@ -118,13 +133,18 @@ impl Layout {
 pub(super) struct TileScratch {
     /// Real and imaginary part, rows of `stride`.
     field: [Aligned; 2],
+    /// A row of a strip before it is filtered.
+    line: [Aligned; 2],
+    /// Each row's last columns of the strip before, as they were.
+    kept: [Vec<f32>; 2],
     /// The last rows filtered along x.
     ring: [Aligned; 2],
-    /// Where the taps' rows or columns lie.
-    places: Vec<[usize; 2]>,
+    /// Where the taps' values lie, along x and along y.
+    places: [Vec<[usize; 2]>; 2],
     /// Where each plane's points start, and the end.
     starts: Vec<u32>,
-    points: Vec<Point>,
+    found: Vec<(u16, Points)>,
+    points: Vec<Points>,
     /// Of each plane, the span of its points in each row.
     point_spans: Vec<Span>,
     /// Where there can be light in each row of the field.
@@ -150,17 +170,19 @@ impl Aligned {
 
 impl TileScratch {
     pub(super) fn reserve(&mut self, points: usize) {
+        self.found.reserve_exact(points);
         self.points.reserve_exact(points);
     }
 }
 
-/// A point of the scene on its plane.
+/// Neighbouring points of one plane in a row.
 #[derive(Clone, Copy, Default)]
-struct Point {
-    /// In the field.
+struct Points {
+    /// The first one's place in the field.
     at: u32,
-    /// Its colour's pixel in the frame.
+    /// The first one's colour in the frame; the others' follow it.
     from: u32,
+    count: u16,
 }
 
 /// A tile of a frame.
@@ -190,37 +212,36 @@ impl<'a> Tile<'a> {
     /// Sorts the points that the tile needs by planes; within one, hidden layers come first, so that what is in front
     /// is written last.
     pub(super) fn gather(&self, scratch: &mut TileScratch) {
+        scratch.starts.fill(0);
+        scratch.found.clear();
+        scratch.point_spans.fill(NOWHERE);
+        let Surfaces { planes, hidden, .. } = self.surfaces;
+        let layers = hidden.len() / planes.len();
+        for layer in (0..=layers).rev() {
+            self.find(layer, scratch);
+        }
         let TileScratch {
             starts,
+            found,
             points,
-            point_spans,
             ..
         } = scratch;
-        let (rows, stride) = (self.layout.rows(), self.layout.stride);
-        starts.fill(0);
-        self.visit(|plane, _, _, _| starts[plane + 1] += 1);
         for k in 1..starts.len() {
             starts[k] += starts[k - 1];
         }
-        let total = starts.last().copied().unwrap_or(0) as usize;
-        points.resize(total, Point::default());
+        points.resize(found.len(), Points::default());
         // Each start runs to its plane's end, which is the next one's start; shifted back afterwards.
-        point_spans.fill(NOWHERE);
-        self.visit(|plane, y, x, from| {
-            points[starts[plane] as usize] = Point {
-                at: (y * stride + x) as u32,
-                from: from as u32,
-            };
-            starts[plane] += 1;
-            let span = &mut point_spans[plane * rows + y];
-            *span = join(*span, [x, x + 1]);
-        });
+        for (plane, found) in found {
+            let start = &mut starts[usize::from(*plane)];
+            points[*start as usize] = *found;
+            *start += 1;
+        }
         starts.copy_within(0..self.layout.halos.len(), 1);
         starts[0] = 0;
     }
 
-    /// Calls `point` with plane, row and column in the field, and pixel of colour, of each point.
-    fn visit(&self, mut point: impl FnMut(usize, usize, usize, usize)) {
+    /// Finds a layer's points; 0 is the front.
+    fn find(&self, layer: usize, scratch: &mut TileScratch) {
         let Surfaces {
             planes,
             hidden,
@@ -228,42 +249,80 @@ impl<'a> Tile<'a> {
             width,
             ..
         } = self.surfaces;
-        let Layout { halos, border, .. } = self.layout;
-        let widest = halos.last().copied().unwrap_or(0);
+        let widest = self.layout.halos.last().copied().unwrap_or(0);
         let around = |side: &Range<usize>, size: usize| {
             side.start.saturating_sub(widest)..(side.end + widest).min(size)
         };
-        let outside = |i: usize, side: &Range<usize>| {
-            side.start
-                .saturating_sub(i)
-                .max((i + 1).saturating_sub(side.end))
-        };
         let columns = around(&self.columns, width);
-        let layers = hidden.len() / planes.len();
-        for layer in (0..=layers).rev() {
-            for y in around(&self.rows, height) {
-                let above = outside(y, &self.rows);
-                let place = y + border - self.rows.start;
-                let row = y * width;
-                let mut add = |x: usize, from: usize| {
-                    let plane = usize::from(planes[from]);
-                    if halos[plane] >= above.max(outside(x, &self.columns)) {
-                        point(plane, place, x + border - self.columns.start, from);
+        for y in around(&self.rows, height) {
+            let row = y * width;
+            match layer {
+                0 => {
+                    let planes = &planes[row..][..width];
+                    let mut x = columns.start;
+                    while x < columns.end {
+                        let plane = planes[x];
+                        let same = planes[x..columns.end].iter().take_while(|p| **p == plane);
+                        let count = same.count();
+                        self.add(plane, y, x..x + count, row + x, scratch);
+                        x += count;
                     }
-                };
-                match layer {
-                    0 => columns.clone().for_each(|x| add(x, row + x)),
-                    _ => {
-                        let sources = &hidden[(layer - 1) * planes.len() + row..][..width];
-                        for (x, source) in columns.clone().zip(&sources[columns.clone()]) {
-                            if *source != super::hidden::NOTHING {
-                                add(x, *source as usize);
+                }
+                _ => {
+                    let sources = &hidden[(layer - 1) * planes.len() + row..][..width];
+                    let mut x = columns.start;
+                    while x < columns.end {
+                        let source = sources[x];
+                        let mut count = 1;
+                        if source != NOTHING {
+                            let plane = planes[source as usize];
+                            while x + count < columns.end
+                                && sources[x + count] == source + count as u32
+                                && planes[source as usize + count] == plane
+                            {
+                                count += 1;
                             }
+                            self.add(plane, y, x..x + count, source as usize, scratch);
                         }
+                        x += count;
                     }
                 }
             }
         }
+    }
+
+    /// Adds the points of row `y` and `columns` of the frame, as far as they are in the plane's halo; the first one's
+    /// colour is at `from`.
+    fn add(
+        &self,
+        plane: u16,
+        y: usize,
+        columns: Range<usize>,
+        from: usize,
+        scratch: &mut TileScratch,
+    ) {
+        let &Layout { border, stride, .. } = self.layout;
+        let k = usize::from(plane);
+        let halo = self.layout.halos[k];
+        let in_halo = y + halo >= self.rows.start && y < self.rows.end + halo;
+        let start = columns.start.max(self.columns.start.saturating_sub(halo));
+        let end = columns.end.min(self.columns.end + halo);
+        if !in_halo || start >= end {
+            return;
+        }
+        let y = y + border - self.rows.start;
+        let x = start + border - self.columns.start;
+        scratch.found.push((
+            plane,
+            Points {
+                at: (y * stride + x) as u32,
+                from: (from + start - columns.start) as u32,
+                count: (end - start) as u16,
+            },
+        ));
+        scratch.starts[k + 1] += 1;
+        let span = &mut scratch.point_spans[k * self.layout.rows() + y];
+        *span = join(*span, [x, x + end - start]);
     }
 
     /// Sweeps one colour over the gathered points; [`Tile::store`] takes the result.
@@ -331,73 +390,127 @@ impl<'a> Tile<'a> {
             }
         }
         let [re, im] = scratch.field.each_mut().map(Aligned::values);
-        for point in &scratch.points[points] {
-            re[point.at as usize] = rgb[point.from as usize];
-            im[point.at as usize] = 0.0;
+        for points in &scratch.points[points] {
+            let (at, from) = (points.at as usize, points.from as usize);
+            let count = usize::from(points.count);
+            re[at..at + count].copy_from_slice(&rgb[from..from + count]);
+            im[at..at + count].fill(0.0);
         }
     }
 
-    /// Filters the field in place where it is lit, in the tile and `halo` around it: a row along x into the ring, and as
-    /// soon as its neighbours below are there too, along y back into the field.
+    /// Filters the field in place where it is lit, in the tile and `halo` around it.
+    ///
+    /// Columns are taken in strips so narrow that the rows in use stay in the nearest cache. In a strip, a row is filtered
+    /// along x into the ring, and as soon as its neighbours below are there too, along y back into the field.
     fn filter(&self, taps: &[[f32; 2]], halo: usize, scratch: &mut TileScratch) {
-        let &Layout { border, stride, .. } = self.layout;
+        let border = self.layout.border;
         let radius = taps.len() - 1;
-        let (top, bottom) = (border - halo, border + self.rows.len() + halo);
+        let rows = border - halo..border + self.rows.len() + halo;
         let (left, right) = (border - halo, border + self.columns.len() + halo);
+        let mut columns = NOWHERE;
+        for (y, span) in scratch.lit.iter_mut().enumerate() {
+            let [from, to] = [span[0].max(left), span[1].min(right)];
+            // To whole lines: they are as fast as parts of them.
+            *span = match rows.contains(&y) && from < to {
+                true => [from / RUN * RUN, to.next_multiple_of(RUN)],
+                false => NOWHERE,
+            };
+            columns = join(columns, *span);
+        }
+        // What is filtered along x serves the rows around it.
+        widen_down(&scratch.lit, &mut scratch.wider, radius);
+        let step = strip(radius);
+        for start in (columns[0]..columns[1]).step_by(step) {
+            let strip = Strip {
+                columns: start..(start + step).min(columns[1]),
+                first: start == columns[0],
+                last: start + step >= columns[1],
+            };
+            self.filter_strip(taps, rows.clone(), &strip, scratch);
+        }
+    }
+
+    fn filter_strip(
+        &self,
+        taps: &[[f32; 2]],
+        rows: Range<usize>,
+        strip: &Strip,
+        scratch: &mut TileScratch,
+    ) {
+        let stride = self.layout.stride;
+        let radius = taps.len() - 1;
         let TileScratch {
             field,
+            line,
+            kept,
             ring,
             places,
             lit,
             wider,
             ..
         } = scratch;
-        // To whole lines: they are as fast as parts of them.
-        for (y, span) in lit.iter_mut().enumerate() {
-            let [from, to] = [span[0].max(left), span[1].min(right)];
-            *span = match (top..bottom).contains(&y) && from < to {
-                true => [from / RUN * RUN, to.next_multiple_of(RUN)],
-                false => NOWHERE,
-            };
-        }
-        // What is filtered along x serves the rows around it.
-        widen_down(lit, wider, radius);
-        let [field_re, field_im] = field.each_mut().map(Aligned::values);
+        let mut field = field.each_mut().map(Aligned::values);
+        let mut line = line.each_mut().map(Aligned::values);
         let [ring_re, ring_im] = ring.each_mut().map(Aligned::values);
-        let places = &mut places[..=radius];
-        let slot = |row: usize| row % (2 * radius + 1) * stride;
-        let filtered = top - radius..bottom + radius;
-        for (row, &[from, to]) in filtered.clone().zip(&wider[filtered]) {
+        let [along, down] = places.each_mut().map(|places| &mut places[..=radius]);
+        let Range { start, end } = strip.columns;
+        let cut = |[from, to]: Span| [from.max(start), to.min(end)];
+        let pitch = end - start;
+        let slots = 2 * radius + 1;
+        // The slot of `row` in the ring.
+        let mut slot = 0;
+        for row in rows.start - radius..rows.end + radius {
+            let at = row * stride;
+            let [from, to] = cut(wider[row]);
             if from < to {
-                let centre = row * stride + from;
-                for (j, place) in places.iter_mut().enumerate() {
-                    *place = [centre - j, centre + j];
+                let out = slot * pitch + from - start..slot * pitch + to - start;
+                let out = [&mut ring_re[out.clone()], &mut ring_im[out]];
+                let centre = |along: &mut [[usize; 2]], centre: usize| {
+                    for (j, place) in along.iter_mut().enumerate() {
+                        *place = [centre - j, centre + j];
+                    }
+                };
+                // The columns before the strip that are in view.
+                let overwritten = (start + radius).saturating_sub(from);
+                if strip.first || overwritten == 0 {
+                    centre(along, at + from);
+                    let [re, im] = &field;
+                    self.fir.filter(taps, [re, im], along, out);
+                } else {
+                    for ((field, line), kept) in field.iter().zip(&mut line).zip(&*kept) {
+                        let (before, rest) = line.split_at_mut(overwritten);
+                        before.copy_from_slice(&kept[row * radius..][radius - overwritten..radius]);
+                        let length = to - start + radius;
+                        rest[..length].copy_from_slice(&field[at + start..][..length]);
+                    }
+                    centre(along, radius);
+                    self.fir.filter(taps, [line[0], line[1]], along, out);
                 }
-                let out = slot(row) + from..slot(row) + to;
-                self.fir.filter(
-                    taps,
-                    [field_re, field_im],
-                    places,
-                    [&mut ring_re[out.clone()], &mut ring_im[out]],
-                );
             }
-            // Row r needs rows up to r + radius.
-            let Some(row) = row.checked_sub(radius).filter(|row| *row >= top) else {
-                continue;
-            };
-            let [from, to] = lit[row];
-            if from < to {
-                for (j, place) in places.iter_mut().enumerate() {
-                    *place = [slot(row - j) + from, slot(row + j) + from];
+            if !strip.last {
+                for (field, kept) in field.iter().zip(&mut *kept) {
+                    kept[row * radius..][..radius]
+                        .copy_from_slice(&field[at + end - radius..at + end]);
                 }
-                let out = row * stride + from..row * stride + to;
-                self.fir.filter(
-                    taps,
-                    [ring_re, ring_im],
-                    places,
-                    [&mut field_re[out.clone()], &mut field_im[out]],
-                );
             }
+            // Row r needs rows up to r + radius, which is the one that has just come.
+            if let Some(row) = row.checked_sub(radius).filter(|row| *row >= rows.start) {
+                let [from, to] = cut(lit[row]);
+                if from < to {
+                    let place = |slot: usize| slot * pitch + from - start;
+                    let wrapped = |i: usize| if i < slots { i } else { i - slots };
+                    // The centre came `radius` rows ago.
+                    let centre = wrapped(slot + slots - radius);
+                    for (j, places) in down.iter_mut().enumerate() {
+                        *places = [centre + slots - j, centre + j].map(|i| place(wrapped(i)));
+                    }
+                    let out = row * stride + from..row * stride + to;
+                    let [re, im] = &mut field;
+                    let out = [&mut re[out.clone()], &mut im[out]];
+                    self.fir.filter(taps, [ring_re, ring_im], down, out);
+                }
+            }
+            slot = if slot + 1 < slots { slot + 1 } else { 0 };
         }
     }
 
@@ -414,6 +527,24 @@ impl<'a> Tile<'a> {
             }
         }
     }
+}
+
+/// Columns of the field that are filtered together. What the strip before has overwritten is kept for those that are not
+/// the first.
+struct Strip {
+    columns: Range<usize>,
+    first: bool,
+    last: bool,
+}
+
+/// Columns of a strip: as many as let the rows of a filter's ring stay in the nearest cache, but no fewer than the filter
+/// looks back.
+fn strip(radius: usize) -> usize {
+    const RING: usize = 3072;
+    (RING / (2 * radius + 1))
+        .max(radius)
+        .max(2 * RUN)
+        .next_multiple_of(RUN)
 }
 
 /// Spans `by` pixels wider in all directions; `wider` is memory.

@@ -21,15 +21,16 @@ public class Plane(
     }
 
     /** The bytes, in a buffer that begins with them. */
-    internal fun bytes(what: String): ByteBuffer {
-        if (!buffer.isDirect) {
-            throw PhasefrontException.Frame(
-                "frame: $what is in a buffer on the Java heap; a direct one is needed, from the camera or ByteBuffer.allocateDirect",
-            )
-        }
-        // What is generated passes the address of a buffer's beginning, whatever its position.
-        return buffer.slice()
+    internal fun bytes(what: String): ByteBuffer = buffer.direct {
+        PhasefrontException.Frame("frame: $what is $it; a direct one is needed, from the camera or ByteBuffer.allocateDirect")
     }
+}
+
+/** The bytes from the position to the limit of a direct buffer, in a buffer that begins with them. */
+internal fun ByteBuffer.direct(refused: (String) -> PhasefrontException): ByteBuffer {
+    if (!isDirect) throw refused("in a buffer on the Java heap")
+    // What is generated passes the address of a buffer's beginning, whatever its position.
+    return slice()
 }
 
 /** A colour image as a camera gives it. */
@@ -100,7 +101,7 @@ public class Frame(
     public val colour: ColourImage,
     public val depth: DepthImage,
     /** How both must be turned to stand upright. */
-    public val orientation: Orientation = Orientation(Rotation.NONE, false),
+    public val orientation: Orientation = Orientation(Rotation.UPRIGHT, false),
     /** How the pixels of depth and colour correspond; null where both show the same field of view. */
     public val cameras: Cameras? = null,
 ) {

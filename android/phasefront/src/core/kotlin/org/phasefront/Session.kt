@@ -130,7 +130,7 @@ public sealed interface SessionEvent {
  * and far by percentiles. Change what is not with `copy`.
  */
 public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions =
-    sessionOptions(Method.Network(network), display)
+    sessionOptions(Method.Trained(network), display)
 
 /** The same by [method]. */
 public fun sessionOptions(method: Method, display: Display = Display()): SessionOptions = SessionOptions(

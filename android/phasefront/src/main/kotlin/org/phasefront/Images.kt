@@ -41,7 +41,7 @@ public fun Image.toDepthImage(confidence: Image? = null): DepthImage {
 public fun sensorOrientation(sensorDegrees: Int, displayDegrees: Int, isFront: Boolean): Orientation {
     val degrees = if (isFront) sensorDegrees + displayDegrees else sensorDegrees - displayDegrees
     val rotation = when (Math.floorMod(degrees, 360)) {
-        0 -> Rotation.NONE
+        0 -> Rotation.UPRIGHT
         90 -> Rotation.CLOCKWISE90
         180 -> Rotation.HALF
         270 -> Rotation.CLOCKWISE270

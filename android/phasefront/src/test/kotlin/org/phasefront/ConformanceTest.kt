@@ -49,7 +49,7 @@ class ConformanceTest {
             else -> error(name)
         }
         val rotation = when (val degrees = case.getInt("rotation")) {
-            0 -> Rotation.NONE
+            0 -> Rotation.UPRIGHT
             90 -> Rotation.CLOCKWISE90
             180 -> Rotation.HALF
             270 -> Rotation.CLOCKWISE270
@@ -77,7 +77,7 @@ class ConformanceTest {
     }
 
     private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
-        "network" -> Method.Network(network)
+        "network" -> Method.Trained(network)
         "sweep" -> Method.Sweep
         else -> error(name)
     }

@@ -267,6 +267,10 @@ class SessionTest {
     fun networksThatAreNoneAreNamed() {
         assertRefused<PhasefrontException.File>("nowhere.onnx") { Network.fromFile("/nowhere.onnx") }
         assertRefused<PhasefrontException.Network>("network") { Network.fromBytes(direct(0)) }
+        assertRefused<PhasefrontException.Network>("allocateDirect") { Network.fromBytes(ByteBuffer.allocate(8)) }
+        val onnx = File(System.getProperty("phasefront.suite")).resolve("../../models/rgbd-8-int8.onnx").readBytes()
+        val positioned = direct(onnx.size + 3).position(3).put(onnx).position(3)
+        assertEquals(8u, Network.fromBytes(positioned).info().layers)
         val file = File.createTempFile("phasefront", ".onnx")
         try {
             file.writeText("not a network")
