@@ -17,7 +17,8 @@ use phasefront::gpu::{
 };
 use phasefront::network::{Isa, reference};
 use phasefront::slm::Response;
-use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Method, Network, RgbdFrame};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
@@ -215,17 +216,7 @@ fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
 /// The CPU's levels and scale of a job.
 fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
     let (h, w) = (job.height, job.width);
-    let job = job.clone();
-    let plan = Pipeline::new(
-        h,
-        w,
-        job.method,
-        &job.display,
-        job.encoding,
-        job.scale,
-        job.response,
-    )
-    .unwrap();
+    let plan = job.on_cpu().unwrap();
     let mut levels = vec![0; 3 * h * w];
     let mut field = vec![Complex32::ZERO; 3 * h * w];
     let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
@@ -540,6 +531,47 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
     let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
     assert!(refused.to_string().contains("shown"), "{refused}");
+}
+
+#[test]
+fn a_calibrated_display_gets_the_levels_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let (h, w) = (47, 61);
+    let network = int8_network();
+    let beam = Array3::from_shape_fn((3, 5, 7), |(c, y, x)| {
+        1.0 - 0.03 * (c as f32 + 1.0) * ((y as f32 - 2.0).powi(2) + (x as f32 - 3.0).powi(2)) / 4.0
+    });
+    let beam = Illumination::new(beam.view()).unwrap();
+    let bent = Aberration::new([[0.4, -0.3, 0.2, 0.1, -0.2]; 3]).unwrap();
+    let frame = rgbd(h, w);
+    for (offset_m, illumination, correction) in [
+        (0.0, Some(beam.clone()), None),
+        (2e-3, Some(beam), Some(bent)),
+        (0.0, None, Some(bent)),
+    ] {
+        let display = Display::default().with_size(h, w).unwrap();
+        let display = display.with_offset_m(offset_m).unwrap();
+        let response = Response::linear(8).unwrap();
+        let method = Method::Network(network.clone());
+        let (encoding, scale) = (Encoding::DoublePhase, Scale::Fixed(1.0));
+        let job = Job {
+            illumination,
+            correction,
+            ..Job::new(h, w, method, &display, encoding, scale, response)
+        };
+        let (expected, _) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.response);
+        assert!(apart < 0.002, "{offset_m}: {apart}");
+        let plain = Job {
+            illumination: None,
+            correction: None,
+            ..job
+        };
+        assert!(on_cpu(&plain, &frame).0 != expected);
+    }
 }
 
 #[test]

@@ -261,28 +261,24 @@ impl Hologram {
     fn on_gpu(
         &self,
         method: phasefront::Method,
-        file: &DisplayFile,
+        display: &DisplayFile,
         encoding: Encoding,
         options: &DeviceOptions,
     ) -> Result<Made> {
-        if file.laser.is_some() || file.aberration.is_some() {
-            return Err(Error::Input(
-                "the display's laser map and aberration are heeded by --backend cpu alone".into(),
-            ));
-        }
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let scale = self.scale();
-        let response = file.response()?;
-        let job = Job::new(
+        let (scale, response) = (self.scale(), display.response()?);
+        let mut job = Job::new(
             height,
             width,
             method,
-            &file.display,
+            &display.display,
             encoding,
             scale,
             response,
         );
+        job.illumination = display.laser.clone();
+        job.correction = display.constant_correction()?;
         let device = Arc::new(Device::open(options)?);
         phasefront::gpu::probe(&device, &job)?;
         let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;

@@ -14,6 +14,8 @@ struct Settings { taps: vec3f, scale: f32 }
 @group(0) @binding(5) var<storage, read> found: array<u32>;
 @group(0) @binding(6) var<storage, read_write> levels: array<u32>;
 @group(0) @binding(7) var shown: texture_storage_2d<rgba8unorm, write>;
+// With TABLE the level of each step; with PIXELS the curves of nodes, K + 1 knots each, then their turns; all else is not
+// read. See slm.rs and slm/per_pixel.rs.
 @group(0) @binding(8) var<storage, read> response: array<u32>;
 
 const PI: f32 = 3.14159265358979;
@@ -75,11 +77,43 @@ fn angle(v: vec2f) -> f32 {
     return select(half, -half, v.y < 0.0);
 }
 
-fn level(v: vec2f, inverse: f32, even: bool) -> u32 {
+fn node(colour: u32, i: u32, j: u32) -> u32 {
+    return (colour * ROWS + min(i, ROWS - 1u)) * COLUMNS + min(j, COLUMNS - 1u);
+}
+
+// What nodes have at `from` + node·stride, between the four around a pixel: in y first, then in x.
+fn between(colour: u32, x: u32, y: u32, first: u32, stride: u32) -> f32 {
+    let i = y / SPACING;
+    let j = x / SPACING;
+    let fx = f32(x % SPACING) / f32(SPACING);
+    let fy = f32(y % SPACING) / f32(SPACING);
+    let a = bitcast<f32>(response[first + node(colour, i, j) * stride]);
+    let b = bitcast<f32>(response[first + node(colour, i + 1u, j) * stride]);
+    let c = bitcast<f32>(response[first + node(colour, i, j + 1u) * stride]);
+    let d = bitcast<f32>(response[first + node(colour, i + 1u, j + 1u) * stride]);
+    let left = a + (b - a) * fy;
+    let right = c + (d - c) * fy;
+    return left + (right - left) * fx;
+}
+
+// The level of a phase at a pixel that has its own curve.
+fn pixel_level(phase: f32, colour: u32, x: u32, y: u32) -> u32 {
+    let turns = 3u * ROWS * COLUMNS * (INTERVALS + 1u);
+    let firstzero = phase >= between(colour, x, y, turns, 1u);
+    let t = select(phase, 0.0, firstzero) * (f32(INTERVALS) / TAU);
+    let k = min(u32(t), INTERVALS - 1u);
+    let here = between(colour, x, y, k, INTERVALS + 1u);
+    let next = between(colour, x, y, k + 1u, INTERVALS + 1u);
+    return u32(clamp(here + (next - here) * (t - f32(k)) + 0.5, 0.0, 255.0));
+}
+
+fn level(v: vec2f, inverse: f32, colour: u32, x: i32, y: i32) -> u32 {
+    let even = ((x + y) & 1) == 0;
     let amplitude = min(sqrt(dot(v, v)) * inverse, 1.0);
     let half = arc_cosine(amplitude);
     let sum = angle(v) + select(-half, half, even);
     let phase = select(sum, sum + TAU, sum < 0.0);
+    if (PIXELS) { return pixel_level(select(phase, 0.0, phase >= TAU), colour, u32(x), u32(y)); }
     let step = u32(phase * (f32(STEPS) / TAU) + 0.5) & (STEPS - 1u);
     if (TABLE) { return response[step]; }
     return step;
@@ -93,11 +127,10 @@ fn encode(@builtin(global_invocation_id) at: vec3u) {
     var scale = settings.scale;
     if (!FIXED) { scale = sqrt(bitcast<f32>(found[0])); }
     let inverse = select(0.0, 1.0 / scale, scale > 0.0);
-    let even = ((x + y) & 1) == 0;
     let rgb = vec3u(
-        level(value(0u, x, y), inverse, even),
-        level(value(1u, x, y), inverse, even),
-        level(value(2u, x, y), inverse, even),
+        level(value(0u, x, y), inverse, 0u, x, y),
+        level(value(1u, x, y), inverse, 1u, x, y),
+        level(value(2u, x, y), inverse, 2u, x, y),
     );
     levels[u32(y * frame.width + x)] = rgb.x | (rgb.y << 8u) | (rgb.z << 16u) | 0xff000000u;
     textureStore(shown, vec2i(x, y), vec4f(vec3f(rgb) / 255.0, 1.0));

@@ -14,14 +14,11 @@ const MOST_THREADS: usize = 256;
 /// Values that a thread holds at a time, where there are threads enough.
 const PER_THREAD: usize = 8;
 
-/// A filter over the padded plane: one quadrant of it, `(W'/2 + 1, H'/2 + 1)`, with 1/(H'·W') in it.
-pub(super) type Quadrant = Vec<Complex32>;
-
-/// The quadrant of what `factor` gives for (kx, ky), without the transforms' scale.
+/// The quadrant, `(W'/2 + 1, H'/2 + 1)`, of what `factor` gives for (kx, ky), times the transforms' 1/(H'·W').
 pub(super) fn quadrant(
     (padded_height, padded_width): (usize, usize),
     factor: impl Fn(usize, usize) -> f32,
-) -> Quadrant {
+) -> Vec<Complex32> {
     let scale = 1.0 / (padded_height * padded_width) as f32;
     let rows = padded_height / 2 + 1;
     (0..(padded_width / 2 + 1) * rows)
@@ -37,8 +34,9 @@ pub(super) struct Planes<'a> {
     pub(super) size: (usize, usize),
     /// (H', W').
     pub(super) padded: (usize, usize),
-    /// One quadrant for all colours, or three.
-    pub(super) quadrants: &'a [&'a [Complex32]],
+    /// The filter, with 1/(H'·W') in it, one for all colours or three: one quadrant of it, (W'/2 + 1, H'/2 + 1), where
+    /// it is even in both frequencies, else (W', H').
+    pub(super) factors: &'a [&'a [Complex32]],
     /// What each colour is multiplied by on the way in, if anything.
     pub(super) turn: Option<&'a wgpu::Buffer>,
 }
@@ -56,6 +54,7 @@ struct Stage {
     forward: bool,
     filter: bool,
     inverse: bool,
+    even: bool,
     in_place: bool,
     turn: bool,
 }
@@ -64,8 +63,9 @@ impl Convolution {
     pub(super) fn new(device: &Device, planes: &Planes<'_>) -> Result<Self> {
         let (height, width) = planes.size;
         let (padded_height, padded_width) = planes.padded;
-        let quadrant = (padded_height / 2 + 1) * (padded_width / 2 + 1);
-        let table: Vec<Complex32> = planes.quadrants.concat();
+        let one = planes.factors[0].len();
+        let even = one == (padded_height / 2 + 1) * (padded_width / 2 + 1);
+        let table: Vec<Complex32> = planes.factors.concat();
         let table = device.table("a filter", bytemuck::cast_slice(&table))?;
         let rows = device.buffer("spectra", 3 * height * padded_width * 8)?;
         let [row_roots, column_roots] = [padded_width, padded_height].map(|n| {
@@ -83,6 +83,7 @@ impl Convolution {
             forward: true,
             filter: false,
             inverse: false,
+            even,
             in_place: false,
             turn: planes.turn.is_some(),
         };
@@ -111,11 +112,7 @@ impl Convolution {
             let together = stage.lines_together(device)?;
             let mut numbers = vec![lines];
             numbers.extend(places);
-            numbers.push(if planes.quadrants.len() > 1 {
-                quadrant
-            } else {
-                0
-            });
+            numbers.push(if planes.factors.len() > 1 { one } else { 0 });
             numbers.resize(12, 0);
             let numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
             let numbers = device.constants("lines", bytemuck::cast_slice(&numbers))?;
@@ -172,11 +169,11 @@ impl Convolution {
         })
     }
 
-    /// Another filter from the next submission on: as many quadrants as were planned, one after another.
-    pub(super) fn set(&self, device: &Device, quadrants: &[Complex32]) {
+    /// Another filter from the next submission on: as many factors as were planned, one colour after another.
+    pub(super) fn set(&self, device: &Device, factors: &[Complex32]) {
         device
             .queue
-            .write_buffer(&self.table, 0, bytemuck::cast_slice(quadrants));
+            .write_buffer(&self.table, 0, bytemuck::cast_slice(factors));
     }
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
@@ -215,12 +212,14 @@ impl Stage {
             const FORWARD: bool = {};
             const FILTER: bool = {};
             const INVERSE: bool = {};
+            const EVEN: bool = {};
             const IN_PLACE: bool = {};
             const TURN: bool = {};
             ",
             self.forward,
             self.filter,
             self.inverse,
+            self.even,
             self.in_place,
             self.turn,
             threads = each * lines,
@@ -386,7 +385,7 @@ mod twins {
             field: &buffer,
             size,
             padded: plans[0].padded_shape(),
-            quadrants: &plans.each_ref().map(|plan| plan.transfer().quadrant()),
+            factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
             turn: Some(&upload(&device, &turns)),
         };
         let convolution = device
@@ -446,7 +445,7 @@ mod twins {
                     field: &buffer,
                     size,
                     padded: size,
-                    quadrants: &[&kept],
+                    factors: &[&kept],
                     turn: None,
                 };
                 let convolution = device
@@ -475,7 +474,7 @@ mod twins {
             field: &buffer,
             size,
             padded: size,
-            quadrants: &[&quadrant(size, |_, _| 1.0)],
+            factors: &[&quadrant(size, |_, _| 1.0)],
             turn: None,
         };
         let refused = device.guarded(|| Convolution::new(&device, &planes)).err();

@@ -14,7 +14,7 @@ struct Lines {
 @group(0) @binding(1) var<storage, read> roots: array<vec2f>;
 @group(0) @binding(2) var<storage, read> source: array<vec2f>;
 @group(0) @binding(3) var<storage, read_write> result: array<vec2f>;
-// One quadrant of the filter, columns first: it is even in both frequencies.
+// The filter, columns first: one quadrant of it where it is EVEN in both frequencies.
 @group(0) @binding(4) var<storage, read> table: array<vec2f>;
 @group(0) @binding(5) var<storage, read> turn: array<vec2f>;
 
@@ -100,9 +100,11 @@ fn convolve(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     workgroupBarrier();
     if (FORWARD) { transform(t, l, -1.0); }
     if (FILTER) {
-        let near = min(line, lines.lines - min(line, lines.lines));
+        let column = min(line, lines.lines - 1u);
+        let near = min(column, lines.lines - column);
         for (var j = t; j < N; j += EACH) {
-            let at = colour * lines.table_plane + near * (N / 2u + 1u) + min(j, N - j);
+            let even = near * (N / 2u + 1u) + min(j, N - j);
+            let at = colour * lines.table_plane + select(column * N + j, even, EVEN);
             row[j * LINES + l] = times(row[j * LINES + l], table[at]);
         }
         workgroupBarrier();

@@ -2,17 +2,19 @@
 
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Device, copy_mapped};
-use super::encode::{Encoder, MeanPhase, Target};
+use super::encode::{Encoder, Light, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame, Packer, Source};
 use super::peak::Peak;
 use super::{Error, Result};
 use crate::display::Display;
 use crate::encode::{Encoding, Scale, deep};
+use crate::illumination::Illumination;
 use crate::method::{Method, check_display};
 use crate::network::{InputKind, Network};
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
+use crate::wave::zernike::Aberration;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,6 +44,10 @@ pub struct Job {
     pub scale: Scale,
     /// From phases to levels.
     pub response: Response,
+    /// The lasers' light over the modulator, where it is calibrated.
+    pub illumination: Option<Illumination>,
+    /// What corrects the display's aberration, where it is calibrated and one for all depths.
+    pub correction: Option<Aberration>,
     /// How colour comes.
     pub colour: Colour,
     /// How depth comes.
@@ -69,10 +75,35 @@ impl Job {
             encoding,
             scale,
             response,
+            illumination: None,
+            correction: None,
             colour: Colour::Planar,
             depth: Depth::F32,
             chain: ChainOptions::default(),
         }
+    }
+
+    /// The same on the CPU.
+    ///
+    /// # Errors
+    /// What [`crate::Pipeline::new`] and the correction refuse.
+    pub fn on_cpu(&self) -> crate::Result<crate::Pipeline> {
+        let mut pipeline = crate::Pipeline::new(
+            self.height,
+            self.width,
+            self.method.clone(),
+            &self.display,
+            self.encoding.clone(),
+            self.scale,
+            self.response.clone(),
+        )?;
+        if let Some(illumination) = &self.illumination {
+            pipeline = pipeline.with_illumination(illumination.clone());
+        }
+        if let Some(correction) = &self.correction {
+            pipeline = pipeline.with_correction(correction)?;
+        }
+        Ok(pipeline)
     }
 
     pub(super) fn network(&self) -> Result<&Network> {
@@ -149,6 +180,7 @@ pub struct Pipeline {
     mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
     offset: Option<Convolution>,
+    light: Option<Light>,
     encoder: Encoder,
     targets: Vec<Target>,
     slots: Vec<Slot>,
@@ -190,6 +222,15 @@ impl Pipeline {
         if let Encoding::Deep(network) = &job.encoding {
             deep::check(network, &job.display)?;
         }
+        if let Some(shape) = job.response.shape()
+            && shape != size
+        {
+            return Err(crate::Error::Plan(format!(
+                "the per-pixel table is for {}×{} pixels, the hologram is {}×{}; both must be of one size",
+                shape.1, shape.0, size.1, size.0
+            ))
+            .into());
+        }
         device.guarded(|| Self::build(device, job, network, size))
     }
 
@@ -212,27 +253,52 @@ impl Pipeline {
         };
         // The first to read the field turns it.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
-        let offset = match job.display.offset_m() {
-            0.0 => None,
-            offset_m => {
-                let plans = Propagator::for_colours(
-                    size.0,
-                    size.1,
-                    job.display.pitch_m(),
-                    job.display.wavelengths_m(),
-                    offset_m,
-                    Padding::Reach,
-                )?;
-                let quadrants = plans.each_ref().map(|plan| plan.transfer().quadrant());
-                let planes = Planes {
+        let display = &job.display;
+        let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
+        let plans = match (display.offset_m(), &job.correction) {
+            (offset_m, Some(correction)) => Some(Propagator::for_colours_corrected(
+                size.0,
+                size.1,
+                pitch_m,
+                wavelengths_m,
+                offset_m,
+                correction,
+                pitch_m,
+            )?),
+            (0.0, None) => None,
+            (offset_m, None) => Some(Propagator::for_colours(
+                size.0,
+                size.1,
+                pitch_m,
+                wavelengths_m,
+                offset_m,
+                Padding::Reach,
+            )?),
+        };
+        let offset = match &plans {
+            None => None,
+            Some(plans) => Some(Convolution::new(
+                device,
+                &Planes {
                     field: &chain.field,
                     size,
                     padded: plans[0].padded_shape(),
-                    quadrants: &quadrants,
+                    factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
                     turn: turn.take(),
-                };
-                Some(Convolution::new(device, &planes)?)
-            }
+                },
+            )?),
+        };
+        let modulator = (job.display.height(), job.display.width());
+        if job.illumination.is_some()
+            && (!matches!(job.encoding, Encoding::DoublePhase) || size != modulator)
+        {
+            return Err(Error::Refused(
+                "the lasers' light is taken out on the GPU for plain double phase over the whole modulator; the CPU does it for all".into(),
+            ));
+        }
+        let light = match &job.illumination {
+            None => None,
+            Some(light) => Some(Light::new(device, &chain.field, size, light, turn.take())?),
         };
         let targets = (0..FLIGHTS)
             .map(|_| Target::new(device, size))
@@ -257,6 +323,7 @@ impl Pipeline {
             chain,
             mean,
             offset,
+            light,
             encoder,
             targets,
             slots,
@@ -359,7 +426,12 @@ impl Pipeline {
                 offset.run(pass);
             }
         });
-        stage(3, &|pass| self.encoder.run(pass, at));
+        stage(3, &|pass| {
+            if let Some(light) = &self.light {
+                light.run(pass);
+            }
+            self.encoder.run(pass, at);
+        });
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;

@@ -38,7 +38,7 @@ impl Preview {
     /// from it, through a Fourier aperture of `aperture_radius` (1: the whole first order).
     ///
     /// # Errors
-    /// A reach or radius that [`crate::refocus::Refocus::new`] refuses, or what `device` cannot do.
+    /// A table for each pixel, a reach or radius that [`crate::refocus::Refocus::new`] refuses, or what `device` cannot do.
     #[allow(clippy::too_many_arguments)]
     pub fn new(
         device: &Arc<Device>,
@@ -50,6 +50,11 @@ impl Preview {
         aperture_radius: f64,
     ) -> Result<Self> {
         Aperture::new(1, 1, aperture_radius)?;
+        if matches!(response, Response::PerPixel(_)) {
+            return Err(Error::Refused(
+                "what a table for each pixel shows is looked at on the CPU only".into(),
+            ));
+        }
         let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
         let (pitch_m, padding) = (display.pitch_m(), Padding::Reach);
         let padded = padded_shape(height, width, pitch_m, longest, reach_m, padding)?;
@@ -93,7 +98,7 @@ impl Preview {
                 field: &field,
                 size: (height, width),
                 padded,
-                quadrants: &[&quadrant, &quadrant, &quadrant],
+                factors: &[&quadrant, &quadrant, &quadrant],
                 turn: None,
             };
             Ok(Preview {
@@ -180,7 +185,7 @@ impl Preview {
             .into_iter()
             .flat_map(|wavelength_m| {
                 let transfer = Transfer::new(self.padded, pitch_m, wavelength_m, distance_m, pass);
-                transfer.quadrant().to_vec()
+                transfer.factors().to_vec()
             })
             .collect()
     }

@@ -26,18 +26,15 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
         width,
         colour: super::Colour::Planar,
         depth: super::Depth::F32,
+        // A table for each pixel is for one size.
+        response: match &job.response {
+            Response::PerPixel(_) => Response::Linear { bits: 8 },
+            other => other.clone(),
+        },
         ..job.clone()
     };
     let frame = frame()?;
-    let cpu = crate::Pipeline::new(
-        height,
-        width,
-        job.method.clone(),
-        &job.display,
-        job.encoding.clone(),
-        job.scale,
-        job.response.clone(),
-    )?;
+    let cpu = job.on_cpu()?;
     let mut field = vec![Complex32::ZERO; 3 * height * width];
     let mut expected = vec![0; 3 * height * width];
     cpu.process(&frame, &mut field, &mut expected, &mut cpu.scratch())?;

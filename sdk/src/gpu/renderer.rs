@@ -182,15 +182,7 @@ fn trusted(options: &DeviceOptions, job: &Job) -> Result<Pipeline> {
 
 impl Cpu {
     fn new(job: &Job) -> Result<Self> {
-        let pipeline = crate::Pipeline::new(
-            job.height,
-            job.width,
-            job.method.clone(),
-            &job.display,
-            job.encoding.clone(),
-            job.scale,
-            job.response.clone(),
-        )?;
+        let pipeline = job.on_cpu()?;
         Ok(Cpu {
             scratch: pipeline.scratch(),
             pipeline,

@@ -179,10 +179,9 @@ impl Transfer {
         }
     }
 
-    /// One quadrant, (W'/2 + 1, H'/2 + 1), of a transfer function without a correction.
+    /// The factors, one quadrant of them, (W'/2 + 1, H'/2 + 1), where they are even, else (W', H').
     #[cfg(feature = "gpu")]
-    pub(crate) fn quadrant(&self) -> &[Complex32] {
-        debug_assert!(self.even);
+    pub(crate) fn factors(&self) -> &[Complex32] {
         &self.factors
     }
 
