@@ -2,6 +2,7 @@
 //! the laboratory. Flags that several commands share are in [`flags`].
 
 mod bench;
+mod calibrate;
 mod compare;
 mod dataset;
 mod evaluate;
@@ -10,6 +11,7 @@ mod hologram;
 mod occlusion;
 mod refocus;
 mod scene;
+mod seeds;
 mod study;
 mod video;
 
@@ -38,11 +40,14 @@ enum Command {
     Compare(compare::Compare),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
+    Seeds(seeds::Seeds),
     Bench(bench::Bench),
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
     Video(video::Video),
+    #[command(subcommand)]
+    Calibrate(calibrate::Calibrate),
 }
 
 impl Phasefront {
@@ -61,6 +66,7 @@ impl Phasefront {
             Command::Compare(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
+            Command::Seeds(command) => command.run(json),
             Command::Bench(command) => command.run(self.threads.map(usize::from), json),
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
@@ -69,6 +75,7 @@ impl Phasefront {
                 let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
+            Command::Calibrate(command) => command.run(json),
         })
     }
 }

@@ -112,7 +112,7 @@ impl<'a> Method<'a> {
         display: &Display,
     ) -> Result<Self> {
         let layers = match network.input() {
-            InputKind::Rgbd => 1,
+            InputKind::Rgbd | InputKind::RgbdXy => 1,
             InputKind::Ldi { layers } => layers,
             other => {
                 return Err(phasefront::Error::Network(format!(
@@ -125,7 +125,12 @@ impl<'a> Method<'a> {
         let plan = network.plan(size, size)?;
         let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
-            let input = network_input(ldi, layers);
+            let mut input = network_input(ldi, layers);
+            if kind == InputKind::RgbdXy {
+                let place = |at: usize| (at as f32 + 0.5) / size as f32 - 0.5;
+                input.extend((0..size * size).map(|i| place(i % size)));
+                input.extend((0..size * size).map(|i| place(i / size)));
+            }
             let mut output = vec![0.0; plan.channels().1 * size * size];
             plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));
@@ -138,7 +143,7 @@ impl<'a> Method<'a> {
 }
 
 /// The front layer's amplitudes, black where nothing is.
-fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
+pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     let front = &ldi.layers[0];
     Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| {
         match front.depth[(y, x)].is_nan() {

@@ -27,6 +27,16 @@ pub const BUILT_IN: &[Built] = &[
         int8: true,
         onnx: include_bytes!("../../models/rgbd-8-int8.onnx"),
     },
+    Built {
+        layers: 15,
+        int8: false,
+        onnx: include_bytes!("../../models/rgbd-15.onnx"),
+    },
+    Built {
+        layers: 15,
+        int8: true,
+        onnx: include_bytes!("../../models/rgbd-15-int8.onnx"),
+    },
 ];
 
 /// Reads a network that comes along.

@@ -48,7 +48,7 @@ impl MethodPlan {
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         let way = match method {
             Method::Network(network) => {
-                if network.input() != InputKind::Rgbd {
+                if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
                     return Err(Error::Network(format!(
                         "it takes {} planes of a layered depth image; a network for RGB-D frames is needed",
                         network.input().channels()

@@ -56,11 +56,11 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// What suits `display`: planes so near each other that light spreads 5/8 of a pixel from one to the next, as far as
+    /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far as
     /// [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
     pub fn for_display(display: &Display) -> Self {
         let reach = reach_px(display, display.volume_depth_m());
-        let planes = (reach * 8.0 / 5.0).ceil() as usize;
+        let planes = (reach * 4.0 / 3.0).ceil() as usize;
         let planes = planes.clamp(*Self::USUAL_PLANES.start(), *Self::USUAL_PLANES.end());
         Sweep {
             planes,
@@ -193,6 +193,7 @@ impl SweepPlan {
             sweep.tile,
             sweep.planes,
             |k| reach_px(display, way_m(k)).ceil() as usize,
+            |k| reach_px(display, k as f64 * optics[0].step_m).ceil() as usize,
             &filters,
         );
         Ok(SweepPlan {

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, shards
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, seeds, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -38,12 +38,19 @@ def parser():
     p.add_argument("--shards", type=int, help="tasks (default: four for each that runs at a time)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --scenes 4000 --size 384 --planes 1000")
 
+    p = add("seeds", run_seeds, "Make the seeds of a data set by the lab's command; what follows -- goes to `phasefront seeds`.")
+    p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("-o", "--output", required=True, help="folder of the seeds")
+    p.add_argument("--variants", type=int, default=4, help="depths a scene: clean, and degraded ones (default 4)")
+    p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --planes 32")
+
     p = add("stage1", run_stage1, "Train a hologram network on scenes and their holograms.")
     training_flags(p)
     resume_flag(p)
     p.add_argument("--layers", type=int, default=15, help="convolution layers (default 15)")
     p.add_argument("--filters", type=int, default=24, help="filters a layer (default 24)")
-    p.add_argument("--input", default="rgbd", help="rgbd or ldiN, N layers of a layered depth image (default rgbd)")
+    p.add_argument("--input", default="rgbd", help="rgbd, rgbdxy (with the place in the frame), seeded, or ldiN, N layers of a layered depth image (default rgbd)")
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
 
@@ -91,6 +98,7 @@ def machine_flags(p):
 
 def evaluation_flags(p):
     p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("--seeds", help="folder of its seeds, for seeded networks; the sweep alone is judged too")
     p.add_argument("--split", choices=data.SPLITS, default="test")
     p.add_argument("--scenes", type=int, help="only the first so many")
     p.add_argument("--json", metavar="FILE", help="write the figures there too")
@@ -99,6 +107,7 @@ def evaluation_flags(p):
 
 def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
     p.add_argument("--data", required=True, help="folder of the data set")
+    p.add_argument("--seeds", help="folder of its seeds, for seeded networks")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
@@ -128,6 +137,12 @@ def run_shards(args):
     print(f"{args.output}: {made} shards", file=sys.stderr)
 
 
+def run_seeds(args):
+    if args.variants < 2:
+        raise ValueError("seeds need 2 variants a scene at least: clean, and degraded")
+    seeds.make(data.Manifest.read(args.data), args.output, args.variants, passed_on(args), args.phasefront)
+
+
 def passed_on(args):
     """What stands behind --, for `phasefront dataset`."""
     return args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
@@ -138,10 +153,10 @@ def run_stage1(args):
     workers = loop.Workers.start(args.device)
     if resume is not None:
         network = resume.network()
-        train, validation = load(args, network.architecture.ldi_layers)
+        train, validation = load(args, network.architecture)
     else:
         wanted = networks.Architecture(args.layers, args.filters, args.input, args.head)
-        train, validation = load(args, wanted.ldi_layers)
+        train, validation = load(args, wanted)
         network = begun(args, wanted, train)
     task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
     go(task, args, workers, resume)
@@ -155,7 +170,7 @@ def begun(args, wanted, train):
     found = network.architecture
     if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
-    return grow.grow(network, args.layers, quantize.examples(train))
+    return grow.grow(network, args.layers, quantize.examples(train, network.architecture.coordinates))
 
 
 def run_stage2(args):
@@ -170,7 +185,7 @@ def run_stage2(args):
         prefilter = prefilter_network()
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
-    train, validation = load(args, hologram.architecture.ldi_layers)
+    train, validation = load(args, hologram.architecture)
     model = DeepDoublePhase(hologram, prefilter, offset_m, train.display, bf16=not args.f32)
     options = sampling(args)
     if resume is None and args.identity_steps:
@@ -184,11 +199,22 @@ def sampling(args):
     return {name: getattr(args, name) for name in ("batch", "crop", "planes", "degraded", "seed")}
 
 
-def load(args, ldi_layers):
+def load(args, architecture):
     """The training scenes, and a few for the curve's validation."""
+    train = scenes_for(args, "train", {architecture.input}, args.scenes)
+    return train, scenes_for(args, "validation", {architecture.input}, VALIDATION_SCENES)
+
+
+def scenes_for(args, split, inputs, limit):
+    """Scenes with what networks of these inputs read."""
+    if "seeded" in inputs and not args.seeds:
+        raise ValueError("a seeded network reads the sweep's fields: --seeds FOLDER")
+    layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
+    if len(layers) > 1:
+        raise ValueError("networks for different inputs are evaluated one call each")
     manifest = data.Manifest.read(args.data)
-    train = data.Scenes(manifest, "train", ldi_layers, args.scenes)
-    return train, data.Scenes(manifest, "validation", ldi_layers, VALIDATION_SCENES)
+    read = seeds.Seeds.read(args.seeds) if args.seeds else None
+    return data.Scenes(manifest, split, layers.pop(), limit, seeds=read)
 
 
 def resumed(args):
@@ -213,8 +239,8 @@ def go(task, args, workers, resume, folder=None):
 
 def run_quantize(args):
     network, display = checkpoint.load_network(args.network)
-    train, validation = load(args, network.architecture.ldi_layers)
-    ranges = quantize.calibrate(network, quantize.examples(train))
+    train, validation = load(args, network.architecture)
+    ranges = quantize.calibrate(network, quantize.examples(train, network.architecture.coordinates))
     exact, rounded = quantize.figures(network, ranges, validation)
     quantize.report("after training", exact, rounded)
     quantized = quantize.Quantized(network, ranges)
@@ -238,11 +264,12 @@ def run_export(args):
 
 def run_evaluate(args):
     predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
-    layers = {architecture.ldi_layers for _, architecture in predictors.values()} or {1}
-    if len(layers) > 1:
-        raise ValueError("networks for different inputs are evaluated one call each")
-    scenes = data.Scenes(data.Manifest.read(args.data), args.split, layers.pop(), args.scenes)
-    methods = {"RGB as the field": evaluate.rgb_as_field} | {name: predict for name, (predict, _) in predictors.items()}
+    inputs = {architecture.input for _, architecture in predictors.values()} or {"rgbd"}
+    scenes = scenes_for(args, args.split, inputs, args.scenes)
+    methods = {"RGB as the field": evaluate.rgb_as_field}
+    if scenes.seeded:
+        methods["the sweep"] = evaluate.seed_as_field
+    methods |= {name: predict for name, (predict, _) in predictors.items()}
     conditions = {"clean": False} if args.clean_only or scenes.ldi_layers > 1 else {"clean": False, "degraded": True}
     results = {
         name: {c: evaluate.evaluate(predict, scenes, degraded, progress=True) for c, degraded in conditions.items()}
@@ -264,7 +291,7 @@ def run_evaluate_encoding(args):
     if "prefilter" not in last.networks:
         raise ValueError(f"{args.checkpoint}: no checkpoint of stage 2")
     hologram, prefilter = last.network("hologram"), last.network("prefilter")
-    scenes = data.Scenes(data.Manifest.read(args.data), args.split, hologram.architecture.ldi_layers, args.scenes)
+    scenes = scenes_for(args, args.split, {hologram.architecture.input}, args.scenes)
     model = DeepDoublePhase(hologram, prefilter, last.extra["offset_m"], scenes.display).to(args.device)
     results = encoding_figures(model, scenes)
     columns = list(next(iter(results.values())))

@@ -25,17 +25,24 @@ STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoin
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
 
 
-def rgb_as_field(colour, depth):
+def rgb_as_field(colour, depth, seed=None):
     """The front layer's image as amplitude, with phase 0."""
     return torch.complex(colour[:3], torch.zeros_like(colour[:3]))
 
 
-def torch_predictor(network, autocast=False):
-    """colour, depth -> field (3, H, W) by a network in memory."""
-    device = next(network.parameters()).device
+def seed_as_field(colour, depth, seed):
+    """What the sweep alone gives."""
+    return torch.complex(seed[:3], seed[3:])
 
-    def predict(colour, depth):
-        x = network_input(colour, depth)[None].to(device).contiguous(memory_format=torch.channels_last)
+
+def torch_predictor(network, autocast=False):
+    """colour, depth, seed -> field (3, H, W) by a network in memory."""
+    device = next(network.parameters()).device
+    seeded = network.architecture.input == "seeded"
+
+    def predict(colour, depth, seed=None):
+        x = network_input(colour, depth, seed if seeded else None, network.architecture.coordinates)[None]
+        x = x.to(device).contiguous(memory_format=torch.channels_last)
         with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=autocast):
             output = network(x)
         return head_field(network.architecture, output, x)[0]
@@ -56,8 +63,9 @@ def onnx_predictor(path, threads=None):
     name = session.get_inputs()[0].name
     meaning = Architecture(layers=3, input=description["input"], head=description["head"])
 
-    def predict(colour, depth):
-        x = network_input(colour.cpu(), depth.cpu())[None]
+    def predict(colour, depth, seed=None):
+        seed = seed.cpu() if meaning.input == "seeded" else None
+        x = network_input(colour.cpu(), depth.cpu(), seed, meaning.coordinates)[None]
         output = torch.from_numpy(session.run(None, {name: x.numpy()})[0])
         return head_field(meaning, output, x)[0]
 
@@ -87,21 +95,27 @@ def compare(field, truth, display, full=True):
     return figures
 
 
-def scene_depth(scenes, i, degraded):
-    """Colour, depth (degraded or clean) and truth of a scene."""
+def degradation(number, variant=0):
+    """The generator of a scene's degraded depths; variant 0 is the one that scenes are judged on."""
+    return np.random.default_rng([7, number] if variant == 0 else [8, number, variant])
+
+
+def scene_as_seen(scenes, i, degraded):
+    """Colour, depth (degraded or clean), seed (None where there is none) and truth of a scene."""
     colour, depth, truth = scenes.scene(i)
+    if scenes.seeded:
+        return colour, *scenes.variant(i, int(degraded)), truth
     if degraded:
-        rng = np.random.default_rng([7, scenes.numbers[i]])
-        depth = torch.cat([degrade_depth(colour[:3], depth[0], rng)[None], depth[1:]])
-    return colour, depth, truth
+        depth = torch.cat([degrade_depth(colour[:3], depth[0], degradation(scenes.numbers[i]))[None], depth[1:]])
+    return colour, depth, None, truth
 
 
 def evaluate(predict, scenes, degraded=False, full=True, progress=False):
     """{figure: mean, 'worst': …} of a predictor over scenes."""
     rows = []
     for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
-        colour, depth, truth = scene_depth(scenes, i, degraded)
-        rows.append(compare(predict(colour, depth), truth, scenes.display, full))
+        colour, depth, seed, truth = scene_as_seen(scenes, i, degraded)
+        rows.append(compare(predict(colour, depth, seed), truth, scenes.display, full))
     means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
     worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
     return means | {

@@ -22,7 +22,7 @@ from torch import nn
 from torch.nn import functional as F
 
 from .data import network_input
-from .evaluate import evaluate, torch_predictor
+from .evaluate import evaluate, scene_as_seen, torch_predictor
 from .stage1 import Stage1
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
@@ -130,17 +130,17 @@ def calibrate(chain, examples):
                 if i < last - 1 or a.has_skip(last):
                     see(f"relu_{i}", h)
             see("concat", h + inputs[last - 2] if a.has_skip(last) else h, x)
-    if a.input != "field":  # colours and depths have a range of their own, whatever the scenes hold
+    if a.input != "field":  # colours, depths and seeds have a range of their own, whatever the scenes hold
         ranges["input"] = (-0.5, 0.5)
         ranges["concat"] = (min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5))
     return ranges
 
 
-def examples(scenes):
+def examples(scenes, coordinates=False):
     """Network inputs of the first scenes, for calibration."""
     for i in range(min(len(scenes), CALIBRATION_SCENES)):
-        colour, depth, _ = scenes.scene(i)
-        yield network_input(colour, depth)
+        colour, depth, seed, _ = scene_as_seen(scenes, i, degraded=False)
+        yield network_input(colour, depth, seed, coordinates)
 
 
 class QuantizationAware(Stage1):

@@ -14,7 +14,7 @@ from .data import Sampler, network_input
 from .encode import (
     DeepDoublePhase, anti_alias, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
-from .evaluate import compare, scene_depth
+from .evaluate import compare, scene_as_seen
 from .loop import Task
 from .losses import fill_invalid, focal_stack_terms
 from .networks import Architecture, Chain, head_field
@@ -48,7 +48,8 @@ class _OnHolograms(Task):
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
         self.facts = scenes.facts
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank)
+        coordinates = model.hologram.architecture.coordinates
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
 
     def sample(self, step):
         return self.sampler.draw(step)
@@ -110,8 +111,9 @@ def encoding_figures(model, scenes, degraded=False, full=True):
     device = next(model.parameters()).device
     with torch.no_grad():
         for i in range(len(scenes)):
-            colour, depth, truth = scene_depth(scenes, i, degraded)
-            x = network_input(colour, depth)[None].to(device)
+            colour, depth, seed, truth = scene_as_seen(scenes, i, degraded)
+            a = model.hologram.architecture
+            x = network_input(colour, depth, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
             midpoint = model.hologram.field(x)
             there = propagate(midpoint, model.offset_m, model.display)
             methods = {

@@ -29,7 +29,7 @@ pub(crate) struct Evaluate {
     )]
     method: Vec<MethodName>,
     /// Networks to judge, separated by commas: one that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE,…", value_delimiter = ',')]
+    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that networks which come along compute in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]

@@ -38,17 +38,16 @@ trait Lanes: Copy {
     fn minus(self, a: Self, b: Self) -> Self;
 }
 
-/// What a kernel is given: pointers to the run's first centre and its first output, the distance of neighbours, and
-/// the run's length.
+/// What a kernel is given: the source, the run's first output, and its length.
 #[derive(Clone, Copy)]
-struct Run {
+struct Run<'a> {
     source: [*const f32; 2],
-    stride: usize,
+    places: &'a [[usize; 2]],
     out: [*mut f32; 2],
     length: usize,
 }
 
-type Kernel = unsafe fn(&Taps, Run);
+type Kernel = unsafe fn(&Taps, Run<'_>);
 
 /// The filter's kernel for one instruction set.
 #[derive(Clone, Copy)]
@@ -90,31 +89,32 @@ impl Fir {
         self.isa
     }
 
-    /// Filters a run: out\[x] = Σⱼ cⱼ·source\[centre + x + j·stride], |j| < `taps.len()`, for all x of `out`.
+    /// Filters a run: out\[x] = c₀·source\[places\[0]\[0] + x] + Σⱼ cⱼ·(source\[places\[j]\[0] + x] +
+    /// source\[places\[j]\[1] + x]) for all x of `out`. Along a row the places of tap j lie j before and j behind the
+    /// centre; along a column they are wherever those rows are kept.
     ///
     /// # Panics
-    /// If `out` is no whole number of [`RUN`]s, its parts differ in length, or the filter reaches beyond `source`.
+    /// If `out` is no whole number of [`RUN`]s, its parts differ in length, or a place lies beyond `source`.
     pub fn filter(
         &self,
         taps: &Taps,
         source: [&[f32]; 2],
-        centre: usize,
-        stride: usize,
+        places: &[[usize; 2]],
         out: [&mut [f32]; 2],
     ) {
         let length = out[0].len();
-        let reach = taps.len().saturating_sub(1) * stride;
-        assert!(!taps.is_empty() && length.is_multiple_of(RUN) && out[1].len() == length);
-        assert!(centre >= reach);
-        assert!(
-            source
-                .iter()
-                .all(|part| centre + length + reach <= part.len())
-        );
+        assert!(!taps.is_empty() && taps.len() == places.len());
+        assert!(length.is_multiple_of(RUN) && out[1].len() == length);
+        let last = places
+            .as_flattened()
+            .iter()
+            .fold(0, |last, at| last.max(*at))
+            + length;
+        assert!(last <= source[0].len() && last <= source[1].len());
         let [re, im] = out;
         let run = Run {
-            source: source.map(|part| part[centre..].as_ptr()),
-            stride,
+            source: source.map(<[f32]>::as_ptr),
+            places,
             out: [re.as_mut_ptr(), im.as_mut_ptr()],
             length,
         };
@@ -130,9 +130,9 @@ impl Fir {
 /// # Safety
 /// As [`Run`] says; the caller has the instruction set of `V`.
 #[inline(always)]
-unsafe fn filter<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run) {
+unsafe fn filter<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run<'_>) {
     let mut x = 0;
-    // SAFETY: x + the block's length stays within the run, and the run's neighbours are within the source.
+    // SAFETY: x + the block's length stays within the run, and the run's places are within the source.
     unsafe {
         while x + REGISTERS * V::LANES <= run.length {
             block::<V, REGISTERS>(taps, run, x);
@@ -148,27 +148,26 @@ unsafe fn filter<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run) {
 /// # Safety
 /// As [`filter`], for `REGISTERS` registers from `x`.
 #[inline(always)]
-unsafe fn block<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run, x: usize) {
+unsafe fn block<V: Lanes, const REGISTERS: usize>(taps: &Taps, run: Run<'_>, x: usize) {
     let zero = V::splat(0.0);
     let (mut re, mut im) = ([zero; REGISTERS], [zero; REGISTERS]);
     let (c, d) = (V::splat(taps[0][0]), V::splat(taps[0][1]));
+    let centre = run.places[0][0] + x;
     // SAFETY: the caller's.
     unsafe {
-        let (source_re, source_im) = (run.source[0].add(x), run.source[1].add(x));
         for r in 0..REGISTERS {
-            let a = V::load(source_re.add(r * V::LANES));
-            let b = V::load(source_im.add(r * V::LANES));
+            let a = V::load(run.source[0].add(centre + r * V::LANES));
+            let b = V::load(run.source[1].add(centre + r * V::LANES));
             re[r] = a.mul(c).minus(b, d);
             im[r] = b.mul(c).plus(a, d);
         }
-        let mut reach = 0;
-        for tap in &taps[1..] {
-            reach += run.stride;
+        for (tap, place) in taps[1..].iter().zip(&run.places[1..]) {
             let (c, d) = (V::splat(tap[0]), V::splat(tap[1]));
+            let (before, behind) = (place[0] + x, place[1] + x);
             for r in 0..REGISTERS {
-                let (at_re, at_im) = (source_re.add(r * V::LANES), source_im.add(r * V::LANES));
-                let a = V::load(at_re.sub(reach)).add(V::load(at_re.add(reach)));
-                let b = V::load(at_im.sub(reach)).add(V::load(at_im.add(reach)));
+                let (before, behind) = (before + r * V::LANES, behind + r * V::LANES);
+                let a = V::load(run.source[0].add(before)).add(V::load(run.source[0].add(behind)));
+                let b = V::load(run.source[1].add(before)).add(V::load(run.source[1].add(behind)));
                 re[r] = re[r].plus(a, c).minus(b, d);
                 im[r] = im[r].plus(b, c).plus(a, d);
             }

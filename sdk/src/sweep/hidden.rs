@@ -3,7 +3,8 @@
 //! Behind a pixel lies what its deeper neighbours show: the hidden layers continue them under the nearer surface, as
 //! far as light can reach. Of a pixel's left, right, upper and lower side, each is searched for
 //!
-//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`], and
+//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`] that is not itself at the upper
+//!   end of such a jump, as pixels of blurred edges are, and
 //! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
 //!
 //! by a rule from pixel to pixel ([`Found::next`]), so that the search costs the same for any reach. The nearest source
@@ -18,6 +19,8 @@ pub const JUMP: f32 = 0.02;
 pub const NOTHING: u32 = u32::MAX;
 /// Rows of a task.
 const BAND: usize = 32;
+/// Pixels that are passed over together where nothing is hidden.
+const BLOCK: usize = 16;
 /// The depth of no source: not deeper than anything.
 const NO_DEPTH: f32 = -1.0;
 
@@ -46,6 +49,10 @@ impl Found {
         far: NONE,
     };
 
+    fn is_nothing(&self) -> bool {
+        self.near.depth == NO_DEPTH
+    }
+
     /// From the sources of the neighbour on that side, and the neighbour's own depth, to those of a pixel of `depth`:
     /// of the neighbour itself, its near source and its far source, the first that is deep enough and within `reach`,
     /// and the one after it.
@@ -66,6 +73,12 @@ impl Found {
             distance: 1,
         };
         let deeper = |source: Source| source.depth > least;
+        // A neighbour whose own neighbour is yet another jump deeper stands on a blurred edge, on neither surface.
+        let itself = if self.near.distance == 1 {
+            NONE
+        } else {
+            itself
+        };
         Found {
             near: if deeper(itself) {
                 itself
@@ -160,6 +173,8 @@ pub struct HiddenScratch {
 struct Work {
     /// The sources above or below the current row, one a column.
     columns: Vec<Found>,
+    /// Whether any column of each [`BLOCK`] has found something.
+    busy: Vec<bool>,
     /// (BAND, W).
     layers: Vec<Layers>,
 }
@@ -179,6 +194,7 @@ impl Hidden {
         HiddenScratch {
             workers: Workers::new(|| Work {
                 columns: vec![Found::NOTHING; self.width],
+                busy: vec![false; self.width.div_ceil(BLOCK)],
                 layers: vec![Layers::NOTHING; BAND.min(self.height) * self.width],
             }),
         }
@@ -218,40 +234,28 @@ impl Hidden {
         let layers = &mut work.layers[..first.len()];
         layers.fill(Layers::NOTHING);
         for (y, layers) in layers.chunks_exact_mut(width).enumerate() {
-            let depth = row(top + y);
-            let at = (top + y) * width;
-            let mut found = Found::NOTHING;
-            for x in 1..width {
-                found = found.next(depth[x - 1], depth[x], reach);
-                layers[x].add(found, |distance| at + x - distance as usize);
-            }
-            let mut found = Found::NOTHING;
-            for x in (0..width - 1).rev() {
-                found = found.next(depth[x + 1], depth[x], reach);
-                layers[x].add(found, |distance| at + x + distance as usize);
-            }
+            along(row(top + y), layers, (top + y) * width, reach);
         }
         // Sources are at most `reach` rows away, so a walk that begins there with nothing finds the same.
-        work.columns.fill(Found::NOTHING);
+        let (columns, busy) = (&mut work.columns, &mut work.busy);
+        columns.fill(Found::NOTHING);
+        busy.fill(false);
         for y in top.saturating_sub(self.reach) + 1..top + rows {
-            step(&mut work.columns, row(y - 1), row(y), reach);
-            if let Some(y_in_band) = y.checked_sub(top) {
-                let layers = &mut layers[y_in_band * width..][..width];
-                for (x, (layers, found)) in layers.iter_mut().zip(&work.columns).enumerate() {
-                    layers.add(*found, |distance| (y - distance as usize) * width + x);
-                }
-            }
+            let layers = y
+                .checked_sub(top)
+                .map(|y| &mut layers[y * width..][..width]);
+            step(columns, busy, row(y - 1), row(y), reach, layers, |x, d| {
+                (y - d as usize) * width + x
+            });
         }
-        work.columns.fill(Found::NOTHING);
+        columns.fill(Found::NOTHING);
+        busy.fill(false);
         let last = (top + rows - 1 + self.reach).min(self.height - 1);
         for y in (top..last).rev() {
-            step(&mut work.columns, row(y + 1), row(y), reach);
-            if y < top + rows {
-                let layers = &mut layers[(y - top) * width..][..width];
-                for (x, (layers, found)) in layers.iter_mut().zip(&work.columns).enumerate() {
-                    layers.add(*found, |distance| (y + distance as usize) * width + x);
-                }
-            }
+            let layers = (y < top + rows).then(|| &mut layers[(y - top) * width..][..width]);
+            step(columns, busy, row(y + 1), row(y), reach, layers, |x, d| {
+                (y + d as usize) * width + x
+            });
         }
         for ((first, second), layers) in first.iter_mut().zip(second).zip(layers) {
             [*first, *second] = layers.source;
@@ -259,10 +263,98 @@ impl Hidden {
     }
 }
 
-/// A row of columns one pixel on.
-fn step(columns: &mut [Found], neighbours: &[f32], depths: &[f32], reach: u32) {
-    for ((found, neighbour), depth) in columns.iter_mut().zip(neighbours).zip(depths) {
-        *found = found.next(*neighbour, *depth, reach);
+/// The left and the right side of a row's pixels; `at` is the row's place in the frame.
+fn along(depth: &[f32], layers: &mut [Layers], at: usize, reach: u32) {
+    let width = depth.len();
+    let mut x = 1;
+    while x < width {
+        x += calm(&depth[x - 1..width - 1], &depth[x..]);
+        let mut found = Found::NOTHING;
+        while x < width {
+            found = found.next(depth[x - 1], depth[x], reach);
+            if found.is_nothing() {
+                break;
+            }
+            layers[x].add(found, |distance| at + x - distance as usize);
+            x += 1;
+        }
+        x += 1;
+    }
+    // The same from the other end: x counts from the right.
+    let mut x = 1;
+    while x < width {
+        x += calm_back(&depth[1..=width - x], &depth[..width - x]);
+        let mut found = Found::NOTHING;
+        while x < width {
+            let i = width - 1 - x;
+            found = found.next(depth[i + 1], depth[i], reach);
+            if found.is_nothing() {
+                break;
+            }
+            layers[i].add(found, |distance| at + i + distance as usize);
+            x += 1;
+        }
+        x += 1;
+    }
+}
+
+/// How many pixels from the first on have a neighbour that is not a jump deeper.
+fn calm(neighbours: &[f32], depths: &[f32]) -> usize {
+    let whole = (neighbours.chunks_exact(BLOCK))
+        .zip(depths.chunks_exact(BLOCK))
+        .take_while(|(neighbours, depths)| !any_jump(neighbours, depths))
+        .count()
+        * BLOCK;
+    let rest = neighbours[whole..].iter().zip(&depths[whole..]);
+    whole + rest.take_while(|(n, d)| **n <= **d + JUMP).count()
+}
+
+/// As [`calm`], from the last on.
+fn calm_back(neighbours: &[f32], depths: &[f32]) -> usize {
+    let whole = (neighbours.rchunks_exact(BLOCK))
+        .zip(depths.rchunks_exact(BLOCK))
+        .take_while(|(neighbours, depths)| !any_jump(neighbours, depths))
+        .count()
+        * BLOCK;
+    let left = depths.len() - whole;
+    let rest = neighbours[..left].iter().zip(&depths[..left]).rev();
+    whole + rest.take_while(|(n, d)| **n <= **d + JUMP).count()
+}
+
+/// Whether any neighbour is a jump deeper; all are looked at, so that it is a few instructions.
+fn any_jump(neighbours: &[f32], depths: &[f32]) -> bool {
+    let jumps = neighbours.iter().zip(depths).map(|(n, d)| *n > *d + JUMP);
+    jumps.fold(false, |any, jump| any | jump)
+}
+
+/// A row of columns one pixel on; what they found is added to the row's `layers` if it has any. `index(x, distance)` is
+/// a source's pixel. Blocks of columns that have found nothing, and find nothing, are passed over.
+fn step(
+    columns: &mut [Found],
+    busy: &mut [bool],
+    neighbours: &[f32],
+    depths: &[f32],
+    reach: u32,
+    mut layers: Option<&mut [Layers]>,
+    index: impl Fn(usize, u32) -> usize,
+) {
+    for (block, busy) in busy.iter_mut().enumerate() {
+        let x = block * BLOCK..((block + 1) * BLOCK).min(columns.len());
+        let (neighbours, depths) = (&neighbours[x.clone()], &depths[x.clone()]);
+        if !*busy && !any_jump(neighbours, depths) {
+            continue;
+        }
+        let columns = &mut columns[x.clone()];
+        *busy = false;
+        for ((found, neighbour), depth) in columns.iter_mut().zip(neighbours).zip(depths) {
+            *found = found.next(*neighbour, *depth, reach);
+            *busy |= !found.is_nothing();
+        }
+        if let Some(layers) = &mut layers {
+            for ((x, layers), found) in x.clone().zip(&mut layers[x]).zip(columns) {
+                layers.add(*found, |distance| index(x, distance));
+            }
+        }
     }
 }
 

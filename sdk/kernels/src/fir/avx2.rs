@@ -12,7 +12,7 @@ pub(super) fn kernel() -> Option<Kernel> {
 /// # Safety
 /// As [`super::filter`].
 #[target_feature(enable = "avx2,fma")]
-unsafe fn run(taps: &Taps, run: Run) {
+unsafe fn run(taps: &Taps, run: Run<'_>) {
     // SAFETY: the caller's.
     unsafe { super::filter::<__m256, 2>(taps, run) }
 }

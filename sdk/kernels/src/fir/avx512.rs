@@ -12,9 +12,9 @@ pub(super) fn kernel() -> Option<Kernel> {
 /// # Safety
 /// As [`super::filter`].
 #[target_feature(enable = "avx512f")]
-unsafe fn run(taps: &Taps, run: Run) {
+unsafe fn run(taps: &Taps, run: Run<'_>) {
     // SAFETY: the caller's.
-    unsafe { super::filter::<__m512, 2>(taps, run) }
+    unsafe { super::filter::<__m512, 4>(taps, run) }
 }
 
 // SAFETY of all below: they run inside `run` alone, which has the instructions.

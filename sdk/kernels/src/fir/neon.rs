@@ -8,7 +8,7 @@ use std::arch::aarch64::*;
 ///
 /// # Safety
 /// As [`super::filter`].
-pub(super) unsafe fn kernel(taps: &Taps, run: Run) {
+pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
     // SAFETY: the caller's.
     unsafe { super::filter::<float32x4_t, 4>(taps, run) }
 }

@@ -10,7 +10,7 @@ const LANES: usize = 8;
 
 /// # Safety
 /// As [`super::filter`].
-pub(super) unsafe fn kernel(taps: &Taps, run: Run) {
+pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
     // SAFETY: the caller's.
     unsafe { super::filter::<[f32; LANES], 1>(taps, run) }
 }

@@ -1,0 +1,48 @@
+//! `phasefront seeds`: the sweep's fields of a data set's scenes, to train seeded networks on.
+
+use super::flags::progress_bar;
+use super::hologram::sweep_for;
+use clap::Args;
+use phasefront_lab::dataset::Manifest;
+use phasefront_lab::{Result, seeds};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Sweep the scenes of a data set on the depths that the training package has put into a folder
+///
+/// `python -m phasefront_training seeds` makes the depths and calls this. Made again it goes on where it was stopped.
+#[derive(Args)]
+pub(crate) struct Seeds {
+    /// Folder of the data set
+    data: PathBuf,
+    /// Planes of the sweep [default: what suits the display]
+    #[arg(long, value_name = "N")]
+    planes: Option<usize>,
+    /// Taps of the sweep's filter [default: what suits planes and display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
+    /// Folder of the depths; the fields are put there too
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+impl Seeds {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let manifest = Manifest::read(&self.data)?;
+        let sweep = sweep_for(&manifest.display, self.planes, self.taps);
+        let bar = progress_bar(manifest.scenes as u64, "scenes");
+        seeds::make(&manifest, &self.data, &self.output, sweep, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        super::print(
+            json,
+            &json!({"folder": self.output, "planes": sweep.planes, "taps": sweep.taps}),
+            format!(
+                "{}: seeds by {} planes of {} taps",
+                self.output.display(),
+                sweep.planes,
+                sweep.taps
+            ),
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+"""Seeds: the plane sweep's field of each scene, on clean and on degraded depth, as seeded networks see it in use.
+
+A folder beside a data set, made by `python -m phasefront_training seeds`. This package writes the depths,
+`depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are degraded
+(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront seeds` adds to each the fields
+that the SDK computes, `seed_000123.npy`, int16 (V, 6, H, W), real parts, then imaginary parts, times the scale that
+`seeds.json` says.
+"""
+
+import json
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from .data import DataError, read_pair
+from .degrade import degrade_depth
+from .evaluate import degradation
+from .files import replacing
+
+FORMAT = "phasefront-seeds-1"
+
+
+def make(manifest, output, variants, arguments, command="phasefront"):
+    """Makes or completes the seeds of a data set: `variants` depths a scene, then the lab's command for the fields."""
+    output = Path(output)
+    output.mkdir(parents=True, exist_ok=True)
+    for number in range(manifest.table["scenes"]):
+        path = output / f"depth_{number:06d}.npy"
+        if manifest.pair(number).exists() and not path.exists():
+            with replacing(path) as temporary, open(temporary, "wb") as file:
+                np.save(file, _depths(manifest.pair(number), number, variants))
+    call = [command, "seeds", str(manifest.folder), "-o", str(output), *arguments]
+    try:
+        status = subprocess.run(call, check=False).returncode
+    except FileNotFoundError:
+        raise DataError(f"no command '{command}': build the lab (cargo build --release) and name it by --phasefront") from None
+    if status != 0:
+        raise DataError(f"'{' '.join(call)}' ended with status {status}")
+
+
+def _depths(pair, number, variants):
+    colour, depth, _ = read_pair(pair, 1)
+    colour, depth = torch.from_numpy(colour).float() / 255, torch.from_numpy(depth[0]).float()
+    depths = [depth] + [degrade_depth(colour, depth, degradation(number, v)) for v in range(variants - 1)]
+    return (torch.stack(depths).numpy() * 65535).round().astype(np.uint16)
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """A folder of seeds."""
+
+    folder: Path
+    scale: float
+
+    @classmethod
+    def read(cls, folder):
+        path = Path(folder) / "seeds.json"
+        try:
+            table = json.loads(path.read_text())
+        except FileNotFoundError:
+            raise DataError(f"{path}: not there; make the seeds first (python -m phasefront_training seeds)") from None
+        except json.JSONDecodeError as error:
+            raise DataError(f"{path}: not JSON ({error})") from None
+        if table.get("format") != FORMAT:
+            raise DataError(f"{path}: the format is '{table.get('format')}', expected '{FORMAT}'")
+        return cls(Path(folder), float(table["scale"]))
+
+    def of(self, number):
+        """Depths float16 (V, H, W) and fields float16 (V, 6, H, W) of a scene."""
+        depths, fields = (self._array(f"{name}_{number:06d}.npy") for name in ("depth", "seed"))
+        if fields.shape != (len(depths), 6, *depths.shape[1:]):
+            raise DataError(f"{self.folder}: depths {depths.shape} and fields {fields.shape} of scene {number} do not belong together")
+        return (depths / np.float32(65535)).astype(np.float16), (fields / np.float32(self.scale)).astype(np.float16)
+
+    def _array(self, name):
+        try:
+            return np.load(self.folder / name)
+        except (OSError, ValueError, EOFError) as error:
+            raise DataError(f"{self.folder / name}: damaged ({error})") from None
