@@ -229,7 +229,7 @@ mod tests {
                 "{word}: {message:?}"
             );
         }
-        let whole = ColourImage::new(yuv, 7, 9, &[plane(7, 1), plane(15, 4), plane(15, 2)]);
+        let whole = ColourImage::new(yuv, 7, 9, &[plane(7, 1), plane(13, 3), plane(14, 2)]);
         assert!(whole.is_ok());
     }
 }
