@@ -30,7 +30,10 @@ fn simulated() -> SimulatedDisplay {
 }
 
 fn measured(simulated: &SimulatedDisplay, colour: usize) -> Curves {
-    let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
+    measured_by(simulated, colour, Pattern::new(SIZE.0, SIZE.1).unwrap())
+}
+
+fn measured_by(simulated: &SimulatedDisplay, colour: usize, pattern: Pattern) -> Curves {
     let dir = tempfile::tempdir().unwrap();
     let shoot = |k: usize| {
         Ok(simulated
@@ -81,14 +84,15 @@ fn per_pixel_calibration_brings_phases_and_black_back() {
 
 #[test]
 fn ranges_under_two_pi_and_under_pi_are_handled_and_reported() {
-    for (range, under_pi) in [(0.8, false), (0.45, true)] {
+    for (range, under_pi, dark) in [(0.8, false, 128), (0.45, true, 255)] {
         let simulated = simulated();
         let short = simulated_display::Curves {
             range: [range; 3],
             ..simulated.curves().clone()
         };
         let simulated = simulated.with_curves(short);
-        let curves = measured(&simulated, 1);
+        let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap().with_dark(dark);
+        let curves = measured_by(&simulated, 1, pattern);
         let ranges = curves.ranges();
         let median = f64::from(ranges[ranges.len() / 2]);
         assert!((median - range).abs() < 0.04 * range, "{range}: {median}");

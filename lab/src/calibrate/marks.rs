@@ -12,6 +12,8 @@ use rayon::prelude::*;
 
 /// What a part of the local light a pixel must be below to be part of a dark square.
 const DARKER: f32 = 0.55;
+/// How many times as bright as a dark square its frame is, at least.
+const FRAMED: f32 = 1.4;
 /// What a part of the brightest light must be near for a place to be on the modulator at all.
 const LIT: f32 = 0.06;
 
@@ -29,7 +31,7 @@ impl std::fmt::Display for NoMarks {
         match self {
             NoMarks::Count(n) => write!(
                 f,
-                "shows {n} of the 4 corner marks; focus on the modulator, light it, and have all of it in the picture"
+                "shows {n} of the 4 corner marks; focus on the modulator, light it, have all of it in the picture; where the marks are not dark, write patterns with another --dark"
             ),
             NoMarks::Turned(corner) => write!(
                 f,
@@ -209,6 +211,7 @@ fn find_marks(
             let inside =
                 spot.x[0] > 0 && spot.y[0] > 0 && spot.x[1] + 1 < width && spot.y[1] + 1 < height;
             inside
+                && is_framed(spot, &small, width, floor)
                 && (0.3 * side..1.4 * side).contains(&w.max(h))
                 && w.min(h) > 0.6 * w.max(h)
                 && spot.area as f64 > 0.5 * w * h
@@ -240,6 +243,28 @@ fn find_marks(
         ));
     }
     Ok(marks.map(|spot| centre(photograph, spot, factor)))
+}
+
+/// Whether a spot has a bright frame: a quarter of it beyond the middle of each of its sides it is brighter than in it, by far.
+fn is_framed(spot: &Spot, small: &[f32], width: usize, floor: f32) -> bool {
+    let height = small.len() / width;
+    let (w, h) = (spot.x[1] + 1 - spot.x[0], spot.y[1] + 1 - spot.y[0]);
+    let lines = spot.y[0]..=spot.y[1];
+    let sum: f32 = lines
+        .flat_map(|y| &small[y * width + spot.x[0]..=y * width + spot.x[1]])
+        .sum();
+    let within = sum / (w * h) as f32 - floor;
+    let (x, y) = (spot.x[0] + w / 2, spot.y[0] + h / 2);
+    let beyond = |at: usize, size: usize| at.checked_sub(size.div_ceil(4));
+    let (Some(left), Some(top)) = (beyond(spot.x[0], w), beyond(spot.y[0], h)) else {
+        return false;
+    };
+    let (right, bottom) = (spot.x[1] + w.div_ceil(4), spot.y[1] + h.div_ceil(4));
+    right < width
+        && bottom < height
+        && [(y, left), (y, right), (top, x), (bottom, x)]
+            .into_iter()
+            .all(|(y, x)| small[y * width + x] - floor > FRAMED * within)
 }
 
 /// The centre of a dark square, weighted by how dark its pixels are, in the full photograph.

@@ -5,7 +5,8 @@
 //! Every pattern carries what tells where it lies in a photograph and which one it is, whatever k: in each corner a
 //! dark square in a bright frame (the one at the top left has a bright hole), and beside the top left one
 //! ten dark or bright cells: one always dark, the eight bits of k (dark is 1, the highest first), and their parity.
-//! Dark is the checkerboard of levels 0 and 128, which any modulator of some 2π shows dark enough.
+//! Dark is the checkerboard of level 0 and one that turns by about π: [`DARK`] does from 0.8·2π to 1.5·2π, another must be
+//! given for ranges beyond.
 
 use crate::error::{Error, Result};
 use ndarray::Array2;
@@ -13,7 +14,7 @@ use ndarray::Array2;
 /// How many patterns there are: one a level.
 pub const PATTERNS: usize = 256;
 /// The level that is dark beside 0, before anything is calibrated.
-const DARK: u8 = 128;
+pub const DARK: u8 = 105;
 /// Cells of the code: one dark, eight bits, parity.
 pub const CELLS: usize = 10;
 /// Pixels around marks and code whose light is mixed with theirs.
@@ -26,6 +27,7 @@ pub struct Pattern {
     width: usize,
     /// Side of a mark with its bright frame, pixels, a multiple of 8; the dark square has half of it.
     mark: usize,
+    dark: u8,
 }
 
 impl Pattern {
@@ -44,7 +46,13 @@ impl Pattern {
             height,
             width,
             mark,
+            dark: DARK,
         })
+    }
+
+    /// The same with `dark` for the level that is dark beside 0.
+    pub fn with_dark(self, dark: u8) -> Self {
+        Pattern { dark, ..self }
     }
 
     /// (H, W).
@@ -110,7 +118,7 @@ impl Pattern {
         let active = (x + y).is_multiple_of(2);
         let shown = match self.fixed(k, y, x) {
             None => k,
-            Some(true) => DARK,
+            Some(true) => self.dark,
             Some(false) => 0,
         };
         if active { shown } else { 0 }

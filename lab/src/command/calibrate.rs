@@ -5,7 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
 use phasefront::Display;
 use phasefront_lab::calibrate::lut::{self, Refusal};
-use phasefront_lab::calibrate::pattern::{PATTERNS, Pattern};
+use phasefront_lab::calibrate::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_lab::calibrate::photograph::Photograph;
 use phasefront_lab::calibrate::rehearse::{self, Rehearsal};
 use phasefront_lab::calibrate::spot::{self, Search, TRIALS};
@@ -47,6 +47,9 @@ pub(crate) struct Lut {
     /// Write pattern_000.png to pattern_255.png there
     #[arg(long, value_name = "DIR", group = "step", conflicts_with = "output")]
     patterns: Option<PathBuf>,
+    /// Level that the marks of --patterns are dark by: one that turns the phase by about π [default: 105]
+    #[arg(long, value_name = "LEVEL", requires = "patterns")]
+    dark: Option<u8>,
     /// Folder with the folders red, green and blue of photographs
     #[arg(long, value_name = "DIR", group = "step", requires = "output")]
     captures: Option<PathBuf>,
@@ -71,7 +74,10 @@ impl Lut {
         let display = self.display.read()?.display;
         let pattern = Pattern::new(display.height(), display.width())?;
         match (&self.patterns, &self.captures, &self.output) {
-            (Some(folder), ..) => self.write_patterns(json, &pattern, folder),
+            (Some(folder), ..) => {
+                let pattern = pattern.with_dark(self.dark.unwrap_or(DARK));
+                self.write_patterns(json, &pattern, folder)
+            }
             (None, Some(captures), Some(output)) => self.measure(json, &pattern, captures, output),
             _ => Err(Error::Input("give --patterns, or --captures and -o".into())),
         }
