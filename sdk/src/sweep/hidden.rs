@@ -236,11 +236,13 @@ impl Hidden {
         for (y, layers) in layers.chunks_exact_mut(width).enumerate() {
             along(row(top + y), layers, (top + y) * width, reach);
         }
-        // Sources are at most `reach` rows away, so a walk that begins there with nothing finds the same.
+        // Sources are at most `reach` rows away, and whether one stands on a blurred edge the row behind it tells: a walk
+        // that begins there with nothing finds the same.
+        let before = self.reach + 1;
         let (columns, busy) = (&mut work.columns, &mut work.busy);
         columns.fill(Found::NOTHING);
         busy.fill(false);
-        for y in top.saturating_sub(self.reach) + 1..top + rows {
+        for y in top.saturating_sub(before) + 1..top + rows {
             let layers = y
                 .checked_sub(top)
                 .map(|y| &mut layers[y * width..][..width]);
@@ -250,7 +252,7 @@ impl Hidden {
         }
         columns.fill(Found::NOTHING);
         busy.fill(false);
-        let last = (top + rows - 1 + self.reach).min(self.height - 1);
+        let last = (top + rows - 1 + before).min(self.height - 1);
         for y in (top..last).rev() {
             let layers = (y < top + rows).then(|| &mut layers[(y - top) * width..][..width]);
             step(columns, busy, row(y + 1), row(y), reach, layers, |x, d| {
@@ -358,7 +360,7 @@ fn step(
     }
 }
 
-/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from `reach` pixels away.
+/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from a pixel beyond `reach`.
 pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Vec<u32> {
     let size = height * width;
     assert_eq!(depth.len(), size);
@@ -376,7 +378,7 @@ pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Ve
                 let at =
                     |distance: usize| (y * width + x).wrapping_add_signed(step * distance as isize);
                 let mut found = Found::NOTHING;
-                for distance in (0..room.min(reach)).rev() {
+                for distance in (0..room.min(reach + 1)).rev() {
                     found = found.next(depth[at(distance + 1)], depth[at(distance)], reach as u32);
                 }
                 layers.add(found, |distance| at(distance as usize));
