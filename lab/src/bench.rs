@@ -10,6 +10,7 @@ use phasefront::slm::Response;
 use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long the peak is measured.
@@ -19,7 +20,7 @@ const PEAK_TIME: Duration = Duration::from_millis(200);
 #[derive(Debug, Clone)]
 pub struct Case<'a> {
     /// The network.
-    pub network: &'a Network,
+    pub network: &'a Arc<Network>,
     /// Width and height, pixels.
     pub size: (usize, usize),
     /// Threads of the pool.
@@ -106,7 +107,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
     let pipeline = Pipeline::new(
         height,
         width,
-        Method::Network(network),
+        Method::Network(network.clone()),
         display,
         Encoding::ANTI_ALIAS,
         Scale::Fixed(1.0),

@@ -12,9 +12,11 @@ mod refocus;
 mod scene;
 mod seeds;
 mod study;
+mod video;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
+use std::num::NonZeroUsize;
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]
@@ -42,6 +44,7 @@ enum Command {
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
+    Video(video::Video),
 }
 
 impl Phasefront {
@@ -65,6 +68,10 @@ impl Phasefront {
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),
+            Command::Video(command) => {
+                let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
+                command.run(threads, json)
+            }
         })
     }
 }

@@ -123,14 +123,14 @@ impl<'a> Method<'a> {
         };
         check_display(network, display)?;
         let plan = network.plan(size, size)?;
-        let head = network.head();
+        let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
             let input = network_input(ldi, layers);
             let mut output = vec![0.0; plan.channels().1 * size * size];
             plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            head.field(&output, &input, values)?;
+            head.field(kind, &output, &input, values)?;
             remove_mean_phase(values);
             Ok(field)
         }))
@@ -180,7 +180,7 @@ fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
 }
 
 /// How a field is shown.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,
@@ -289,7 +289,7 @@ impl Viewer {
     ) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
-        let refocus = match shown.encoding {
+        let refocus = match shown.encoding.clone() {
             None => &self.complex,
             Some(encoding) => {
                 let response = Response::linear(self.display.bits())?;

@@ -122,6 +122,16 @@ pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
     }))
 }
 
+/// The (H, W) of an image and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is left out.
+///
+/// # Errors
+/// A file that is missing, cut short, or not a PNG or JPEG.
+pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
+    let image = open_image(path)?.into_rgb8();
+    let shape = (image.height() as usize, image.width() as usize);
+    Ok((shape, image.into_raw()))
+}
+
 /// The numbers of a depth image, (H, W), as they stand in a grey PNG of 8 or 16 bits or a 2D `.npy`. For
 /// `normalized` depth whole numbers are divided by the largest their type holds.
 ///
@@ -206,6 +216,22 @@ pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
 fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
     let pixels = stack.permuted_axes([1, 2, 0]);
     pixels.iter().map(|v| byte(*v)).collect()
+}
+
+/// Writes an 8-bit RGBA PNG of rows of `rgba`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Result<()> {
+    write_atomically(path, |file| {
+        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        let other = std::io::Error::other;
+        let mut writer = encoder.write_header().map_err(other)?;
+        writer.write_image_data(rgba).map_err(other)?;
+        writer.finish().map_err(other)
+    })
 }
 
 fn write_png(

@@ -3,9 +3,11 @@
 pub mod bench;
 pub mod corrected;
 pub mod dataset;
+pub mod depth_study;
 pub mod error;
 pub mod evaluate;
 pub mod files;
+pub mod flicker;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
@@ -18,5 +20,6 @@ pub mod scene;
 pub mod seeds;
 pub mod sm_lbm;
 pub mod study;
+pub mod video;
 
 pub use error::{Error, Result};

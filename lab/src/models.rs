@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use phasefront::Network;
 use std::path::Path;
+use std::sync::Arc;
 
 /// A network of `models/` that the command holds.
 #[derive(Debug)]
@@ -26,14 +27,24 @@ pub const BUILT_IN: &[Built] = &[
         int8: true,
         onnx: include_bytes!("../../models/rgbd-8-int8.onnx"),
     },
+    Built {
+        layers: 15,
+        int8: false,
+        onnx: include_bytes!("../../models/rgbd-15.onnx"),
+    },
+    Built {
+        layers: 15,
+        int8: true,
+        onnx: include_bytes!("../../models/rgbd-15-int8.onnx"),
+    },
 ];
 
 /// Reads a network that comes along.
 ///
 /// # Errors
 /// Never, for the files in `models/` are tested.
-pub fn built_in(built: &Built) -> Result<Network> {
-    Ok(Network::from_onnx(built.onnx)?)
+pub fn built_in(built: &Built) -> Result<Arc<Network>> {
+    Ok(Arc::new(Network::from_onnx(built.onnx)?))
 }
 
 /// The network called `name`: its number of layers, where one comes along in that precision, or an ONNX
@@ -41,7 +52,7 @@ pub fn built_in(built: &Built) -> Result<Network> {
 ///
 /// # Errors
 /// A name that is neither, or a file that is no hologram network.
-pub fn network(name: &str, int8: bool) -> Result<Network> {
+pub fn network(name: &str, int8: bool) -> Result<Arc<Network>> {
     let named = |built: &&Built| built.layers.to_string() == name && built.int8 == int8;
     if let Some(built) = BUILT_IN.iter().find(named) {
         return built_in(built);
@@ -61,5 +72,6 @@ pub fn network(name: &str, int8: bool) -> Result<Network> {
             ),
         )
     })?;
-    Network::from_onnx(&bytes).map_err(|e| Error::file(path, e))
+    let network = Network::from_onnx(&bytes).map_err(|e| Error::file(path, e))?;
+    Ok(Arc::new(network))
 }

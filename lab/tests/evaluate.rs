@@ -198,7 +198,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
             SIZE,
             SIZE,
             display,
-            shown.encoding.unwrap(),
+            shown.encoding.clone().unwrap(),
             Scale::Max,
             response,
         )

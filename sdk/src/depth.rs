@@ -1,6 +1,15 @@
-//! Depth as sensors and files give it, to normalized depth: units, range, holes.
+//! Depth as sensors and files give it, to normalized depth: units, range, holes; and the depth images of phones,
+//! aligned with colour, steadied over time, and refined to the display's resolution.
 //!
 //! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
+
+pub mod align;
+pub mod image;
+pub mod range;
+pub mod refine;
+pub mod refine_reference;
+pub mod steady;
+pub mod stream;
 
 use crate::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
@@ -137,43 +146,47 @@ fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
 /// # Errors
 /// If nothing but NaN is there.
 pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
-    let (height, width) = depth.dim();
     let holes = depth.iter().filter(|v| v.is_nan()).count();
     if holes == depth.len() {
         return Err(Error::Frame(
             "depth has no reading at all; at least one pixel must be valid".into(),
         ));
     }
-    if holes == 0 {
-        return Ok(0);
+    if holes > 0 {
+        let width = depth.dim().1;
+        let mut filled: Vec<f32> = depth.iter().copied().collect();
+        fill_from_nearest(&mut filled, width, &mut Vec::new(), &mut Vec::new());
+        depth.iter_mut().zip(filled).for_each(|(to, v)| *to = v);
     }
+    Ok(holes)
+}
+
+/// Gives each NaN of `depth`, rows of `width`, the value of a nearest reading in steps along rows and columns.
+/// `front` and `next` are working memory. There must be a reading.
+fn fill_from_nearest(depth: &mut [f32], width: usize, front: &mut Vec<u32>, next: &mut Vec<u32>) {
     // A wave that starts at all readings at once reaches every hole from a nearest one.
-    let mut front: Vec<(usize, usize)> = depth
-        .indexed_iter()
-        .filter(|(_, v)| !v.is_nan())
-        .map(|(at, _)| at)
-        .collect();
-    let mut next = Vec::new();
+    front.clear();
+    front.extend((0..depth.len() as u32).filter(|i| !depth[*i as usize].is_nan()));
     while !front.is_empty() {
-        for &(y, x) in &front {
-            let value = depth[(y, x)];
+        next.clear();
+        for &i in front.iter() {
+            let i = i as usize;
+            let x = i % width;
             let neighbours = [
-                (y.wrapping_sub(1), x),
-                (y + 1, x),
-                (y, x.wrapping_sub(1)),
-                (y, x + 1),
+                (i >= width).then(|| i - width),
+                (i + width < depth.len()).then(|| i + width),
+                (x > 0).then(|| i - 1),
+                (x + 1 < width).then(|| i + 1),
             ];
-            for (ny, nx) in neighbours {
-                if ny < height && nx < width && depth[(ny, nx)].is_nan() {
-                    depth[(ny, nx)] = value;
-                    next.push((ny, nx));
+            for n in neighbours.into_iter().flatten() {
+                if depth[n].is_nan() {
+                    depth[n] = depth[i];
+                    next.push(n as u32);
                 }
             }
         }
-        front.clear();
-        std::mem::swap(&mut front, &mut next);
+        std::mem::swap(front, next);
     }
-    Ok(holes)
 }
 
 #[cfg(test)]

@@ -155,8 +155,8 @@ impl Display {
                 self.offset_m * 1e3
             ));
         }
-        if !(1..=8).contains(&self.bits) {
-            return refuse(format!("bits is {}; it must lie in 1..=8", self.bits));
+        if !(1..=10).contains(&self.bits) {
+            return refuse(format!("bits is {}; it must lie in 1..=10", self.bits));
         }
         Ok(())
     }
@@ -191,7 +191,7 @@ impl Display {
         self.offset_m
     }
 
-    /// Bits of a modulator level, 1 to 8.
+    /// Bits of a modulator level, 1 to 10; over 8 only sessions make.
     pub fn bits(&self) -> u32 {
         self.bits
     }
@@ -202,6 +202,20 @@ impl Display {
     /// An offset that is not finite or beyond 10 m.
     pub fn with_offset_m(self, offset_m: f64) -> Result<Self> {
         let display = Display { offset_m, ..self };
+        display.check()?;
+        Ok(display)
+    }
+
+    /// The same display with (`height`, `width`) pixels.
+    ///
+    /// # Errors
+    /// A side outside 1..=65536.
+    pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
+        let display = Display {
+            height,
+            width,
+            ..self
+        };
         display.check()?;
         Ok(display)
     }
@@ -236,7 +250,7 @@ mod tests {
             ("wavelengths_nm = [638, 520, -450]", "wavelength"),
             ("volume_depth_mm = 0", "volume_depth_mm"),
             ("offset_mm = inf", "offset_mm"),
-            ("bits = 9", "bits"),
+            ("bits = 11", "bits"),
             ("pich_um = 8", "pich_um"),
             ("width = ", "line 1"),
         ] {

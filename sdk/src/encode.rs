@@ -6,17 +6,22 @@
 
 pub mod anti_alias;
 pub mod band_limit;
+pub mod deep;
 pub mod double_phase;
 
 use crate::error::{Error, Result};
+use crate::network::Network;
 use crate::slm::Response;
 use crate::wave::fft::Scratch;
 use anti_alias::{AntiAlias, AntiAliasScratch};
 use band_limit::BandLimit;
+use deep::{Deep, DeepScratch};
 use num_complex::Complex32;
+use std::sync::Arc;
 
 /// A way from a field to phases.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Encoding {
     /// Double phase on the field as it is, Eq. 7.
     DoublePhase,
@@ -32,6 +37,8 @@ pub enum Encoding {
         /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel.
         k: f32,
     },
+    /// DDPM: a pre-filter network first, trained for the modulator's offset.
+    Deep(Arc<Network>),
 }
 
 impl Encoding {
@@ -64,6 +71,7 @@ enum Prefilter {
     None,
     AntiAlias(AntiAlias),
     BandLimit(BandLimit),
+    Deep(Deep),
 }
 
 /// Working memory of an [`Encoder`] for one call at a time.
@@ -72,13 +80,14 @@ pub struct EncoderScratch(Option<PrefilterScratch>);
 enum PrefilterScratch {
     AntiAlias(AntiAliasScratch),
     Spectrum(Scratch),
+    Deep(DeepScratch),
 }
 
 impl Encoder {
     /// Plans the encoding of stacks of (`height`, `width`) planes.
     ///
     /// # Errors
-    /// An empty plane or a parameter out of its range.
+    /// An empty plane, a parameter out of its range, or a network that is no pre-filter.
     pub fn new(height: usize, width: usize, encoding: Encoding) -> Result<Self> {
         if height == 0 || width == 0 {
             return Err(Error::Plan(format!(
@@ -91,6 +100,7 @@ impl Encoder {
                 Prefilter::AntiAlias(AntiAlias::new(sigma, width)?)
             }
             Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, k)?),
+            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, &network)?),
         };
         Ok(Encoder {
             height,
@@ -107,6 +117,7 @@ impl Encoder {
                 Some(PrefilterScratch::AntiAlias(plan.scratch(self.width)))
             }
             Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
+            Prefilter::Deep(plan) => Some(PrefilterScratch::Deep(plan.scratch())),
         })
     }
 
@@ -151,6 +162,11 @@ impl Encoder {
     fn filter(&self, field: &mut [Complex32], scale: Scale, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), 3 * plane);
+        if let (Prefilter::Deep(plan), Some(PrefilterScratch::Deep(scratch))) =
+            (&self.prefilter, &mut scratch.0)
+        {
+            plan.filter(field, scratch);
+        }
         for plane in field.chunks_exact_mut(plane) {
             match (&self.prefilter, &mut scratch.0) {
                 (Prefilter::AntiAlias(plan), Some(PrefilterScratch::AntiAlias(rows))) => {

@@ -16,6 +16,22 @@ pub enum Error {
     /// An ONNX file that is not a hologram network.
     #[error("network: {0}")]
     Network(String),
+    /// A call that a session cannot answer in its mode or state.
+    #[error("session: {0}")]
+    Session(String),
+    /// A frame that is not later than the last one. It is refused; what follows is not harmed.
+    #[error(
+        "timestamp: {given_ns} ns is not after {last_ns} ns, the last one taken; timestamps must rise, or the session be reset"
+    )]
+    Timestamp {
+        /// The frame's.
+        given_ns: u64,
+        /// The last one that was taken.
+        last_ns: u64,
+    },
+    /// A panic inside; a fault of this library. The frame is lost, the session goes on.
+    #[error("internal error: {0}; please report it")]
+    Internal(String),
 }
 
 /// The core's result.

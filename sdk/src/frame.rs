@@ -1,8 +1,25 @@
-//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth.
+//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth; and the colour
+//! images of cameras that become it.
 //!
 //! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
 
+mod camera;
+mod colour;
+mod convert;
+mod plane;
+pub mod reference;
+mod resample;
+
+pub use camera::{Alignment, CameraFrame};
+pub(crate) use colour::check_size;
+pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
+pub use convert::{ColourPlan, ColourScratch};
+pub use plane::{Orientation, Plane, Rotation};
+pub(crate) use resample::Axis;
+pub use resample::Crop;
+
 use crate::error::{Error, Result};
+use crate::network::Source;
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 
 /// Colour as amplitude in \[0, 1], (3, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest.
@@ -46,10 +63,31 @@ impl RgbdFrame {
                 )));
             }
         }
+        // Copied only where values do not lie row by row already.
         Ok(RgbdFrame {
-            rgb: rgb.as_standard_layout().into_owned(),
-            depth: depth.as_standard_layout().into_owned(),
+            rgb: match rgb.is_standard_layout() {
+                true => rgb,
+                false => rgb.as_standard_layout().into_owned(),
+            },
+            depth: match depth.is_standard_layout() {
+                true => depth,
+                false => depth.as_standard_layout().into_owned(),
+            },
         })
+    }
+
+    /// A black frame at the far end of the volume.
+    pub(crate) fn black((height, width): (usize, usize)) -> Self {
+        RgbdFrame {
+            rgb: Array3::zeros((3, height, width)),
+            depth: Array2::ones((height, width)),
+        }
+    }
+
+    /// Colour and depth to write into; what is written must be in \[0, 1].
+    pub(crate) fn planes_mut(&mut self) -> (&mut [f32], &mut [f32]) {
+        let planes = self.rgb.as_slice_mut().zip(self.depth.as_slice_mut());
+        planes.expect("both are made in standard layout")
     }
 
     /// (H, W).
@@ -88,15 +126,19 @@ impl RgbdFrame {
         }
         Ok(())
     }
+}
 
-    /// The network's input, (4, H, W): red, green, blue, depth, each minus ½.
-    ///
-    /// # Panics
-    /// If `input` has not 4·H·W values.
-    pub fn network_input(&self, input: &mut [f32]) {
-        assert_eq!(input.len(), 4 * self.depth.len());
-        let planes = self.rgb.iter().chain(&self.depth);
-        for (to, from) in input.iter_mut().zip(planes) {
+/// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½.
+impl Source for RgbdFrame {
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
+        let (height, width) = self.shape();
+        let (values, plane) = match plane {
+            3 => (self.depth.as_slice(), 0),
+            colour => (self.rgb.as_slice(), colour),
+        };
+        let values = values.expect("rows in order, by construction");
+        let at = (plane * height + row) * width + from;
+        for (to, from) in into.iter_mut().zip(&values[at..]) {
             *to = from - 0.5;
         }
     }
@@ -125,12 +167,19 @@ mod tests {
     }
 
     #[test]
-    fn network_input_is_planar_and_centred() {
-        let rgb = Array3::from_shape_fn((3, 2, 2), |(c, y, x)| (c * 4 + y * 2 + x) as f32 / 16.0);
-        let frame = RgbdFrame::new(rgb, Array2::ones((2, 2))).unwrap();
-        let mut input = vec![0.0; 16];
-        frame.network_input(&mut input);
-        assert_eq!(input[5], 5.0 / 16.0 - 0.5);
-        assert_eq!(input[12..], [0.5; 4]);
+    fn a_network_reads_rows_of_centred_planes() {
+        let rgb = Array3::from_shape_fn((3, 2, 4), |(c, y, x)| (c * 8 + y * 4 + x) as f32 / 24.0);
+        let depth = Array2::from_shape_fn((2, 4), |(y, x)| (y * 4 + x) as f32 / 8.0);
+        // The same values in another order in memory.
+        let mut turned = Array3::zeros((4, 2, 3)).reversed_axes();
+        turned.assign(&rgb);
+        for rgb in [rgb, turned] {
+            let frame = RgbdFrame::new(rgb, depth.clone()).unwrap();
+            let mut row = [0.0; 2];
+            frame.read(1, 1, 2, &mut row);
+            assert_eq!(row, [14.0 / 24.0 - 0.5, 15.0 / 24.0 - 0.5]);
+            frame.read(3, 1, 0, &mut row);
+            assert_eq!(row, [0.0, 0.125]);
+        }
     }
 }

@@ -15,8 +15,11 @@ pub mod frame;
 pub mod method;
 pub mod modulator;
 pub mod network;
+pub mod output;
 pub mod pipeline;
+pub mod preview;
 pub mod refocus;
+pub mod session;
 pub mod slm;
 pub mod sweep;
 pub mod wave;
@@ -28,6 +31,7 @@ pub use method::Method;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};
 pub use pipeline::Pipeline;
+pub use session::Session;
 pub use sweep::Sweep;
 
 /// The README's code compiles.

@@ -3,19 +3,20 @@
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
-use crate::network::{Engine, Head, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
 use crate::sweep::{self, Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
+use std::sync::Arc;
 
 /// How far a display may lie from what a network was trained for, relative.
 const DISPLAY_TOLERANCE: f64 = 0.02;
 
 /// What makes the hologram.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone)]
 #[non_exhaustive]
-pub enum Method<'a> {
+pub enum Method {
     /// A trained network for RGB-D frames.
-    Network(&'a Network),
+    Network(Arc<Network>),
     /// The plane sweep, for any display.
     Sweep(Sweep),
 }
@@ -27,7 +28,7 @@ pub struct MethodPlan {
 }
 
 enum Way {
-    Network { plan: NetworkPlan, head: Head },
+    Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
 }
 
@@ -35,11 +36,7 @@ enum Way {
 pub struct MethodScratch(Scratch);
 
 enum Scratch {
-    Network {
-        input: Vec<f32>,
-        output: Vec<f32>,
-        network: NetworkScratch,
-    },
+    Network(NetworkScratch),
     Sweep(SweepScratch),
 }
 
@@ -57,11 +54,8 @@ impl MethodPlan {
                         network.input().channels()
                     )));
                 }
-                check_display(network, display)?;
-                Way::Network {
-                    plan: network.plan(height, width)?,
-                    head: network.head(),
-                }
+                check_display(&network, display)?;
+                Way::Network(Box::new(network.plan(height, width)?))
             }
             Method::Sweep(sweep) => {
                 let offset_m = display.offset_m();
@@ -89,7 +83,7 @@ impl MethodPlan {
     /// far away, all else ends at the midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.way {
-            Way::Network { .. } => 0.0,
+            Way::Network(_) => 0.0,
             Way::Sweep(plan) => plan.z_m(),
         }
     }
@@ -97,23 +91,15 @@ impl MethodPlan {
     /// What runs the network, and why; None for a method without one.
     pub fn engine(&self) -> Option<&Engine> {
         match &self.way {
-            Way::Network { plan, .. } => Some(plan.engine()),
+            Way::Network(plan) => Some(plan.engine()),
             Way::Sweep(_) => None,
         }
     }
 
     /// Working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
-        let size = self.shape.0 * self.shape.1;
         MethodScratch(match &self.way {
-            Way::Network { plan, .. } => {
-                let (inputs, outputs) = plan.channels();
-                Scratch::Network {
-                    input: vec![0.0; inputs * size],
-                    output: vec![0.0; outputs * size],
-                    network: plan.scratch(),
-                }
-            }
+            Way::Network(plan) => Scratch::Network(plan.scratch()),
             Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
         })
     }
@@ -121,10 +107,10 @@ impl MethodPlan {
     /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (3, H, W).
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// A frame of another shape, or a `field` that has not 3·H·W values.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values or `scratch` is another plan's.
+    /// If `scratch` is another plan's.
     pub fn field(
         &self,
         frame: &RgbdFrame,
@@ -133,18 +119,7 @@ impl MethodPlan {
     ) -> Result<()> {
         frame.check_shape(self.shape)?;
         match (&self.way, &mut scratch.0) {
-            (
-                Way::Network { plan, head },
-                Scratch::Network {
-                    input,
-                    output,
-                    network,
-                },
-            ) => {
-                frame.network_input(input);
-                plan.run(input, output, network)?;
-                head.field(output, input, field)
-            }
+            (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
             _ => panic!("the scratch is another plan's"),
         }

@@ -3,7 +3,7 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::display::Display;
-use crate::encode::{Encoder, EncoderScratch, Encoding, Scale};
+use crate::encode::{Encoder, EncoderScratch, Encoding, Scale, deep};
 use crate::error::{Error, Result};
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
@@ -18,6 +18,7 @@ pub struct Modulator {
     /// None where the modulator stands at the midpoint.
     offset: Option<[Propagator; 3]>,
     encoder: Encoder,
+    keeps_phase: bool,
     scale: Scale,
     response: Response,
 }
@@ -42,7 +43,8 @@ impl Modulator {
     /// `response`.
     ///
     /// # Errors
-    /// An offset, shape or encoding that cannot be planned, or a fixed scale that is not positive.
+    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, or a fixed scale that
+    /// is not positive.
     pub fn new(
         height: usize,
         width: usize,
@@ -58,6 +60,9 @@ impl Modulator {
                 "a scale of {scale} cannot stand for full light; it must be above 0"
             )));
         }
+        if let Encoding::Deep(network) = &encoding {
+            deep::check(network, display)?;
+        }
         let offset = match display.offset_m() {
             0.0 => None,
             offset_m => Some(Propagator::for_colours(
@@ -72,10 +77,17 @@ impl Modulator {
         Ok(Modulator {
             size: height * width,
             offset,
+            keeps_phase: matches!(encoding, Encoding::Deep(_)),
             encoder: Encoder::new(height, width, encoding)?,
             scale,
             response,
         })
+    }
+
+    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
+    /// take from it what it knows.
+    pub fn keeps_phase(&self) -> bool {
+        self.keeps_phase
     }
 
     /// Working memory for one call at a time.
@@ -111,14 +123,47 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
+        self.modulate_at(field, self.scale, levels, scratch)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
         let start = Instant::now();
-        let scale = self.encoder.encode_levels(
-            field,
-            self.scale,
-            &self.response,
-            levels,
-            &mut scratch.encoder,
-        );
+        let scale =
+            self.encoder
+                .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
+        Modulation {
+            scale,
+            encode: start.elapsed(),
+        }
+    }
+}
+
+impl Modulator {
+    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
+    ///
+    /// # Panics
+    /// If `field` or `phases` has not 3·H·W values.
+    pub fn phases_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        phases: &mut [f32],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let start = Instant::now();
+        let scale = self
+            .encoder
+            .encode(field, scale, phases, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),

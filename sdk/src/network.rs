@@ -1,11 +1,13 @@
 //! The hologram network: loaded from ONNX, checked to be the paper's residual chain, run on frames of any size.
 //!
-//! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::run`] takes
-//! the planar input to the output planes; [`Head::field`] turns these into a complex field. What the chain is, stands
+//! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::field`] takes
+//! rows of a [`Source`] to rows of a complex field; [`NetworkPlan::run`] takes planes to planes, which [`Head::field`]
+//! turns into a field. What the chain is, stands
 //! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
 //! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
 pub mod chain;
+mod filter;
 mod fused;
 mod head;
 mod metadata;
@@ -16,12 +18,14 @@ mod stock;
 mod tensor;
 
 pub use chain::Precision;
+pub use filter::{FilterPlan, FilterScratch};
 pub use head::Head;
 pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::{Error, Result};
 use chain::Chain;
 use fused::{FusedChain, FusedScratch};
+use num_complex::Complex32;
 pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
 use stock::StockPlan;
 use tract_onnx::pb::ModelProto;
@@ -32,14 +36,31 @@ const MAX_STOCK_PIXELS: usize = 1 << 24;
 /// Most pixels of a frame at all.
 const MAX_PIXELS: usize = 1 << 28;
 
+/// Planes that a network reads, a run of a row's pixels at a time: they need not lie in memory as the network takes
+/// them.
+pub trait Source: Sync {
+    /// Writes pixels of `row` of `plane`, from column `from` on, into `into`; planes as [`InputKind`] counts them.
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]);
+}
+
 /// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
-#[derive(Debug)]
 pub struct Network {
     chain: Chain,
     input: InputKind,
     head: Head,
     display: TrainedDisplay,
     proto: ModelProto,
+}
+
+impl std::fmt::Debug for Network {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (layers, filters) = (self.layers(), self.filters());
+        let (input, precision) = (self.input, self.precision());
+        write!(
+            f,
+            "Network({input}, {layers} layers of {filters} filters, {precision})"
+        )
+    }
 }
 
 impl Network {
@@ -88,11 +109,6 @@ impl Network {
                 ));
             }
             _ => {}
-        }
-        if input == InputKind::Field && head != Head::AmplitudePhase {
-            return Err(Error::Network(
-                "phasefront.input 'field' needs phasefront.head 'amplitude-phase'".into(),
-            ));
         }
         Ok(Network {
             chain,
@@ -168,25 +184,52 @@ impl Network {
 
     fn fused_plan(&self, height: usize, width: usize, chain: FusedChain) -> Result<NetworkPlan> {
         check_size(height, width, MAX_PIXELS)?;
-        let isa = chain.isa();
-        let why = format!(
-            "{} layers of {} filters in {}: one fused chain",
-            self.layers(),
-            self.filters(),
-            self.precision()
-        );
+        let engine = self.fused_engine(&chain);
         Ok(NetworkPlan {
-            inputs: self.chain.inputs,
-            outputs: self.chain.outputs(),
+            input: self.input,
+            head: self.head,
             height,
             width,
             path: Path::Fused(chain),
-            engine: Engine {
-                name: isa.name(),
-                isa: Some(isa),
-                why,
-            },
+            engine,
         })
+    }
+
+    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels.
+    ///
+    /// # Errors
+    /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
+    /// empty field or one too large.
+    pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
+        if self.input != InputKind::Field {
+            return Err(Error::Network(format!(
+                "a pre-filter takes 'field', this network '{}'",
+                self.input
+            )));
+        }
+        let chain = FusedChain::new(&self.chain, None)
+            .map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
+        check_size(height, width, MAX_PIXELS)?;
+        Ok(FilterPlan {
+            engine: self.fused_engine(&chain),
+            chain,
+            head: self.head,
+            size: (height, width),
+        })
+    }
+
+    fn fused_engine(&self, chain: &FusedChain) -> Engine {
+        let isa = chain.isa();
+        Engine {
+            name: isa.name(),
+            isa: Some(isa),
+            why: format!(
+                "{} layers of {} filters in {}: one fused chain",
+                self.layers(),
+                self.filters(),
+                self.precision()
+            ),
+        }
     }
 
     /// The network as a tract graph of any frame size, its chain one fused operator: for graphs built around it.
@@ -207,8 +250,8 @@ impl Network {
         check_size(height, width, MAX_STOCK_PIXELS)?;
         let plan = StockPlan::new(&self.proto, [1, self.chain.inputs, height, width])?;
         Ok(NetworkPlan {
-            inputs: self.chain.inputs,
-            outputs: self.chain.outputs(),
+            input: self.input,
+            head: self.head,
             height,
             width,
             path: Path::Stock(plan),
@@ -251,8 +294,8 @@ enum Path {
 
 /// A network prepared for one frame size. Immutable; one plan serves many threads, each with its own scratch.
 pub struct NetworkPlan {
-    inputs: usize,
-    outputs: usize,
+    input: InputKind,
+    head: Head,
     height: usize,
     width: usize,
     path: Path,
@@ -265,12 +308,15 @@ pub struct NetworkPlan {
 #[derive(Debug, Default)]
 pub struct NetworkScratch {
     fused: FusedScratch,
+    /// Input and output as planes, for stock tract.
+    planes: [Vec<f32>; 2],
 }
 
 impl NetworkScratch {
     /// Bytes held between frames.
     pub fn bytes(&self) -> usize {
-        self.fused.bytes()
+        let planes: usize = self.planes.iter().map(Vec::capacity).sum();
+        self.fused.bytes() + planes * size_of::<f32>()
     }
 }
 
@@ -287,7 +333,7 @@ impl NetworkPlan {
 
     /// Channels of the input and of the output.
     pub fn channels(&self) -> (usize, usize) {
-        (self.inputs, self.outputs)
+        (self.input.channels(), phasefront_kernels::OUTPUTS)
     }
 
     /// Which path runs this plan, and why.
@@ -308,18 +354,9 @@ impl NetworkPlan {
         output: &mut [f32],
         scratch: &mut NetworkScratch,
     ) -> Result<()> {
-        let area = self.height * self.width;
-        for (what, is, channels) in [
-            ("input", input.len(), self.inputs),
-            ("output", output.len(), self.outputs),
-        ] {
-            if is != channels * area {
-                return Err(Error::Frame(format!(
-                    "network {what} has {is} values; {channels} planes of {}×{} pixels are right",
-                    self.width, self.height
-                )));
-            }
-        }
+        let (inputs, outputs) = self.channels();
+        self.check("input", input.len(), inputs)?;
+        self.check("output", output.len(), outputs)?;
         match &self.path {
             Path::Fused(chain) => {
                 chain.run(input, output, self.size(), &scratch.fused);
@@ -327,5 +364,49 @@ impl NetworkPlan {
             }
             Path::Stock(plan) => plan.run(input, output),
         }
+    }
+
+    /// Runs the network on the rows of `source` and writes the complex field that its head makes of them, (3, H, W), on
+    /// the current rayon pool. On the fused path neither input nor output lies in memory as planes, and after the first
+    /// frame nothing is allocated.
+    ///
+    /// # Errors
+    /// [`Error::Frame`] when `field` has not 3·H·W values.
+    pub fn field<S: Source + ?Sized>(
+        &self,
+        source: &S,
+        field: &mut [Complex32],
+        scratch: &mut NetworkScratch,
+    ) -> Result<()> {
+        self.check("field", field.len(), 3)?;
+        let size = self.size();
+        match &self.path {
+            Path::Fused(chain) => {
+                chain.field(source, (self.input, self.head), field, size, &scratch.fused);
+                Ok(())
+            }
+            Path::Stock(plan) => {
+                let area = size.0 * size.1;
+                let (inputs, outputs) = self.channels();
+                let [input, output] = &mut scratch.planes;
+                input.resize(inputs * area, 0.0);
+                output.resize(outputs * area, 0.0);
+                for (row, into) in input.chunks_exact_mut(size.1).enumerate() {
+                    source.read(row / size.0, row % size.0, 0, into);
+                }
+                plan.run(input, output)?;
+                self.head.field(self.input, output, input, field)
+            }
+        }
+    }
+
+    fn check(&self, what: &str, values: usize, planes: usize) -> Result<()> {
+        if values == planes * self.height * self.width {
+            return Ok(());
+        }
+        Err(Error::Frame(format!(
+            "network {what} has {values} values; {planes} planes of {}×{} pixels are right",
+            self.width, self.height
+        )))
     }
 }

@@ -92,8 +92,8 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out,
-    /// the rest of the offset. Gives the times of the method and of the rest.
+    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out (but for an
+    /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
     ///
     /// # Errors
     /// A frame of another shape.
@@ -105,7 +105,9 @@ impl Pipeline {
     ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
         self.method.field(frame, field, &mut scratch.method)?;
-        remove_mean_phase(field);
+        if !self.modulator.keeps_phase() {
+            remove_mean_phase(field);
+        }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))
@@ -123,6 +125,36 @@ impl Pipeline {
     ) -> Modulation {
         self.modulator
             .modulate(field, levels, &mut scratch.modulator)
+    }
+
+    /// [`Self::modulate`] at another scale than the planned one: a session chooses it for each frame.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not 3·H·W values.
+    pub fn modulate_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        levels: &mut [u8],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .modulate_at(field, scale, levels, &mut scratch.modulator)
+    }
+
+    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
+    ///
+    /// # Panics
+    /// If `field` or `phases` has not 3·H·W values.
+    pub fn phases_at(
+        &self,
+        field: &mut [Complex32],
+        scale: Scale,
+        phases: &mut [f32],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        self.modulator
+            .phases_at(field, scale, phases, &mut scratch.modulator)
     }
 
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as

@@ -103,7 +103,18 @@ impl Response {
     }
 }
 
-/// round(φ/2π·n) mod n, for n a power of two up to 256.
+/// The linear response of a modulator of `bits`, 1 to 16, whose levels do not fit bytes. Allocates nothing.
+///
+/// # Panics
+/// If the lengths differ.
+pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {
+    assert_eq!(phases.len(), words.len());
+    for (word, phase) in words.iter_mut().zip(phases) {
+        *word = step(*phase, 1 << bits) as u16;
+    }
+}
+
+/// round(φ/2π·n) mod n, for n a power of two up to 65536.
 fn step(phase: f32, n: i32) -> usize {
     // Phases are not negative, so the conversion's truncation is the floor.
     ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize
@@ -137,6 +148,21 @@ mod tests {
                 let shown = r.phase(r.level(phase));
                 let error = (shown - phase).abs();
                 assert!(error.min(TAU - error) < TAU / 256.0, "{i}: {shown}");
+            }
+        }
+    }
+
+    #[test]
+    fn words_follow_the_rule() {
+        let phases: Vec<f32> = (0..4096).map(|i| i as f32 / 4096.0 * TAU).collect();
+        let mut words = vec![0; phases.len()];
+        for bits in [8, 9, 10, 16] {
+            linear_words(&phases, bits, &mut words);
+            for (phase, word) in phases.iter().zip(&words) {
+                let levels = f64::from(1u32 << bits);
+                let exact = f64::from(*phase) / std::f64::consts::TAU * levels;
+                let apart = (f64::from(*word) - exact).abs();
+                assert!(apart.min(levels - apart) < 0.51, "{bits} {phase}");
             }
         }
     }

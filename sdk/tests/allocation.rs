@@ -1,13 +1,20 @@
 //! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
 #![allow(unsafe_code, clippy::unwrap_used)]
 
+mod network_models;
+
+use network_models::Model;
 use num_complex::Complex32;
+use phasefront::depth::refine::Refiner;
 use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
+use phasefront::preview::Preview;
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::{Display, Modulator};
+use phasefront::{Display, Modulator, Network};
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 struct Counting;
@@ -41,6 +48,44 @@ fn count(mut call: impl FnMut()) -> usize {
     ALLOCATIONS.load(Ordering::Relaxed) - before
 }
 
+/// Colour, depth and a preview, on the current thread pool.
+fn camera_frames_and_previews() {
+    let (h, w) = (30, 40);
+    let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
+    let image =
+        ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), h, w).unwrap();
+    let mut scratch = plan.scratch();
+    let mut rgb = vec![0.0; 3 * h * w];
+    let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
+    assert_eq!(count(convert), 0);
+    let plan = Refiner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w)).unwrap();
+    let mut scratch = plan.scratch();
+    let depth: Vec<f32> = (0..300)
+        .map(|i| {
+            if i % 7 == 0 {
+                f32::NAN
+            } else {
+                (i % 20) as f32 / 20.0
+            }
+        })
+        .collect();
+    let mut refined = vec![0.0; h * w];
+    let refine = || {
+        plan.refine(&depth, &[1.0; 300], &rgb, &mut refined, &mut scratch)
+            .unwrap()
+    };
+    assert_eq!(count(refine), 0);
+    let plan = Preview::new((h, w), &Display::default(), 2e-3, (20, 20)).unwrap();
+    let mut scratch = plan.scratch();
+    let response = Response::linear(8).unwrap();
+    let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
+    assert_eq!(
+        count(|| plan.look(&levels, &response, 1.0, &mut rgba, &mut scratch)),
+        0
+    );
+}
+
 #[test]
 fn hot_calls_allocate_nothing() {
     let (h, w) = (61, 47);
@@ -48,6 +93,7 @@ fn hot_calls_allocate_nothing() {
     let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
+    let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -64,9 +110,11 @@ fn hot_calls_allocate_nothing() {
                 Encoding::DoublePhase,
                 Encoding::ANTI_ALIAS,
                 Encoding::BAND_LIMIT,
+                Encoding::Deep(prefilter.clone()),
             ] {
                 let response = Response::linear(8).unwrap();
-                let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response).unwrap();
+                let plan =
+                    Modulator::new(h, w, &display, encoding.clone(), Scale::Max, response).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
@@ -74,6 +122,7 @@ fn hot_calls_allocate_nothing() {
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
+            camera_frames_and_previews();
         });
     }
 }

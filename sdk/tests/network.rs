@@ -4,7 +4,8 @@
 mod network_models;
 
 use network_models::{Model, frame, int, ints};
-use phasefront::network::{Head, InputKind, Isa, Network, Precision, reference};
+use num_complex::Complex32;
+use phasefront::network::{Head, InputKind, Isa, Network, Precision, Source, reference};
 use prost::Message;
 use tract_onnx::pb::{ModelProto, NodeProto};
 
@@ -163,6 +164,142 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
             }
         }
     }
+}
+
+/// Planes in memory as a network's source.
+struct Planes<'a> {
+    values: &'a [f32],
+    size: (usize, usize),
+}
+
+impl Source for Planes<'_> {
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
+        let at = (plane * self.size.0 + row) * self.size.1 + from;
+        into.copy_from_slice(&self.values[at..][..into.len()]);
+    }
+}
+
+#[test]
+fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
+    let tanh = Model {
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(5, 8)
+    };
+    let field = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(4, 8)
+    };
+    let models = [
+        Model::new(5, 8),
+        Model::int8(8, 24),
+        Model {
+            inputs: 20,
+            input: "ldi5",
+            ..Model::int8(3, 8)
+        },
+        Model {
+            int8: true,
+            ..field.clone()
+        },
+        field,
+        Model {
+            inputs: 6,
+            input: "field",
+            ..tanh.clone()
+        },
+        tanh,
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        // The last is cut into bands, and where threads are few into strips.
+        for (height, width) in [(1, 1), (7, 5), (61, 47), (150, 300)] {
+            let values = frame(model.inputs, height, width, 7);
+            let source = Planes {
+                values: &values,
+                size: (height, width),
+            };
+            for stock in [false, true] {
+                let plan = match stock {
+                    false => network.plan(height, width),
+                    true => network.plan_on_stock_tract(height, width),
+                };
+                let plan = plan.unwrap();
+                let mut scratch = plan.scratch();
+                let mut output = vec![f32::NAN; 6 * height * width];
+                plan.run(&values, &mut output, &mut scratch).unwrap();
+                let mut expected = vec![Complex32::ZERO; 3 * height * width];
+                network
+                    .head()
+                    .field(network.input(), &output, &values, &mut expected)
+                    .unwrap();
+                let mut field = vec![Complex32::ZERO; 3 * height * width];
+                plan.field(&source, &mut field, &mut scratch).unwrap();
+                assert_eq!(field, expected, "{width}×{height}, stock: {stock}");
+                assert!(plan.field(&source, &mut field[1..], &mut scratch).is_err());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pre_filter_in_place_gives_the_same_bits_however_it_is_cut() {
+    let residual = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(8, 8)
+    };
+    let models = [
+        Model {
+            int8: true,
+            ..residual.clone()
+        },
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            layers: 3,
+            ..residual.clone()
+        },
+        residual,
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for (height, width) in [(1, 1), (7, 5), (150, 70)] {
+            let values = frame(6, height, width, 3);
+            let area = height * width;
+            let plan = network.plan(height, width).unwrap();
+            let mut output = vec![0.0; 6 * area];
+            plan.run(&values, &mut output, &mut plan.scratch()).unwrap();
+            let mut expected = vec![Complex32::ZERO; 3 * area];
+            network
+                .head()
+                .field(InputKind::Field, &output, &values, &mut expected)
+                .unwrap();
+            let plan = network.filter_plan(height, width).unwrap();
+            let mut scratch = plan.scratch();
+            for threads in [1, 2, 5] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                let mut field: Vec<_> = (0..3 * area)
+                    .map(|i| Complex32::new(values[i], values[3 * area + i]))
+                    .collect();
+                let filter = || plan.filter(&mut field, &mut scratch);
+                pool.build().unwrap().install(filter);
+                assert_eq!(field, expected, "{width}×{height} on {threads}");
+            }
+        }
+    }
+    let other = Network::from_onnx(&Model::new(3, 8).bytes()).unwrap();
+    let why = other.filter_plan(4, 4).err().unwrap().to_string();
+    assert!(why.contains("takes 'field', this network 'rgbd'"), "{why}");
+    let odd = Model {
+        inputs: 6,
+        input: "field",
+        ..Model::new(3, 5)
+    };
+    let odd = Network::from_onnx(&odd.bytes()).unwrap();
+    let why = odd.filter_plan(4, 4).err().unwrap().to_string();
+    assert!(why.contains("5 filters"), "{why}");
 }
 
 #[test]
@@ -650,11 +787,10 @@ fn missing_or_wrong_metadata_is_refused() {
         refusal(
             &Model {
                 input: "field",
-                inputs: 6,
                 ..model
             }
             .proto()
         )
-        .contains("'field'")
+        .contains("'field' with 6 channels")
     );
 }

@@ -1,19 +1,22 @@
 //! The optics against the paper's equations in f64, and what physics demands of them.
 #![allow(clippy::unwrap_used)]
 
+mod network_models;
 #[path = "../../tests/reference.rs"]
 mod reference;
 
 use ndarray::{Array2, Array3};
+use network_models::Model;
 use phasefront::encode::{Encoder, Encoding, Scale};
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{self, Padding, Propagator};
-use phasefront::{Display, wave};
+use phasefront::{Display, Modulator, Network, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 130)];
 const RED: f64 = 638e-9;
@@ -233,7 +236,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         Encoding::ANTI_ALIAS,
         Encoding::BAND_LIMIT,
     ] {
-        let encoder = Encoder::new(h, w, encoding).unwrap();
+        let encoder = Encoder::new(h, w, encoding.clone()).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, Scale::Max, &mut phase, &mut encoder.scratch());
@@ -293,4 +296,42 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
         }
         assert!(plan.focal_stack(&hologram, &[0.5]).is_err());
     }
+}
+
+#[test]
+fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
+    let network = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let (h, w) = (40, 33);
+    let response = || Response::linear(8).unwrap();
+    let plan = |display: &Display, network: &Arc<Network>| {
+        let encoding = Encoding::Deep(network.clone());
+        Modulator::new(h, w, display, encoding, Scale::Max, response())
+    };
+    let modulator = plan(&display, &network).unwrap();
+    assert!(modulator.keeps_phase());
+    let mut field: Vec<_> = (0..3 * h * w)
+        .map(|i| Complex32::from_polar(0.5 + 0.3 * (i as f32).sin(), i as f32 * 0.01))
+        .collect();
+    let mut filtered = field.clone();
+    let filter = network.filter_plan(h, w).unwrap();
+    filter.filter(&mut filtered, &mut filter.scratch());
+    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let mut expected = vec![0; 3 * h * w];
+    let scale = encoder.encode_levels(
+        &mut filtered,
+        Scale::Max,
+        &response(),
+        &mut expected,
+        &mut encoder.scratch(),
+    );
+    let mut levels = vec![0; 3 * h * w];
+    let modulation = modulator.modulate(&mut field, &mut levels, &mut modulator.scratch());
+    assert_eq!((modulation.scale, levels), (scale, expected));
+
+    let why = |display: &Display, network| plan(display, network).err().unwrap().to_string();
+    let elsewhere = Display::default().with_offset_m(5.9e-3).unwrap();
+    assert!(why(&elsewhere, &network).contains("offset of 6.000 mm"));
+    let hologram = Arc::new(Network::from_onnx(&Model::new(3, 8).bytes()).unwrap());
+    assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
 }

@@ -1,7 +1,8 @@
 //! `phasefront evaluate`: the paper's Table 2 on a data set.
 
+use super::flags::EncoderName;
 use super::flags::progress_bar;
-use super::hologram::{EncoderName, PrecisionName, sweep_for};
+use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
 use phasefront::sweep::MAX_HIDDEN_LAYERS;
 use phasefront::{Display, Sweep};
@@ -28,7 +29,7 @@ pub(crate) struct Evaluate {
     )]
     method: Vec<MethodName>,
     /// Networks to judge, separated by commas: one that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE,…", value_delimiter = ',')]
+    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that networks which come along compute in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -99,10 +100,18 @@ impl Evaluate {
             .collect();
         let methods = self.methods(&manifest)?;
         let mut shown = vec![Shown::complex()];
-        shown.extend(self.encoder.iter().map(|encoder| Shown {
-            name: encoder.name().into(),
-            encoding: Some(encoder.encoding()),
-        }));
+        for encoder in &self.encoder {
+            let encoding = encoder.encoding(None).map_err(|_| {
+                Error::Input(format!(
+                    "--encoder {} needs the network that its pre-filter was trained with: `python -m phasefront_training evaluate-encoding` judges the pair",
+                    encoder.name()
+                ))
+            })?;
+            shown.push(Shown {
+                name: encoder.name().into(),
+                encoding: Some(encoding),
+            });
+        }
         if let Some(dir) = &self.pictures {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }

@@ -2,12 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use phasefront::RgbdFrame;
 use phasefront::depth::DepthUnit;
+use phasefront::encode::Encoding;
+use phasefront::{Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::rgbd::{self, DepthOptions};
-use phasefront_lab::{Error, Result};
+use phasefront_lab::{Error, Result, models};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// The display that a hologram is for.
 #[derive(Args)]
@@ -36,6 +38,72 @@ impl DisplayFlags {
     }
 }
 
+/// How the field becomes phases.
+#[derive(Args)]
+pub(crate) struct EncoderFlags {
+    /// How the field becomes phases
+    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
+    encoder: EncoderName,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
+    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
+    prefilter: Option<String>,
+}
+
+impl EncoderFlags {
+    pub(crate) fn read(&self) -> Result<Encoding> {
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
+        self.encoder.encoding(prefilter)
+    }
+
+    pub(crate) fn name(&self) -> &'static str {
+        self.encoder.name()
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+pub(crate) enum EncoderName {
+    /// Double phase
+    Double,
+    /// Double phase after a small blur (AA-DPM)
+    AntiAlias,
+    /// Double phase after a cut of high frequencies (BL-DPM)
+    BandLimit,
+    /// Double phase after a pre-filter network (DDPM)
+    Deep,
+}
+
+impl EncoderName {
+    pub(crate) fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
+        Ok(match (self, prefilter) {
+            (EncoderName::Double, None) => Encoding::DoublePhase,
+            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
+            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
+            (EncoderName::Deep, Some(network)) => Encoding::Deep(network),
+            (EncoderName::Deep, None) => {
+                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Input(format!(
+                    "--prefilter goes with --encoder deep, not with {}",
+                    self.name()
+                )));
+            }
+        })
+    }
+
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            EncoderName::Double => "double",
+            EncoderName::AntiAlias => "anti-alias",
+            EncoderName::BandLimit => "band-limit",
+            EncoderName::Deep => "deep",
+        }
+    }
+}
+
 /// An RGB-D image and what its depth means.
 #[derive(Args)]
 pub(crate) struct FrameFlags {
@@ -50,6 +118,13 @@ pub(crate) struct FrameFlags {
     /// Depth image: grey PNG of 8 or 16 bits, or .npy
     #[arg(long, value_name = "FILE", requires = "rgb")]
     depth: Option<PathBuf>,
+    #[command(flatten)]
+    depth_numbers: DepthFlags,
+}
+
+/// What the numbers of a depth image mean, and which are shown where.
+#[derive(Args)]
+pub(crate) struct DepthFlags {
     /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth
     #[arg(long, value_enum, default_value_t = UnitName::Normalized)]
     depth_unit: UnitName,
@@ -83,6 +158,12 @@ impl FrameFlags {
         let (Some(rgb), Some(depth)) = (&self.rgb, &self.depth) else {
             return Err(Error::Input("this method needs --rgb and --depth".into()));
         };
+        rgbd::read(rgb, depth, self.depth_numbers.options())
+    }
+}
+
+impl DepthFlags {
+    pub(crate) fn options(&self) -> DepthOptions {
         let unit = match self.depth_unit {
             UnitName::Normalized => DepthUnit::Normalized,
             UnitName::M => DepthUnit::Metres,
@@ -92,12 +173,11 @@ impl FrameFlags {
                 units_per_m: self.depth_scale.unwrap_or(f64::NAN),
             },
         };
-        let options = DepthOptions {
+        DepthOptions {
             unit,
             near_m: self.near,
             far_m: self.far,
-        };
-        rgbd::read(rgb, depth, options)
+        }
     }
 }
 

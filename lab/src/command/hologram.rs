@@ -1,6 +1,6 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, FrameFlags, progress_bar};
+use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -27,8 +27,8 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Layers of a network that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|FILE", default_value = "8")]
+    /// Layers of a network that comes along (8, 15), or an ONNX file
+    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
     network: String,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -42,9 +42,8 @@ pub(crate) struct Hologram {
     /// What keeps light from where it should not go, for --method points
     #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
     occlusion: OcclusionName,
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
@@ -105,34 +104,6 @@ impl PrecisionName {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum EncoderName {
-    /// Double phase
-    Double,
-    /// Double phase after a small blur (AA-DPM)
-    AntiAlias,
-    /// Double phase after a cut of high frequencies (BL-DPM)
-    BandLimit,
-}
-
-impl EncoderName {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            EncoderName::Double => Encoding::DoublePhase,
-            EncoderName::AntiAlias => Encoding::ANTI_ALIAS,
-            EncoderName::BandLimit => Encoding::BAND_LIMIT,
-        }
-    }
-
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            EncoderName::Double => "double",
-            EncoderName::AntiAlias => "anti-alias",
-            EncoderName::BandLimit => "band-limit",
-        }
-    }
-}
-
 /// Planes of the methods of exact waves.
 const DEFAULT_PLANES: usize = 256;
 
@@ -172,6 +143,7 @@ impl Hologram {
                 ));
             }
         }
+        let encoding = self.encoder.read()?;
         let display = self.display.read()?;
         let response = match display.lut {
             Some(lut) => Response::lut(lut),
@@ -184,13 +156,13 @@ impl Hologram {
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
                 let network = models::network(&self.network, self.precision.is_int8())?;
-                let method = phasefront::Method::Network(&network);
-                self.by_pipeline("network", method, &display.display, response)?
+                let method = phasefront::Method::Network(network);
+                self.by_pipeline("network", method, &display.display, encoding, response)?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display.display, response)?
+                self.by_pipeline("sweep", method, &display.display, encoding, response)?
             }
             (Method::Network | Method::Sweep, Some(dir)) => {
                 return Err(Error::file(
@@ -203,7 +175,7 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, response)?
+                self.by_physics(method, &ldi, &display.display, encoding, response)?
             }
         };
         let info = HologramInfo {
@@ -232,6 +204,7 @@ impl Hologram {
         stage: &'static str,
         method: phasefront::Method,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
@@ -241,7 +214,7 @@ impl Hologram {
             width,
             method,
             display,
-            self.encoder.encoding(),
+            encoding,
             self.scale(),
             response,
         )?;
@@ -273,17 +246,11 @@ impl Hologram {
         method: Method,
         ldi: &Ldi,
         display: &phasefront::Display,
+        encoding: Encoding,
         response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(
-            height,
-            width,
-            display,
-            self.encoder.encoding(),
-            self.scale(),
-            response,
-        )?;
+        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();

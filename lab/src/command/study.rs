@@ -1,14 +1,18 @@
-//! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot.
+//! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
+//! video are worth, as a table and JSON.
 
 use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
+use phasefront::Method;
+use phasefront::sweep::Sweep;
+use phasefront_lab::depth_study::{self, RATIO, SENSOR};
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
-use phasefront_lab::{Error, Result, files};
+use phasefront_lab::{Error, Result, files, flicker, models};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Study how many layers or planes a hologram needs: PSNR and SSIM against the finest
+/// Study how many layers or planes a hologram needs, what refined depth is worth, and how much video flickers
 #[derive(Args)]
 pub(crate) struct Study {
     /// What to study
@@ -17,7 +21,7 @@ pub(crate) struct Study {
     /// Random scenes
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
     scenes: u16,
-    /// Height and width of a scene, pixels
+    /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768
     #[arg(long, value_name = "PX", default_value_t = 384, value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: u16,
     /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192]
@@ -42,11 +46,20 @@ enum What {
     Layers,
     /// Planes of the volume: 32, 128, 512 and 2048 against 8192 (Fig. 2b)
     Planes,
+    /// Holograms of depth that a sensor of 256×192 gave, refined and not, against the truth
+    Depth,
+    /// How much the picture of a scene that stands still changes from frame to frame, 30 of each scene
+    Flicker,
 }
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, e))?;
+        match self.what {
+            What::Layers | What::Planes => {}
+            What::Depth => return self.depth(json),
+            What::Flicker => return self.flicker(json),
+        }
         let scenes = Scenes {
             scenes: self.scenes.into(),
             size: self.size.into(),
@@ -55,15 +68,15 @@ impl Study {
         };
         let of_layers = self.what == What::Layers;
         let planes = self.planes.unwrap_or(if of_layers { 256 } else { 8192 }) as usize;
-        let work = match self.what {
-            What::Layers => study::layers_work(&scenes, planes),
-            What::Planes => study::planes_work(&scenes, planes),
+        let work = match of_layers {
+            true => study::layers_work(&scenes, planes),
+            false => study::planes_work(&scenes, planes),
         };
         let bar = progress_bar(work as u64, "planes");
         let done = |planes: usize| bar.inc(planes as u64);
-        let (name, rows) = match self.what {
-            What::Layers => ("layers", study::layers(&scenes, planes, &done)?),
-            What::Planes => (
+        let (name, rows) = match of_layers {
+            true => ("layers", study::layers(&scenes, planes, &done)?),
+            false => (
                 "planes",
                 study::planes(&scenes, self.ldi_layers.into(), planes, &done)?,
             ),
@@ -80,11 +93,7 @@ impl Study {
             "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed, "display": scenes.display,
             "rows": rows,
         });
-        let path = self.output.join(format!("{name}.json"));
-        files::write_atomically(&path, |file| {
-            serde_json::to_writer_pretty(&mut *file, &result)?;
-            std::io::Write::write_all(file, b"\n")
-        })?;
+        self.write_json(name, &result)?;
         self.plot(name, finest, &rows)?;
         let mut text = format!(
             "{name:>7}  PSNR dB    SSIM   (against {finest}, mean of {} scenes)",
@@ -97,14 +106,104 @@ impl Study {
         Ok(())
     }
 
+    fn write_json(&self, name: &str, result: &serde_json::Value) -> Result<()> {
+        files::write_atomically(&self.output.join(format!("{name}.json")), |file| {
+            serde_json::to_writer_pretty(&mut *file, result)?;
+            std::io::Write::write_all(file, b"\n")
+        })
+    }
+
+    fn depth(&self, json: bool) -> Result<()> {
+        let display = self.display.read()?.display;
+        let planes = self.planes.unwrap_or(256) as usize;
+        let network = models::network("8", true)?;
+        let methods = [
+            ("network".to_owned(), Method::Network(network)),
+            (
+                "sweep".to_owned(),
+                Method::Sweep(Sweep::for_display(&display)),
+            ),
+        ];
+        let scenes = usize::from(self.scenes);
+        let bar = progress_bar(depth_study::work(scenes, methods.len()) as u64, "holograms");
+        let rows = depth_study::study(scenes, self.seed, planes, &display, &methods, &|| {
+            bar.inc(1)
+        })?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "depth", "planes": planes, "scenes": self.scenes, "seed": self.seed, "display": display,
+            "rows": rows,
+        });
+        self.write_json("depth", &result)?;
+        let mut text = "method    depth                PSNR dB    SSIM   wrong depth".to_owned();
+        for row in &rows {
+            let depth = format!("{}, {}", row.degradation, row.depth);
+            text += &format!(
+                "\n{:9} {depth:20} {:7.2}  {:.4}  {:9.2} %",
+                row.method,
+                row.psnr,
+                row.ssim,
+                100.0 * row.wrong_depth
+            );
+        }
+        super::print(json, &result, text);
+        Ok(())
+    }
+
+    fn flicker(&self, json: bool) -> Result<()> {
+        /// Of each scene.
+        const FRAMES: usize = 30;
+        let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
+        let display = self.display.read()?.display.with_size(height, width)?;
+        let method = Method::Network(models::network("8", true)?);
+        let scenes = usize::from(self.scenes);
+        let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
+        let mut rows: Vec<flicker::Row> = Vec::new();
+        for scene in 0..u64::from(self.scenes) {
+            let of_scene =
+                flicker::study(self.seed + scene, FRAMES, &display, &method, &|| bar.inc(1))?;
+            match rows.is_empty() {
+                true => rows = of_scene,
+                false => {
+                    for (sum, row) in rows.iter_mut().zip(of_scene) {
+                        sum.brightness += row.brightness;
+                        sum.pixel += row.pixel;
+                    }
+                }
+            }
+        }
+        bar.finish_and_clear();
+        for row in &mut rows {
+            row.brightness /= scenes as f64;
+            row.pixel /= scenes as f64;
+        }
+        let result = json!({
+            "study": "flicker", "frames": FRAMES, "scenes": self.scenes, "seed": self.seed, "display": display,
+            "rows": rows,
+        });
+        self.write_json("flicker", &result)?;
+        let mut text = "change from frame to frame  brightness   a pixel's amplitude".to_owned();
+        for row in &rows {
+            text += &format!(
+                "\n{:26}  {:8.3} %   {:.5}",
+                row.setting,
+                100.0 * row.brightness,
+                row.pixel
+            );
+        }
+        super::print(json, &result, text);
+        Ok(())
+    }
+
     fn plot(&self, name: &str, finest: usize, rows: &[Row]) -> Result<()> {
-        let (x, title) = match self.what {
-            What::Layers => ("layers", format!("LDI layers against {finest}")),
-            What::Planes => ("bits of depth", format!("planes against {finest}")),
+        let of_layers = self.what == What::Layers;
+        let (x, title) = match of_layers {
+            true => ("layers", format!("LDI layers against {finest}")),
+            false => ("bits of depth", format!("planes against {finest}")),
         };
-        let x_of = |row: &Row| match self.what {
-            What::Layers => row.value as i32,
-            What::Planes => row.value.ilog2() as i32,
+        let x_of = |row: &Row| match of_layers {
+            true => row.value as i32,
+            false => row.value.ilog2() as i32,
         };
         // Scenes that equal the finest to the bit have no finite PSNR, and then nor has their mean.
         let points = |figure: fn(&Row) -> f64| -> Vec<(i32, f64)> {

@@ -4,7 +4,7 @@
 //! hidden layer yields `max(sum + bias, 0)`, plus the skip's value where there is one. Instruction sets differ in
 //! whether products are fused into sums, so they agree to rounding and not to the bit.
 
-use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
+use crate::wavefront::{self, Chain, Geometry, Rows, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
 
 /// One layer.
@@ -116,6 +116,11 @@ impl F32Chain {
         self.isa
     }
 
+    /// How many layers.
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
     /// The tiling that suits a frame size and the current rayon pool.
     pub fn tiling(&self, height: usize, width: usize) -> Tiling {
         wavefront::tiling_for(self, height, width)
@@ -133,7 +138,29 @@ impl F32Chain {
         tiling: Tiling,
         scratch: &Scratch<f32>,
     ) {
-        wavefront::run(self, input, output, size, tiling, scratch);
+        let area = size.0 * size.1;
+        assert_eq!(input.len(), self.inputs() * area, "planes of the input");
+        assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
+        let mut planes = output.chunks_exact_mut(area.max(1));
+        let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        let rows = wavefront::Planar { input, size };
+        self.run_rows(&rows, planes, size, tiling, scratch);
+    }
+
+    /// The same with input and output that need not be planes in memory: `rows` are read, and written to `planes`,
+    /// each (H, W).
+    ///
+    /// # Panics
+    /// If a length does not fit the size, and where `rows` do.
+    pub fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
+        &self,
+        rows: &R,
+        planes: [&mut [R::Value]; PLANES],
+        size: (usize, usize),
+        tiling: Tiling,
+        scratch: &Scratch<f32>,
+    ) {
+        wavefront::run(self, rows, planes, size, tiling, scratch);
     }
 }
 

@@ -14,7 +14,7 @@
 //!
 //! A row is grouped by four channels: `[channel/4][pixel][4]`. The concatenated network input starts a group of its own.
 
-use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
+use crate::wavefront::{self, Chain, Geometry, Rows, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
 
 /// Channels that lie together.
@@ -300,6 +300,11 @@ impl Int8Chain {
         self.isa
     }
 
+    /// How many layers.
+    pub fn layers(&self) -> usize {
+        self.layers.len()
+    }
+
     /// The tiling that suits a frame size and the current rayon pool.
     pub fn tiling(&self, height: usize, width: usize) -> Tiling {
         wavefront::tiling_for(self, height, width)
@@ -317,7 +322,29 @@ impl Int8Chain {
         tiling: Tiling,
         scratch: &Scratch<u8>,
     ) {
-        wavefront::run(self, input, output, size, tiling, scratch);
+        let area = size.0 * size.1;
+        assert_eq!(input.len(), self.inputs() * area, "planes of the input");
+        assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
+        let mut planes = output.chunks_exact_mut(area.max(1));
+        let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        let rows = wavefront::Planar { input, size };
+        self.run_rows(&rows, planes, size, tiling, scratch);
+    }
+
+    /// The same with input and output that need not be planes in memory: `rows` are read, and written to `planes`,
+    /// each (H, W).
+    ///
+    /// # Panics
+    /// If a length does not fit the size, and where `rows` do.
+    pub fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
+        &self,
+        rows: &R,
+        planes: [&mut [R::Value]; PLANES],
+        size: (usize, usize),
+        tiling: Tiling,
+        scratch: &Scratch<u8>,
+    ) {
+        wavefront::run(self, rows, planes, size, tiling, scratch);
     }
 }
 

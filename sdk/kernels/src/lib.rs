@@ -41,7 +41,7 @@ pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
 pub use peak::{f32_peak, int8_peak};
-pub use wavefront::{Scratch, Tiling};
+pub use wavefront::{Band, Rows, Scratch, Tiling};
 
 /// Planes of a hologram network's output: two a colour.
 pub const OUTPUTS: usize = 6;

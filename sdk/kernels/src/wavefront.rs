@@ -167,21 +167,108 @@ pub(crate) struct SourceRow<'a> {
     pub(crate) planes: &'a [f32],
     /// Elements from one plane to the next.
     pub(crate) plane: usize,
-    /// Element of the first plane where the row's (or strip's) first pixel lies.
-    pub(crate) offset: usize,
 }
 
 impl<'a> SourceRow<'a> {
     /// `count` pixels of channel `c`.
     pub(crate) fn channel(&self, c: usize, count: usize) -> &'a [f32] {
-        &self.planes[c * self.plane + self.offset..][..count]
+        &self.planes[c * self.plane..][..count]
+    }
+}
+
+/// What a chain reads and where its rows go, row by row, while it runs: neither needs to lie in memory as planes of
+/// their own. Rows are written to `PLANES` planes of one size, which are cut into bands of rows; a band is handed to
+/// one thread.
+pub trait Rows<const PLANES: usize>: Sync {
+    /// A value of the planes that are written.
+    type Value: Send;
+
+    /// Fills `into`, one run of `into.len() / inputs` pixels for each of the chain's input planes, with `row` from
+    /// column `from` on.
+    ///
+    /// Called twice for each row that a band needs. Where strips are as wide as the frame, a row is read for the last
+    /// time before the row above it is written, so that what is written may replace what is read.
+    fn read(&self, row: usize, from: usize, band: &Band<'_, Self::Value, PLANES>, into: &mut [f32]);
+
+    /// Takes the values of `row` from column `from` on, one run of pixels for each output; they may be worked on there.
+    fn write(
+        &self,
+        row: usize,
+        from: usize,
+        values: [&mut [f32]; OUTPUTS],
+        band: &mut Band<'_, Self::Value, PLANES>,
+    );
+}
+
+/// Some rows of the planes that a chain's rows are written to.
+pub struct Band<'a, T, const PLANES: usize> {
+    top: usize,
+    width: usize,
+    planes: [&'a mut [T]; PLANES],
+}
+
+impl<T, const PLANES: usize> Band<'_, T, PLANES> {
+    /// The rows of the frame that lie in this band.
+    pub fn rows(&self) -> std::ops::Range<usize> {
+        self.top..self.top + self.planes[0].len() / self.width
+    }
+
+    /// `count` pixels of `row` of one plane, from column `from` on.
+    ///
+    /// # Panics
+    /// If the row does not lie in this band.
+    pub fn row(&self, plane: usize, row: usize, from: usize, count: usize) -> &[T] {
+        &self.planes[plane][(row - self.top) * self.width + from..][..count]
+    }
+
+    /// The same of every plane, to be written.
+    ///
+    /// # Panics
+    /// If the row does not lie in this band.
+    pub fn rows_mut(&mut self, row: usize, from: usize, count: usize) -> [&mut [T]; PLANES] {
+        let at = (row - self.top) * self.width + from;
+        self.planes
+            .each_mut()
+            .map(|plane| &mut plane[at..at + count])
+    }
+}
+
+/// The plain case: planes in, planes out.
+pub(crate) struct Planar<'a> {
+    pub(crate) input: &'a [f32],
+    pub(crate) size: (usize, usize),
+}
+
+impl Rows<OUTPUTS> for Planar<'_> {
+    type Value = f32;
+
+    fn read(&self, row: usize, from: usize, _: &Band<'_, f32, OUTPUTS>, into: &mut [f32]) {
+        let (height, width) = self.size;
+        let planes = self.input.chunks_exact(height * width);
+        let count = into.len() / planes.len();
+        for (into, plane) in into.chunks_exact_mut(count).zip(planes) {
+            into.copy_from_slice(&plane[row * width + from..][..count]);
+        }
+    }
+
+    fn write(
+        &self,
+        row: usize,
+        from: usize,
+        values: [&mut [f32]; OUTPUTS],
+        band: &mut Band<'_, f32, OUTPUTS>,
+    ) {
+        let out = band.rows_mut(row, from, values[0].len());
+        for (out, values) in out.into_iter().zip(values) {
+            out.copy_from_slice(values);
+        }
     }
 }
 
 /// Working memory for as many bands as run at once; grows in the first frame and is kept.
 #[derive(Debug)]
 pub struct Scratch<E> {
-    free: Mutex<Vec<Vec<Ring<E>>>>,
+    free: Mutex<Vec<Memory<E>>>,
 }
 
 impl<E> Default for Scratch<E> {
@@ -197,9 +284,33 @@ impl<E> Scratch<E> {
     pub fn bytes(&self) -> usize {
         let free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         free.iter()
-            .flatten()
-            .map(|ring| ring.memory.capacity() * size_of::<E>())
+            .map(|memory| {
+                let rings: usize = memory.rings.iter().map(|r| r.memory.capacity()).sum();
+                let rows = memory.input.capacity() + memory.output.capacity();
+                rings * size_of::<E>() + rows * size_of::<f32>()
+            })
             .sum()
+    }
+}
+
+/// What one band works in.
+#[derive(Debug)]
+struct Memory<E> {
+    /// One a layer.
+    rings: Vec<Ring<E>>,
+    /// A row of the network's input.
+    input: Vec<f32>,
+    /// A row of its output.
+    output: Vec<f32>,
+}
+
+impl<E> Default for Memory<E> {
+    fn default() -> Self {
+        Memory {
+            rings: Vec::new(),
+            input: Vec::new(),
+            output: Vec::new(),
+        }
     }
 }
 
@@ -245,86 +356,108 @@ impl<E: Copy + Default> Ring<E> {
     }
 }
 
-/// Runs `chain` on a frame: `input` planar, `output` (6, H, W).
-pub(crate) fn run<C: Chain>(
+/// Runs `chain` on a frame: its input from `rows`, its output through them into `planes`, each (H, W).
+pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     chain: &C,
-    input: &[f32],
-    output: &mut [f32],
+    rows: &R,
+    planes: [&mut [R::Value]; PLANES],
     (height, width): (usize, usize),
     tiling: Tiling,
     scratch: &Scratch<C::Element>,
 ) {
     let area = height * width;
-    assert_eq!(input.len(), chain.inputs() * area, "planes of the input");
-    assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
+    assert!(
+        PLANES > 0 && planes.iter().all(|plane| plane.len() == area),
+        "planes of the output"
+    );
     if area == 0 {
         return;
     }
     let frame = Frame {
         chain,
-        input,
+        rows,
         height,
         width,
         tiling,
         scratch,
     };
-    let mut planes = output.chunks_exact_mut(area);
-    let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
-    frame.bands(0, height.div_ceil(tiling.band_rows.max(1)), planes);
+    let bands = height.div_ceil(tiling.band_rows.max(1));
+    let whole = Band {
+        top: 0,
+        width,
+        planes,
+    };
+    frame.bands(0, bands, whole);
 }
 
-struct Frame<'a, C: Chain> {
+struct Frame<'a, C: Chain, R> {
     chain: &'a C,
-    input: &'a [f32],
+    rows: &'a R,
     height: usize,
     width: usize,
     tiling: Tiling,
     scratch: &'a Scratch<C::Element>,
 }
 
-impl<C: Chain> Frame<'_, C> {
-    /// Runs bands `from..to`, whose rows `planes` hold, dividing them among the pool's threads.
-    fn bands(&self, from: usize, to: usize, planes: [&mut [f32]; OUTPUTS]) {
-        let rows = self.tiling.band_rows.max(1);
+impl<C: Chain, R> Frame<'_, C, R> {
+    /// Runs bands `from..to`, which `band` holds, dividing them among the pool's threads.
+    fn bands<const PLANES: usize>(&self, from: usize, to: usize, band: Band<'_, R::Value, PLANES>)
+    where
+        R: Rows<PLANES>,
+    {
         if to - from == 1 {
-            return self.band(from * rows, planes);
+            return self.band(band);
         }
         let middle = (from + to) / 2;
-        let split = (middle - from) * rows * self.width;
-        let mut halves = planes.map(|plane| plane.split_at_mut(split));
+        let rows = (middle - from) * self.tiling.band_rows.max(1);
+        let mut halves = band
+            .planes
+            .map(|plane| plane.split_at_mut(rows * self.width));
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);
+        let part = |top, planes| Band {
+            top,
+            width: self.width,
+            planes,
+        };
         rayon::join(
-            || self.bands(from, middle, first),
-            || self.bands(middle, to, second),
+            || self.bands(from, middle, part(band.top, first)),
+            || self.bands(middle, to, part(band.top + rows, second)),
         );
     }
 
-    /// Runs the band that starts at row `top`, strip by strip.
-    fn band(&self, top: usize, mut planes: [&mut [f32]; OUTPUTS]) {
+    /// Runs a band, strip by strip.
+    fn band<const PLANES: usize>(&self, mut band: Band<'_, R::Value, PLANES>)
+    where
+        R: Rows<PLANES>,
+    {
         let free = || {
             self.scratch
                 .free
                 .lock()
                 .unwrap_or_else(PoisonError::into_inner)
         };
-        let mut rings = free().pop().unwrap_or_default();
-        let bottom = top + planes[0].len() / self.width;
+        let mut memory = free().pop().unwrap_or_default();
         let columns = self.tiling.strip_columns.max(1);
         for left in (0..self.width).step_by(columns) {
             let right = (left + columns).min(self.width);
-            self.strip((top, bottom), (left, right), &mut planes, &mut rings);
+            self.strip((left, right), &mut band, &mut memory);
         }
-        free().push(rings);
+        free().push(memory);
     }
 
-    fn strip(
+    fn strip<const PLANES: usize>(
         &self,
-        (top, bottom): (usize, usize),
         (left, right): (usize, usize),
-        planes: &mut [&mut [f32]; OUTPUTS],
-        rings: &mut Vec<Ring<C::Element>>,
-    ) {
+        band: &mut Band<'_, R::Value, PLANES>,
+        Memory {
+            rings,
+            input,
+            output,
+        }: &mut Memory<C::Element>,
+    ) where
+        R: Rows<PLANES>,
+    {
         let chain = self.chain;
         let layers = chain.layers();
         // The strip with the halo that its last layer reaches, one pixel a layer, within the frame.
@@ -337,13 +470,12 @@ impl<C: Chain> Frame<'_, C> {
         for (i, ring) in rings.iter_mut().take(layers).enumerate() {
             ring.prepare(chain.groups(i) * geometry.stride(), chain.zero(i));
         }
-        let source = |row: usize| SourceRow {
-            planes: self.input,
-            plane: self.height * self.width,
-            offset: row * self.width + start,
-        };
-        let (top, bottom, height) = (top as isize, bottom as isize, self.height as isize);
-        let depth = layers as isize;
+        let columns = end - start;
+        let input = grown(input, chain.inputs() * columns);
+        let output = grown(output, OUTPUTS * (right - left));
+        let rows = band.rows();
+        let (top, bottom) = (rows.start as isize, rows.end as isize);
+        let (height, depth) = (self.height as isize, layers as isize);
         for step in top - depth..bottom + depth {
             for (i, reach) in (1..=depth).rev().enumerate() {
                 let row = step - i as isize;
@@ -356,15 +488,22 @@ impl<C: Chain> Frame<'_, C> {
                     out.fill(chain.zero(i));
                     continue;
                 }
+                if i == 0 || i == layers - 1 {
+                    self.rows.read(row as usize, start, band, input);
+                }
+                let source = SourceRow {
+                    planes: input,
+                    plane: columns,
+                };
                 match i {
-                    0 => chain.input_row(source(row as usize), out, geometry),
+                    0 => chain.input_row(source, out, geometry),
                     _ => {
                         let skip = has_skip(i).then(|| before[i - 2].row(row));
                         chain.hidden_row(i - 1, before[i - 1].window(row), skip, out, geometry);
                     }
                 }
                 if i == layers - 1 {
-                    chain.concatenated_row(source(row as usize), out, geometry);
+                    chain.concatenated_row(source, out, geometry);
                 }
                 // The next layer reads one pixel past the row: at the frame's edge that is padding.
                 let past = geometry.start() + geometry.width * geometry.group;
@@ -374,12 +513,21 @@ impl<C: Chain> Frame<'_, C> {
             }
             let row = step - depth;
             if (top..bottom).contains(&row) {
-                let at = (row - top) as usize * self.width + left;
-                let out = planes
-                    .each_mut()
-                    .map(|plane| &mut plane[at..at + right - left]);
+                let mut planes = output.chunks_exact_mut(right - left);
+                let mut planes: [_; OUTPUTS] =
+                    std::array::from_fn(|_| planes.next().unwrap_or_default());
+                let out = planes.each_mut().map(|plane| &mut **plane);
                 chain.last_row(rings[layers - 1].window(row), out, left - start, geometry);
+                self.rows.write(row as usize, left, planes, band);
             }
         }
     }
+}
+
+/// The first `count` values of `memory`, which grows where it has fewer.
+fn grown(memory: &mut Vec<f32>, count: usize) -> &mut [f32] {
+    if memory.len() < count {
+        memory.resize(count, 0.0);
+    }
+    &mut memory[..count]
 }

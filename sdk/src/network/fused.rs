@@ -1,8 +1,11 @@
 //! A chain on Phasefront's own kernels: the choice of kernels, and the step sizes that they multiply by.
 
 use super::chain::{Chain, Precision, Quantisation, Weights};
+use super::{Head, InputKind, Source};
+use num_complex::Complex32;
 use phasefront_kernels::{
-    F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, Quantiser, Requantise, Scratch, SkipSum,
+    Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows,
+    Scratch, SkipSum, Tiling,
 };
 use rayon::prelude::*;
 
@@ -61,32 +64,110 @@ impl FusedChain {
         size: (usize, usize),
         scratch: &FusedScratch,
     ) {
+        let tiling = self.tiling(size);
         match &self.kernels {
-            Kernels::Int8(chain) => {
-                chain.run(
-                    input,
-                    output,
-                    size,
-                    chain.tiling(size.0, size.1),
-                    &scratch.int8,
-                );
-            }
-            Kernels::F32(chain) => {
-                chain.run(
-                    input,
-                    output,
-                    size,
-                    chain.tiling(size.0, size.1),
-                    &scratch.f32,
-                );
-            }
+            Kernels::Int8(chain) => chain.run(input, output, size, tiling, &scratch.int8),
+            Kernels::F32(chain) => chain.run(input, output, size, tiling, &scratch.f32),
         }
         if self.tanh {
             const CHUNK: usize = 1 << 14;
             output
                 .par_chunks_mut(CHUNK)
-                .for_each(|chunk| chunk.iter_mut().for_each(|v| *v = tanh(*v)));
+                .for_each(|chunk| tanh(&mut [chunk]));
         }
+    }
+
+    /// Runs the chain from `source`, planes of `kind`, through `head` into `field`, (3, H, W), row by row: neither the
+    /// input nor the output lies in memory as a whole.
+    pub(super) fn field<S: Source + ?Sized>(
+        &self,
+        source: &S,
+        (kind, head): (InputKind, Head),
+        field: &mut [Complex32],
+        size: (usize, usize),
+        scratch: &FusedScratch,
+    ) {
+        let rows = FieldRows {
+            source,
+            kind,
+            head,
+            tanh: self.tanh,
+        };
+        let mut planes = field.chunks_exact_mut((size.0 * size.1).max(1));
+        let planes: [_; 3] = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        self.run_rows(&rows, planes, size, self.tiling(size), scratch);
+    }
+
+    pub(super) fn layers(&self) -> usize {
+        match &self.kernels {
+            Kernels::Int8(chain) => chain.layers(),
+            Kernels::F32(chain) => chain.layers(),
+        }
+    }
+
+    /// Whether what rows are written holds before tanh.
+    pub(super) fn has_tanh(&self) -> bool {
+        self.tanh
+    }
+
+    /// The tiling that suits a frame of `size` and the current rayon pool.
+    pub(super) fn tiling(&self, size: (usize, usize)) -> Tiling {
+        match &self.kernels {
+            Kernels::Int8(chain) => chain.tiling(size.0, size.1),
+            Kernels::F32(chain) => chain.tiling(size.0, size.1),
+        }
+    }
+
+    /// Runs the chain but for its tanh.
+    pub(super) fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
+        &self,
+        rows: &R,
+        planes: [&mut [R::Value]; PLANES],
+        size: (usize, usize),
+        tiling: Tiling,
+        scratch: &FusedScratch,
+    ) {
+        match &self.kernels {
+            Kernels::Int8(chain) => chain.run_rows(rows, planes, size, tiling, &scratch.int8),
+            Kernels::F32(chain) => chain.run_rows(rows, planes, size, tiling, &scratch.f32),
+        }
+    }
+}
+
+/// Rows of a source in, rows of a field out.
+struct FieldRows<'a, S: ?Sized> {
+    source: &'a S,
+    kind: InputKind,
+    head: Head,
+    tanh: bool,
+}
+
+impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
+    type Value = Complex32;
+
+    fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, 3>, into: &mut [f32]) {
+        let count = into.len() / self.kind.channels();
+        for (plane, into) in into.chunks_exact_mut(count).enumerate() {
+            self.source.read(plane, row, from, into);
+        }
+    }
+
+    fn write(
+        &self,
+        row: usize,
+        from: usize,
+        mut values: [&mut [f32]; OUTPUTS],
+        band: &mut Band<'_, Complex32, 3>,
+    ) {
+        if self.tanh {
+            tanh(&mut values);
+        }
+        let field = band.rows_mut(row, from, values[0].len());
+        let base = |plane: usize, at: usize, into: &mut [f32]| {
+            self.source.read(plane, row, from + at, into);
+        };
+        self.head
+            .row(self.kind, values.map(|run| &*run), base, field);
     }
 }
 
@@ -179,9 +260,16 @@ fn int8(chain: &Chain, isa: Isa) -> Result<Int8Chain, String> {
     )
 }
 
+/// tanh of runs of values, in place.
+pub(super) fn tanh(runs: &mut [&mut [f32]]) {
+    for run in runs {
+        run.iter_mut().for_each(|v| *v = tanh_value(*v));
+    }
+}
+
 /// tanh to 3e-7, without branches, so that loops over it vectorise: `1 − 2/(e^2x + 1)`.
 #[inline(always)]
-fn tanh(x: f32) -> f32 {
+fn tanh_value(x: f32) -> f32 {
     // Beyond ±10 tanh is ±1 in f32.
     let y = x.clamp(-10.0, 10.0) * (2.0 * std::f32::consts::LOG2_E);
     // 2^y = 2^k · 2^r with |r| ≤ ½; adding 1.5·2²³ rounds and leaves k in the low bits.
@@ -205,11 +293,11 @@ mod tests {
     fn tanh_agrees_with_f64() {
         for k in -120_000..=120_000 {
             let x = k as f32 / 10_000.0;
-            let worst = (f64::from(tanh(x)) - f64::from(x).tanh()).abs();
+            let worst = (f64::from(tanh_value(x)) - f64::from(x).tanh()).abs();
             assert!(worst < 3e-7, "tanh {x} is off by {worst}");
         }
         for (x, expected) in [(1e30, 1.0), (-1e30, -1.0), (f32::INFINITY, 1.0), (0.0, 0.0)] {
-            assert!((tanh(x) - expected).abs() < 3e-7);
+            assert!((tanh_value(x) - expected).abs() < 3e-7);
         }
     }
 }

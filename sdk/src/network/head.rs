@@ -1,8 +1,13 @@
 //! From a network's output to the complex field that it stands for.
 
+use super::InputKind;
 use crate::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
+
+/// Pixels of a parallel part, and of a piece that is worked on at once.
+const PART: usize = 1 << 12;
+const PIECE: usize = 256;
 
 /// How a network's six output planes stand for a complex field of three colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -10,7 +15,8 @@ use rayon::prelude::*;
 pub enum Head {
     /// The paper's: with `t` the tanh of the last layer, amplitude `(t[c] + 1)·√½ ∈ [0, √2]` and phase `π·t[3+c]`.
     AmplitudePhase,
-    /// A correction of the flat field: real part `rgb[c] + o[c]` with the image's value in [0, 1], imaginary `o[3+c]`.
+    /// A correction `o` of what came in: of the flat field, real part `rgb[c] + o[c]` with the front image's value in
+    /// [0, 1], imaginary `o[3+c]`; or, where the input is a field `u`, `u[c] + o[c] + i·o[3+c]`.
     RealImaginary,
 }
 
@@ -23,46 +29,92 @@ impl Head {
         }
     }
 
-    /// Turns `output` (6, H, W) into `field` (3, H, W), carrier-free, at z = 0.
+    /// Turns `output` (6, H, W) into `field` (3, H, W), carrier-free, at z = 0 (or, for a pre-filter, where its input
+    /// stands).
     ///
-    /// `input` is the network's input, whose first three planes are the front image minus 0.5; only
-    /// [`Head::RealImaginary`] reads it. Runs on the current rayon pool and allocates nothing.
+    /// `input` is the network's input, planes of `kind`; only [`Head::RealImaginary`] reads it. Runs on the current
+    /// rayon pool and allocates nothing.
     ///
     /// # Errors
     /// When the lengths do not fit each other.
-    pub fn field(self, output: &[f32], input: &[f32], field: &mut [Complex32]) -> Result<()> {
+    pub fn field(
+        self,
+        kind: InputKind,
+        output: &[f32],
+        input: &[f32],
+        field: &mut [Complex32],
+    ) -> Result<()> {
         let area = field.len() / 3;
-        if field.len() != 3 * area || output.len() != 6 * area || input.len() < 3 * area {
+        if field.len() != 3 * area
+            || output.len() != 6 * area
+            || input.len() != kind.channels() * area
+        {
             return Err(Error::Frame(format!(
-                "head: output {}, input {} and field {} values; 6, 3 or more, and 3 planes of one size are right",
+                "head: output {}, input {} and field {} values; 6, {} and 3 planes of one size are right",
                 output.len(),
                 input.len(),
-                field.len()
+                field.len(),
+                kind.channels()
             )));
         }
-        const CHUNK: usize = 4096;
-        let (first, second) = output.split_at(3 * area);
-        let parts = first.par_chunks(CHUNK).zip(second.par_chunks(CHUNK));
-        parts
-            .zip(input[..3 * area].par_chunks(CHUNK))
-            .zip(field.par_chunks_mut(CHUNK))
-            .for_each(|(((first, second), image), field)| match self {
-                Head::AmplitudePhase => {
-                    for ((out, a), p) in field.iter_mut().zip(first).zip(second) {
-                        let amplitude = (a + 1.0) * std::f32::consts::FRAC_1_SQRT_2;
-                        let (sin, cos) = sin_cos_pi(*p);
-                        *out = Complex32::new(amplitude * cos, amplitude * sin);
-                    }
-                }
-                Head::RealImaginary => {
-                    for (((out, re), im), image) in
-                        field.iter_mut().zip(first).zip(second).zip(image)
-                    {
-                        *out = Complex32::new(image + 0.5 + re, *im);
-                    }
-                }
-            });
+        if area == 0 {
+            return Ok(());
+        }
+        let mut planes = field.chunks_exact_mut(area);
+        let [red, green, blue] =
+            std::array::from_fn(|_| planes.next().unwrap_or_default().par_chunks_mut(PART));
+        let parts = red.zip(green).zip(blue).enumerate();
+        parts.for_each(|(part, ((red, green), blue))| {
+            let at = part * PART;
+            let values = std::array::from_fn(|k| &output[k * area + at..][..red.len()]);
+            let base = |plane: usize, from: usize, into: &mut [f32]| {
+                into.copy_from_slice(&input[plane * area + at + from..][..into.len()]);
+            };
+            self.row(kind, values, base, [red, green, blue]);
+        });
         Ok(())
+    }
+
+    /// A run of pixels of [`Head::field`]: `base` gives pixels of a plane of the input, from the given one of the run on.
+    pub(super) fn row(
+        self,
+        kind: InputKind,
+        values: [&[f32]; 6],
+        base: impl Fn(usize, usize, &mut [f32]),
+        field: [&mut [Complex32]; 3],
+    ) {
+        if self == Head::AmplitudePhase {
+            return Self::amplitude_phase(values, field);
+        }
+        for (c, field) in field.into_iter().enumerate() {
+            let (first, second) = (values[c], values[3 + c]);
+            let (mut re, mut im) = ([0.0; PIECE], [0.0; PIECE]);
+            for (piece, out) in field.chunks_mut(PIECE).enumerate() {
+                let (at, count) = (piece * PIECE, out.len());
+                base(c, at, &mut re[..count]);
+                if kind == InputKind::Field {
+                    base(3 + c, at, &mut im[..count]);
+                } else {
+                    // Colours come in minus a half.
+                    re[..count].iter_mut().for_each(|re| *re += 0.5);
+                }
+                let parts = out.iter_mut().zip(&first[at..]).zip(&second[at..]);
+                for (((out, first), second), (re, im)) in parts.zip(re.iter().zip(&im)) {
+                    *out = Complex32::new(re + first, im + second);
+                }
+            }
+        }
+    }
+
+    /// A run of pixels of [`Head::AmplitudePhase`].
+    pub(super) fn amplitude_phase(values: [&[f32]; 6], field: [&mut [Complex32]; 3]) {
+        for (c, field) in field.into_iter().enumerate() {
+            for ((out, a), p) in field.iter_mut().zip(values[c]).zip(values[3 + c]) {
+                let amplitude = (a + 1.0) * std::f32::consts::FRAC_1_SQRT_2;
+                let (sin, cos) = sin_cos_pi(*p);
+                *out = Complex32::new(amplitude * cos, amplitude * sin);
+            }
+        }
     }
 }
 
@@ -120,7 +172,7 @@ mod tests {
         let input: Vec<f32> = (0..8).map(|k| k as f32 / 8.0 - 0.5).collect();
         let mut field = vec![Complex32::default(); 6];
         Head::AmplitudePhase
-            .field(&output, &input, &mut field)
+            .field(InputKind::Rgbd, &output, &input, &mut field)
             .unwrap();
         for (k, value) in field.iter().enumerate() {
             let expected = Complex32::from_polar(
@@ -133,10 +185,21 @@ mod tests {
             );
         }
         Head::RealImaginary
-            .field(&output, &input, &mut field)
+            .field(InputKind::Rgbd, &output, &input, &mut field)
             .unwrap();
         for (k, value) in field.iter().enumerate() {
             let expected = Complex32::new(k as f32 / 8.0 + output[k], output[6 + k]);
+            assert!(
+                (value - expected).norm() < 1e-6,
+                "{k}: {value} against {expected}"
+            );
+        }
+        let there: Vec<f32> = (0..12).map(|k| (k as f32 * 0.7).sin()).collect();
+        Head::RealImaginary
+            .field(InputKind::Field, &output, &there, &mut field)
+            .unwrap();
+        for (k, value) in field.iter().enumerate() {
+            let expected = Complex32::new(there[k] + output[k], there[6 + k] + output[6 + k]);
             assert!(
                 (value - expected).norm() < 1e-6,
                 "{k}: {value} against {expected}"
@@ -147,15 +210,14 @@ mod tests {
     #[test]
     fn wrong_lengths_are_refused() {
         let mut field = vec![Complex32::default(); 3];
-        assert!(
-            Head::AmplitudePhase
-                .field(&[0.0; 5], &[0.0; 3], &mut field)
-                .is_err()
-        );
-        assert!(
-            Head::RealImaginary
-                .field(&[0.0; 6], &[0.0; 2], &mut field)
-                .is_err()
-        );
+        for (kind, output, input) in [
+            (InputKind::Rgbd, 5, 4),
+            (InputKind::Rgbd, 6, 3),
+            (InputKind::Field, 6, 4),
+        ] {
+            let (output, input) = (vec![0.0; output], vec![0.0; input]);
+            let head = Head::RealImaginary;
+            assert!(head.field(kind, &output, &input, &mut field).is_err());
+        }
     }
 }

@@ -15,7 +15,7 @@ pub enum InputKind {
         /// How many layers.
         layers: usize,
     },
-    /// "field": amplitude (3) and phase (3) planes of a field; a pre-filter network.
+    /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,
 }
 

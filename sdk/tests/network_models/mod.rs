@@ -18,6 +18,7 @@ pub struct Model {
     pub inner_roundings: bool,
     pub head: &'static str,
     pub input: &'static str,
+    pub offset_mm: &'static str,
 }
 
 impl Model {
@@ -32,6 +33,7 @@ impl Model {
             inner_roundings: true,
             head: "real-imaginary",
             input: "rgbd",
+            offset_mm: "0",
         }
     }
 
@@ -39,6 +41,16 @@ impl Model {
         Model {
             int8: true,
             ..Model::new(layers, filters)
+        }
+    }
+
+    /// A pre-filter for an offset.
+    pub fn prefilter(offset_mm: &'static str) -> Model {
+        Model {
+            inputs: 6,
+            input: "field",
+            offset_mm,
+            ..Model::new(8, 8)
         }
     }
 
@@ -136,7 +148,7 @@ impl Model {
             ("pitch_um", "8.0"),
             ("wavelengths_nm", "638,520,450"),
             ("volume_depth_mm", "6.0"),
-            ("offset_mm", "0"),
+            ("offset_mm", self.offset_mm),
         ];
         ModelProto {
             ir_version: 8,

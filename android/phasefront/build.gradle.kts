@@ -1,0 +1,95 @@
+// The Gradle library: the Kotlin API over what is generated, and libphasefront_ffi.so for two ABIs. Needs cargo,
+// cargo-ndk 4 and NDK r28 or later, whose libraries have pages of 16 KB.
+import com.vanniktech.maven.publish.AndroidSingleVariantLibrary
+
+plugins {
+    alias(libs.plugins.android.library)
+    alias(libs.plugins.kotlin.android)
+    alias(libs.plugins.maven.publish)
+}
+
+val workspace: File = rootDir.parentFile
+val phasefrontVersion: String = Regex("""(?m)^version = "(.+)"$""")
+    .find(workspace.resolve("Cargo.toml").readText())!!.groupValues[1]
+
+group = "org.phasefront"
+version = phasefrontVersion
+
+val libraries = layout.buildDirectory.dir("rust/jniLibs")
+val generated = layout.buildDirectory.dir("generated/uniffi")
+
+val buildRust by tasks.registering(Exec::class) {
+    description = "Builds libphasefront_ffi.so for the phones' ABIs."
+    workingDir = workspace
+    inputs.files(fileTree(workspace) { include("Cargo.*", "bindings/src/**", "bindings/Cargo.toml", "sdk/**", "models/*.onnx") })
+    outputs.dir(libraries)
+    commandLine(
+        "cargo", "ndk", "--target", "arm64-v8a", "--target", "x86_64", "--platform", "26",
+        "--output-dir", libraries.get().asFile.path, "build", "--profile", "mobile", "--package", "phasefront-ffi",
+    )
+}
+
+val generateKotlin by tasks.registering(Exec::class) {
+    description = "Generates the Kotlin under the API from the library."
+    dependsOn(buildRust)
+    workingDir = workspace
+    inputs.files("$workspace/bindings/uniffi.toml", "$rootDir/uniffi.toml")
+    inputs.dir(libraries)
+    outputs.dir(generated)
+    commandLine(
+        "cargo", "run", "--release", "--package", "phasefront-bindgen", "--bin", "uniffi-bindgen", "--", "generate",
+        libraries.get().file("arm64-v8a/libphasefront_ffi.so").asFile.path, "--language", "kotlin", "--no-format",
+        "--config", "$rootDir/uniffi.toml", "--out-dir", generated.get().asFile.path,
+    )
+}
+
+android {
+    namespace = "org.phasefront"
+    compileSdk = 36
+    ndkVersion = "28.2.13676358"
+
+    defaultConfig {
+        minSdk = 26
+        consumerProguardFiles("consumer-rules.pro")
+        testInstrumentationRunner = "android.test.InstrumentationTestRunner"
+        ndk { abiFilters += listOf("arm64-v8a", "x86_64") }
+    }
+
+    compileOptions {
+        sourceCompatibility = JavaVersion.VERSION_17
+        targetCompatibility = JavaVersion.VERSION_17
+    }
+
+    sourceSets["main"].apply {
+        // `core` has no class of Android's: it is tested on a JVM, by pom.xml and tests/kotlin.
+        kotlin.srcDirs("src/core/kotlin", generated)
+        jniLibs.srcDir(libraries)
+    }
+
+    packaging { jniLibs.useLegacyPackaging = false }
+}
+
+kotlin { compilerOptions { jvmTarget.set(org.jetbrains.kotlin.gradle.dsl.JvmTarget.JVM_17) } }
+
+tasks.named("preBuild") { dependsOn(generateKotlin) }
+
+dependencies {
+    api(libs.coroutines)
+    implementation("${libs.jna.get()}@aar")
+}
+
+mavenPublishing {
+    configure(AndroidSingleVariantLibrary("release", sourcesJar = true, publishJavadocJar = true))
+    publishToMavenCentral()
+    signAllPublications()
+    coordinates("org.phasefront", "phasefront", phasefrontVersion)
+    pom {
+        name.set("Phasefront")
+        description.set("RGB-D frames to phase-only 3D holograms, on the device")
+        licenses {
+            license {
+                name.set("MIT OR Apache-2.0")
+            }
+        }
+    }
+}

@@ -1,0 +1,12 @@
+package org.phasefront
+
+import java.nio.ByteBuffer
+
+/**
+ * Reads a network from an ONNX file's bytes: those of [onnx], a direct buffer, from its position to its limit.
+ *
+ * @throws PhasefrontException.Network for what is not a hologram network, with what is not so and what would be right.
+ */
+public fun Network.Companion.fromBytes(onnx: ByteBuffer): Network = fromMemory(
+    onnx.direct { PhasefrontException.Network("network: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
+)

@@ -1,0 +1,219 @@
+package org.phasefront
+
+import com.sun.jna.Native
+import java.util.ArrayDeque
+import kotlinx.coroutines.channels.Channel
+import kotlinx.coroutines.flow.Flow
+import kotlinx.coroutines.flow.flow
+
+/**
+ * Frames in, holograms out. Every call may come from any thread, at any moment. [process], [warmUp] and [close] wait for a
+ * frame: not for the main thread.
+ *
+ * ```kotlin
+ * Session(sessionOptions(Network.builtIn()), RunningMode.IMAGE).use { session ->
+ *     session.process(frame).use { hologram -> hologram.usePlane(Colour.GREEN) { println(it.remaining()) } }
+ * }
+ * ```
+ *
+ * In a live stream [listener] is called on the session's own thread, one event after another, and no frame is processed
+ * while it is busy; without one, read [events].
+ *
+ * @throws PhasefrontException for options that cannot be meant or planned for.
+ */
+public class Session(
+    options: SessionOptions,
+    mode: RunningMode,
+    listener: ((SessionEvent) -> Unit)? = null,
+) : AutoCloseable {
+    private val queue = EventQueue()
+    private val raw: RawSession = when {
+        listener != null -> RawSession(options, mode, Listener(listener))
+        mode == RunningMode.LIVE_STREAM -> RawSession(options, mode, Listener(queue::push))
+        else -> RawSession(options, mode, null)
+    }
+
+    init {
+        if (listener != null || mode != RunningMode.LIVE_STREAM) queue.finish()
+    }
+
+    /**
+     * What becomes of the frames of a live stream; for one reader. Empty where a listener hears it, and in the other running
+     * modes. Two holograms wait for the reader at most: the oldest gives way to a newer one and is told as dropped, as
+     * [DropReason.UNREAD], so a slow reader falls behind by little and memory stays flat.
+     */
+    public val events: Flow<SessionEvent> = flow {
+        while (true) emit(queue.take() ?: break)
+    }
+
+    /**
+     * The hologram of [frame], in an image or a video session. Waits for it.
+     *
+     * @throws PhasefrontException for a frame that is not usable or late, or a session that is a live stream, paused or
+     * closed. None of them harms the frames that follow.
+     */
+    public fun process(frame: Frame): Hologram = Hologram(
+        raw.process(
+            frame.colourBytes(0),
+            frame.colourBytes(1),
+            frame.colourBytes(2),
+            frame.depthBytes(),
+            frame.confidenceBytes(),
+            frame.info(),
+        ),
+    )
+
+    /**
+     * Hands [frame] to a live stream, which copies it and goes on by itself: it never waits for a frame to be processed.
+     * Gives why the frame was dropped, if it was at once; that is an event, too.
+     *
+     * @throws PhasefrontException for a frame that is not usable or late, or a session that is no live stream or is closed.
+     * None of them harms the frames that follow.
+     */
+    public fun submit(frame: Frame): DropReason? = raw.submit(
+        frame.colourBytes(0),
+        frame.colourBytes(1),
+        frame.colourBytes(2),
+        frame.depthBytes(),
+        frame.confidenceBytes(),
+        frame.info(),
+    )
+
+    /** Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it. */
+    public fun warmUp(): Unit = raw.warmUp()
+
+    /** Forgets all frames so far; the next, of any timestamp, is the first again. */
+    public fun reset(): Unit = raw.reset()
+
+    /** Takes no frames until [resume]. */
+    public fun pause(): Unit = raw.pause()
+
+    /** Takes frames again. */
+    public fun resume(): Unit = raw.resume()
+
+    /** Says how hot the device is. */
+    public fun setThermal(thermal: Thermal): Unit = raw.setThermal(thermal)
+
+    /** Allows or forbids steps on the ladder. */
+    public fun setQuality(quality: Quality): Unit = raw.setQuality(quality)
+
+    /** What the session has done so far; of a closed one, what it did. Never waits for a frame. */
+    public fun statistics(): Statistics = raw.statistics()
+
+    /**
+     * Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all events
+     * have been told; called by the listener, it returns at once. Closing twice does nothing.
+     */
+    override fun close() {
+        raw.shutDown()
+        queue.finish()
+    }
+}
+
+/** What becomes of the frames of a live stream, in the order in which it happened. */
+public sealed interface SessionEvent {
+    /** A frame became a hologram, which is the receiver's to close. */
+    public class Made(public val hologram: Hologram) : SessionEvent
+
+    /** A frame was dropped. */
+    public data class Dropped(val timestampNs: Long, val reason: DropReason) : SessionEvent
+
+    /** A frame could not be processed. The session goes on. */
+    public data class Failed(val timestampNs: Long, val message: String) : SessionEvent
+
+    /** The frames after this one are made on another rung of the ladder. */
+    public data class QualityChanged(val timestampNs: Long, val change: QualityChange) : SessionEvent
+}
+
+/**
+ * What is usual: holograms of [display]'s resolution by [network]; AA-DPM, levels in equal steps, steady brightness, near
+ * and far by percentiles. Change what is not with `copy`.
+ */
+public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions =
+    sessionOptions(Method.Trained(network), display)
+
+/** The same by [method]. */
+public fun sessionOptions(method: Method, display: Display = Display()): SessionOptions = SessionOptions(
+    display = display,
+    ladder = listOf(Rung(method, display.width, display.height)),
+    quality = Quality.Adaptive,
+    targetRateHz = null,
+    encoding = Encoding.AntiAlias(0.7f, 3u),
+    response = Response.Linear,
+    brightness = Brightness.Steady,
+    depthRange = DepthRange.Percentiles,
+    leastConfidence = 0.25f,
+    threads = null,
+)
+
+/** Passes the library's calls on. */
+private class Listener(private val tell: (SessionEvent) -> Unit) : SessionListener {
+    override fun onHologram(hologram: RawHologram) = attached { tell(SessionEvent.Made(Hologram(hologram))) }
+
+    override fun onDropped(timestampNs: ULong, reason: DropReason) = attached {
+        tell(SessionEvent.Dropped(timestampNs.toLong(), reason))
+    }
+
+    override fun onFailed(timestampNs: ULong, message: String) = attached {
+        tell(SessionEvent.Failed(timestampNs.toLong(), message))
+    }
+
+    override fun onQualityChanged(timestampNs: ULong, change: QualityChange) = attached {
+        tell(SessionEvent.QualityChanged(timestampNs.toLong(), change))
+    }
+
+    /** Attaching the session's thread to the virtual machine is costly; without this, JNA would do it for every call. */
+    private inline fun attached(call: () -> Unit) {
+        Native.detach(false)
+        call()
+    }
+}
+
+/** Events that wait for their reader. */
+internal class EventQueue {
+    private val waiting = ArrayDeque<SessionEvent>()
+    private var holograms = 0
+    private var finished = false
+    private val changed = Channel<Unit>(Channel.CONFLATED)
+
+    fun push(event: SessionEvent) {
+        val given = synchronized(waiting) {
+            if (finished) return@synchronized event
+            waiting.add(event)
+            if (event !is SessionEvent.Made || ++holograms <= MOST_HOLOGRAMS) return@synchronized null
+            holograms--
+            val oldest = waiting.first { it is SessionEvent.Made } as SessionEvent.Made
+            val dropped = SessionEvent.Dropped(oldest.hologram.info.timestampNs.toLong(), DropReason.UNREAD)
+            val kept = waiting.map { if (it === oldest) dropped else it }
+            waiting.clear()
+            waiting.addAll(kept)
+            oldest
+        }
+        (given as? SessionEvent.Made)?.hologram?.close()
+        changed.trySend(Unit)
+    }
+
+    /** The next event; null behind the last. */
+    suspend fun take(): SessionEvent? {
+        while (true) {
+            synchronized(waiting) {
+                waiting.poll()?.let {
+                    if (it is SessionEvent.Made) holograms--
+                    return it
+                }
+                if (finished) return null
+            }
+            changed.receiveCatching()
+        }
+    }
+
+    /** No more events come; those that wait can still be read. */
+    fun finish() {
+        synchronized(waiting) { finished = true }
+        changed.close()
+    }
+
+    private companion object {
+        const val MOST_HOLOGRAMS = 2
+    }
+}

@@ -1,0 +1,24 @@
+package org.phasefront
+
+import android.os.PowerManager
+
+/** Sends messages of [level] and above to logcat, under the tag "phasefront". */
+public fun Log.sendToLogcat(level: LogLevel = LogLevel.INFO) {
+    send(level) { of, message ->
+        val priority = when (of) {
+            LogLevel.ERROR -> android.util.Log.ERROR
+            LogLevel.WARNING -> android.util.Log.WARN
+            LogLevel.INFO -> android.util.Log.INFO
+            LogLevel.DEBUG -> android.util.Log.DEBUG
+        }
+        android.util.Log.println(priority, "phasefront", message)
+    }
+}
+
+/** What `PowerManager.currentThermalStatus` (API 29) says. */
+public fun thermalOf(status: Int): Thermal = when (status) {
+    PowerManager.THERMAL_STATUS_NONE -> Thermal.NOMINAL
+    PowerManager.THERMAL_STATUS_LIGHT, PowerManager.THERMAL_STATUS_MODERATE -> Thermal.FAIR
+    PowerManager.THERMAL_STATUS_SEVERE -> Thermal.SERIOUS
+    else -> Thermal.CRITICAL
+}

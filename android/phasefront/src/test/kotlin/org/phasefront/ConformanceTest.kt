@@ -1,0 +1,133 @@
+package org.phasefront
+
+import java.io.ByteArrayOutputStream
+import java.io.File
+import java.nio.ByteBuffer
+import kotlin.math.abs
+import kotlin.math.min
+import kotlin.test.Test
+import kotlin.test.assertContentEquals
+import kotlin.test.assertEquals
+import kotlin.test.assertTrue
+import org.json.JSONArray
+import org.json.JSONObject
+
+/** The conformance suite, run from Kotlin: the levels must be those of the suite, and Rust's to the bit. */
+class ConformanceTest {
+    private val folder = File(System.getProperty("phasefront.suite"))
+    private val memory: ByteBuffer = folder.resolve("frames.bin").readBytes().let { direct(it.size).put(it).flip() }
+
+    private fun JSONArray.objects(): List<JSONObject> = List(length()) { getJSONObject(it) }
+
+    private fun plane(plane: JSONObject): Plane {
+        // Not sliced: the wrapper must see to positions itself.
+        val bytes = memory.duplicate()
+        bytes.position(plane.getInt("offset")).limit(plane.getInt("offset") + plane.getInt("length"))
+        return Plane(bytes, plane.getInt("row_stride"), plane.getInt("pixel_stride"))
+    }
+
+    private fun frame(case: JSONObject): Frame {
+        val colour = case.getJSONObject("colour")
+        val depth = case.getJSONObject("depth")
+        val confidence = case.optJSONObject("confidence")?.let {
+            val format = when (val name = it.getString("format")) {
+                "low-medium-high" -> ConfidenceFormat.LOW_MEDIUM_HIGH
+                "u8" -> ConfidenceFormat.U8
+                else -> error(name)
+            }
+            ConfidenceMap(format, it.getInt("width"), it.getInt("height"), plane(it.getJSONObject("plane")))
+        }
+        val depthFormat = when (val name = depth.getString("format")) {
+            "metres-f32" -> DepthFormat.METRES_F32
+            "metres-f16" -> DepthFormat.METRES_F16
+            "disparity-f32" -> DepthFormat.DISPARITY_F32
+            "disparity-f16" -> DepthFormat.DISPARITY_F16
+            "millimetres-u16" -> DepthFormat.MILLIMETRES_U16
+            "android-depth16" -> DepthFormat.ANDROID_DEPTH16
+            "normalized-u8" -> DepthFormat.NORMALIZED_U8
+            "normalized-u16" -> DepthFormat.NORMALIZED_U16
+            else -> error(name)
+        }
+        val rotation = when (val degrees = case.getInt("rotation")) {
+            0 -> Rotation.UPRIGHT
+            90 -> Rotation.CLOCKWISE90
+            180 -> Rotation.HALF
+            270 -> Rotation.CLOCKWISE270
+            else -> error("$degrees")
+        }
+        return Frame(
+            case.getLong("timestamp_ns"),
+            ColourImage(
+                ColourFormat.valueOf(colour.getString("format").uppercase()),
+                colour.getInt("width"),
+                colour.getInt("height"),
+                colour.getJSONArray("planes").objects().map(::plane),
+                YuvMatrix.valueOf(colour.getString("matrix").uppercase()),
+                colour.getBoolean("video_range"),
+            ),
+            DepthImage(
+                depthFormat,
+                depth.getInt("width"),
+                depth.getInt("height"),
+                plane(depth.getJSONObject("plane")),
+                confidence,
+            ),
+            Orientation(rotation, case.getBoolean("mirrored")),
+        )
+    }
+
+    private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
+        "network" -> Method.Trained(network)
+        "sweep" -> Method.Sweep
+        else -> error(name)
+    }
+
+    private fun options(case: JSONObject): SessionOptions = sessionOptions(method(case), displayFromToml(case.getString("display"))).copy(
+        encoding = when (val name = case.getString("encoding")) {
+            "double-phase" -> Encoding.DoublePhase
+            "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
+            "band-limit" -> Encoding.BandLimit(1.0f)
+            else -> error(name)
+        },
+        response = case.optJSONArray("lut")?.let { lut -> Response.Lut(ByteArray(lut.length()) { lut.getInt(it).toByte() }) }
+            ?: Response.Linear,
+        brightness = if (case.isNull("brightness")) Brightness.Steady else Brightness.Fixed(case.getDouble("brightness").toFloat()),
+        depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
+            ?: DepthRange.Percentiles,
+    )
+
+    private fun levels(case: JSONObject): ByteArray =
+        Session(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
+            val all = ByteArrayOutputStream()
+            for (frame in case.getJSONArray("frames").objects()) {
+                session.process(frame(frame)).use { all.write(it.levels()) }
+            }
+            all.toByteArray()
+        }
+
+    @Test
+    fun framesBecomeTheLevelsThatAreExpected() {
+        val cases = JSONObject(folder.resolve("cases.json").readText()).getJSONArray("cases").objects()
+        val got = cases.map(::levels)
+        System.getenv("PHASEFRONT_CONFORMANCE")?.let {
+            val rust = File(it).resolve("levels.bin").readBytes()
+            assertContentEquals(rust, got.reduce(ByteArray::plus), "not the bits that Rust has")
+        }
+        val expected = folder.resolve("levels.bin").readBytes()
+        var from = 0
+        for ((case, levels) in cases zip got) {
+            val differ = levels.indices.count { levels[it] != expected[from + it] }
+            assertTrue(differ * 200 <= levels.size, "${case.getString("name")}: $differ of ${levels.size} levels differ")
+            if (case.isNull("lut")) {
+                val n = case.getInt("levels")
+                val most = levels.indices.maxOf {
+                    val apart = abs(levels[it].toUByte().toInt() - expected[from + it].toUByte().toInt())
+                    min(apart, n - apart)
+                }
+                assertTrue(most <= 1, "${case.getString("name")}: a level differs by $most")
+            }
+            from += levels.size
+        }
+        assertEquals(expected.size, from)
+    }
+}

@@ -1,0 +1,50 @@
+package org.phasefront
+
+import java.nio.ByteBuffer
+import java.nio.ByteOrder
+
+/** A direct buffer of [size] bytes in little-endian order. */
+internal fun direct(size: Int): ByteBuffer = ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN)
+
+internal val network: Network by lazy { Network.builtIn() }
+internal val display: Display = Display(width = 64u, height = 48u)
+
+internal fun options(): SessionOptions = sessionOptions(network, display)
+
+/** RGBA of 64×48 with something in it. */
+internal fun colourBytes(): ByteBuffer {
+    val bytes = direct(4 * 64 * 48)
+    for (y in 0 until 48) {
+        for (x in 0 until 64) {
+            bytes.put((x * 4).toByte()).put((y * 5).toByte()).put((255 - x * 3).toByte()).put(0)
+        }
+    }
+    return bytes.flip().order(ByteOrder.LITTLE_ENDIAN)
+}
+
+/** Metres of 32×24: something before a wall. */
+internal fun depthBytes(metres: Float = 0.5f): ByteBuffer {
+    val bytes = direct(4 * 32 * 24)
+    for (y in 0 until 24) {
+        for (x in 0 until 32) bytes.putFloat(if (y in 6..17 && x in 8..23) metres / 2 else metres)
+    }
+    return bytes.flip().order(ByteOrder.LITTLE_ENDIAN)
+}
+
+internal fun still(
+    timestampNs: Long = 0,
+    colour: ByteBuffer = colourBytes(),
+    depth: ByteBuffer = depthBytes(),
+): Frame = Frame(
+    timestampNs,
+    ColourImage(ColourFormat.RGBA, 64, 48, colour),
+    DepthImage(DepthFormat.METRES_F32, 32, 24, depth),
+)
+
+/** The levels of all three colours. */
+internal fun Hologram.levels(): ByteArray {
+    val size = info.width.toInt() * info.height.toInt()
+    val all = ByteArray(3 * size)
+    for (colour in Colour.entries) usePlane(colour) { it.get(all, colour.ordinal * size, size) }
+    return all
+}

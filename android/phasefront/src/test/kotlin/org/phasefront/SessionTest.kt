@@ -1,0 +1,334 @@
+package org.phasefront
+
+import java.io.File
+import java.lang.ref.Reference
+import java.nio.ByteBuffer
+import java.util.Collections
+import java.util.concurrent.CountDownLatch
+import java.util.concurrent.LinkedBlockingQueue
+import java.util.concurrent.TimeUnit
+import kotlin.concurrent.thread
+import kotlin.test.Test
+import kotlin.test.assertContains
+import kotlin.test.assertContentEquals
+import kotlin.test.assertEquals
+import kotlin.test.assertFailsWith
+import kotlin.test.assertFalse
+import kotlin.test.assertIs
+import kotlin.test.assertNull
+import kotlin.test.assertTrue
+import kotlinx.coroutines.flow.toList
+import kotlinx.coroutines.runBlocking
+import org.junit.jupiter.api.Assumptions.assumeTrue
+
+/** Sessions from Kotlin: threads, live streams, misuse, memory. */
+class SessionTest {
+    private fun <T> image(use: (Session) -> T): T = Session(options(), RunningMode.IMAGE).use(use)
+
+    private inline fun <reified E : PhasefrontException> assertRefused(words: String, noinline call: () -> Any?) {
+        val message = assertFailsWith<E> { call() }.message.orEmpty()
+        assertContains(message, words)
+        assertFalse(message.contains('\n'), message)
+    }
+
+    @Test
+    fun levelsAreReadInPlaceAndOutliveTheSession() {
+        val hologram = image { it.process(still()) }
+        val before = hologram.levels()
+        assertTrue(before.toSet().size > 100)
+        hologram.usePlane(Colour.GREEN) { plane ->
+            assertTrue(plane.isDirect && plane.isReadOnly)
+            assertEquals(64 * 48, plane.remaining())
+            // Closed by another thread while it is read.
+            thread { hologram.close() }.join()
+            val bytes = ByteArray(64 * 48).also { plane.get(it) }
+            assertContentEquals(before.copyOfRange(64 * 48, 2 * 64 * 48), bytes)
+        }
+        assertRefused<PhasefrontException.Session>("closed") { hologram.usePlane(Colour.RED) {} }
+        assertRefused<PhasefrontException.Session>("closed") { hologram.preview(0.0, 8, 8) }
+        hologram.close()
+    }
+
+    @Test
+    fun positionsAndSlicesOfBuffersAreHeeded() = image { session ->
+        val want = session.process(still()).use { it.levels() }
+        val colour = colourBytes()
+        val positioned = direct(colour.capacity() + 100).position(60).put(colour.duplicate())
+        positioned.flip().position(60)
+        assertContentEquals(want, session.process(still(colour = positioned)).use { it.levels() })
+        assertEquals(60, positioned.position())
+        assertContentEquals(want, session.process(still(colour = positioned.slice())).use { it.levels() })
+        assertContentEquals(want, session.process(still(colour = positioned.asReadOnlyBuffer())).use { it.levels() })
+        positioned.limit(positioned.limit() - 4)
+        assertRefused<PhasefrontException.Frame>("too few") { session.process(still(colour = positioned)) }
+        assertRefused<PhasefrontException.Frame>("too few") { session.process(still(depth = direct(0))) }
+    }
+
+    @Test
+    fun buffersOnTheHeapAreRefused() = image { session ->
+        assertRefused<PhasefrontException.Frame>("allocateDirect") { session.process(still(depth = ByteBuffer.allocate(4 * 32 * 24))) }
+    }
+
+    @Test
+    fun unusableFramesAreNamed() = image { session ->
+        fun colour(width: Int, height: Int, vararg planes: Plane) =
+            Frame(0, ColourImage(ColourFormat.RGBA, width, height, planes.toList()), still().depth)
+        val bytes = colourBytes()
+        assertRefused<PhasefrontException.Frame>("64×0") { session.process(colour(64, 0, Plane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("-64") { session.process(colour(-64, 48, Plane(bytes, 256, 4))) }
+        assertRefused<PhasefrontException.Frame>("must not be negative") { session.process(colour(64, 48, Plane(bytes, -256, 4))) }
+        assertRefused<PhasefrontException.Frame>("row stride") { session.process(colour(64, 48, Plane(bytes, 200, 4))) }
+        assertRefused<PhasefrontException.Frame>("pixel stride") { session.process(colour(64, 48, Plane(bytes, 256, 1))) }
+        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48)) }
+        assertRefused<PhasefrontException.Frame>("planes") { session.process(colour(64, 48, *Array(4) { Plane(bytes, 256, 4) })) }
+        session.process(still()).close()
+    }
+
+    @Test
+    fun aPreviewShowsThePictureAndATapGivesZ() {
+        image { it.process(still()) }.use { hologram ->
+            hologram.preview(0.0, 32, 24).use { image ->
+                assertEquals(32 to 24, image.width to image.height)
+                image.useBytes { bytes ->
+                    assertEquals(4 * 32 * 24, bytes.remaining())
+                    val values = ByteArray(bytes.remaining()).also { bytes.get(it) }
+                    assertTrue(values.indices.filter { it % 4 == 3 }.all { values[it] == 255.toByte() })
+                    assertTrue(values.toSet().size > 20)
+                }
+            }
+            assertTrue(hologram.zAt(0.5, 0.5) > hologram.zAt(0.02, 0.02))
+            assertRefused<PhasefrontException.Setting>("0×24") { hologram.preview(0.0, 0, 24) }
+        }
+    }
+
+    @Test
+    fun outputIsWhatTheModulatorTakes() {
+        image { it.process(still()) }.use { hologram ->
+            val levels = hologram.levels()
+            val rgba = hologram.output().use { image -> image.useBytes { bytes -> ByteArray(bytes.remaining()).also { bytes.get(it) } } }
+            assertContentEquals(levels.copyOf(64 * 48), ByteArray(64 * 48) { rgba[4 * it] })
+            hologram.output(Placement(Layout.GREY, flipX = true), 2).use { image ->
+                assertEquals(1, image.pixelBytes)
+                image.useBytes { assertEquals(levels[2 * 64 * 48 + 63], it.get(0)) }
+            }
+            assertRefused<PhasefrontException.Setting>("no image 1") { hologram.output(index = 1) }
+        }
+    }
+
+    @Test
+    fun aLiveStreamAnswersEveryFrameOnItsOwnThread() {
+        val answered = Collections.synchronizedList(mutableListOf<Long>())
+        val threads = Collections.synchronizedSet(mutableSetOf<Thread>())
+        val session = Session(options(), RunningMode.LIVE_STREAM) { event ->
+            threads.add(Thread.currentThread())
+            when (event) {
+                is SessionEvent.Made -> event.hologram.use { answered.add(it.info.timestampNs.toLong()) }
+                is SessionEvent.Dropped -> answered.add(event.timestampNs)
+                else -> error("$event")
+            }
+        }
+        session.use { for (i in 1000L until 1050L) it.submit(still(i)) }
+        assertEquals((1000L until 1050L).toList(), answered.sorted())
+        assertEquals(1, threads.size, "the thread is attached once, not for every call")
+        assertFalse(Thread.currentThread() in threads)
+        val statistics = session.statistics()
+        assertEquals(50UL, statistics.submitted)
+        assertEquals(50UL, statistics.processed + statistics.dropped.total)
+        assertEquals(0UL, statistics.listenerFailures)
+    }
+
+    @Test
+    fun aFlowTellsTheSame() = runBlocking {
+        val session = Session(options(), RunningMode.LIVE_STREAM)
+        val submitting = thread {
+            for (i in 1L..50L) session.submit(still(i))
+            session.close()
+        }
+        val events = session.events.toList()
+        submitting.join()
+        val timestamps = events.map {
+            when (it) {
+                is SessionEvent.Made -> it.hologram.use { hologram -> hologram.info.timestampNs.toLong() }
+                is SessionEvent.Dropped -> it.timestampNs
+                else -> error("$it")
+            }
+        }
+        assertEquals((1L..50L).toList(), timestamps.sorted())
+    }
+
+    @Test
+    fun anUnreadFlowHoldsTwoHologramsAtMost() = runBlocking {
+        val session = Session(options(), RunningMode.LIVE_STREAM)
+        for (i in 1L..8L) {
+            session.submit(still(i))
+            while (session.statistics().pending > 0UL) Thread.sleep(1)
+        }
+        session.close()
+        val events = session.events.toList()
+        assertEquals(8, events.size)
+        assertEquals(2, events.count { it is SessionEvent.Made })
+        assertEquals(6, events.count { it is SessionEvent.Dropped && it.reason == DropReason.UNREAD })
+    }
+
+    @Test
+    fun aLateFrameInAStreamHarmsNothing() {
+        val events = LinkedBlockingQueue<SessionEvent>()
+        Session(options(), RunningMode.LIVE_STREAM, events::add).use { session ->
+            session.submit(still(5))
+            assertIs<SessionEvent.Made>(events.poll(60, TimeUnit.SECONDS))
+            assertRefused<PhasefrontException.Timestamp>("5 ns") { session.submit(still(5)) }
+            assertNull(session.submit(still(6)))
+            assertIs<SessionEvent.Made>(events.poll(60, TimeUnit.SECONDS))
+        }
+    }
+
+    @Test
+    fun whatAListenerThrowsIsCountedAndTheStreamGoesOn() {
+        val heard = LinkedBlockingQueue<SessionEvent>()
+        val session = Session(options(), RunningMode.LIVE_STREAM) {
+            heard.add(it)
+            throw IllegalStateException("no thanks")
+        }
+        session.use {
+            for (i in 1L..3L) {
+                it.submit(still(i))
+                assertIs<SessionEvent.Made>(heard.poll(60, TimeUnit.SECONDS))
+            }
+        }
+        assertEquals(3UL, session.statistics().listenerFailures)
+    }
+
+    @Test
+    fun aListenerMayCloseItsSession() {
+        val closed = CountDownLatch(1)
+        lateinit var session: Session
+        session = Session(options(), RunningMode.LIVE_STREAM) {
+            session.close()
+            closed.countDown()
+        }
+        session.submit(still(1))
+        assertTrue(closed.await(60, TimeUnit.SECONDS))
+        assertRefused<PhasefrontException.Session>("closed") { session.submit(still(2)) }
+        session.close()
+    }
+
+    @Test
+    fun threadsShareASession() = image { session ->
+        val want = session.process(still()).use { it.levels() }
+        val wrong = LinkedBlockingQueue<Any>()
+        List(4) {
+            thread {
+                repeat(10) {
+                    val got = session.process(still()).use { it.levels() }
+                    if (!got.contentEquals(want)) wrong.add(got)
+                }
+            }
+        }.forEach { it.join() }
+        assertTrue(wrong.isEmpty())
+    }
+
+    @Test
+    fun aClosedSessionSaysSo() {
+        val session = Session(options(), RunningMode.IMAGE)
+        session.process(still()).close()
+        session.close()
+        session.close()
+        val calls = listOf({ session.process(still()) }, session::warmUp, session::reset, session::pause, session::resume)
+        for (call in calls) assertRefused<PhasefrontException.Session>("closed; make a new one") { call() }
+        assertEquals(1UL, session.statistics().processed)
+    }
+
+    @Test
+    fun aPausedSessionRefusesAndAResetLetsTimeBeginAnew() {
+        Session(options(), RunningMode.VIDEO).use { session ->
+            session.warmUp()
+            session.process(still(100)).close()
+            assertRefused<PhasefrontException.Timestamp>("99 ns") { session.process(still(99)) }
+            session.reset()
+            session.process(still(1)).close()
+            session.pause()
+            assertRefused<PhasefrontException.Session>("paused") { session.process(still(2)) }
+            session.resume()
+            session.process(still(3)).close()
+        }
+    }
+
+    @Test
+    fun modesAreNotMixed() {
+        image { session -> assertRefused<PhasefrontException.Session>("not live") { session.submit(still()) } }
+        Session(options(), RunningMode.LIVE_STREAM) {}.use { session ->
+            assertRefused<PhasefrontException.Session>("submitted") { session.process(still()) }
+        }
+        assertRefused<PhasefrontException.Session>("listener") { Session(options(), RunningMode.IMAGE) {} }
+        image { session -> runBlocking { assertEquals(listOf(), session.events.toList()) } }
+    }
+
+    @Test
+    fun networksThatAreNoneAreNamed() {
+        assertRefused<PhasefrontException.File>("nowhere.onnx") { Network.fromFile("/nowhere.onnx") }
+        assertRefused<PhasefrontException.Network>("network") { Network.fromBytes(direct(0)) }
+        assertRefused<PhasefrontException.Network>("allocateDirect") { Network.fromBytes(ByteBuffer.allocate(8)) }
+        val onnx = File(System.getProperty("phasefront.suite")).resolve("../../models/rgbd-8-int8.onnx").readBytes()
+        val positioned = direct(onnx.size + 3).position(3).put(onnx).position(3)
+        assertEquals(8u, Network.fromBytes(positioned).info().layers)
+        val file = File.createTempFile("phasefront", ".onnx")
+        try {
+            file.writeText("not a network")
+            assertRefused<PhasefrontException.Network>("network") { Network.fromFile(file.path) }
+        } finally {
+            file.delete()
+        }
+        val info = network.info()
+        assertEquals(8u to 8.0, info.layers to info.pitchUm)
+    }
+
+    @Test
+    fun settingsThatCannotBeMeantAreNamed() {
+        fun make(change: SessionOptions.() -> SessionOptions): () -> Any? = { Session(options().change(), RunningMode.IMAGE) }
+        assertRefused<PhasefrontException.Setting>("ladder is empty", make { copy(ladder = listOf()) })
+        assertRefused<PhasefrontException.Setting>("0 threads", make { copy(threads = 0u) })
+        assertRefused<PhasefrontException.Setting>("target rate", make { copy(targetRateHz = Double.NaN) })
+        assertRefused<PhasefrontException.Setting>("no rung 3", make { copy(quality = Quality.Fixed(3u)) })
+        assertRefused<PhasefrontException.Setting>("3 levels", make { copy(response = Response.Lut(ByteArray(3))) })
+        assertRefused<PhasefrontException.Display>("pitch_um", make { copy(display = display.copy(pitchUm = -1.0)) })
+        assertRefused<PhasefrontException.Network>("pitch", make { copy(display = display.copy(pitchUm = 3.74)) })
+        assertRefused<PhasefrontException.Display>("line 1") { displayFromToml("width = ") }
+    }
+
+    @Test
+    fun messagesReachTheLog() {
+        val messages = Collections.synchronizedList(mutableListOf<Pair<LogLevel, String>>())
+        Log.send(LogLevel.INFO) { level, message -> messages.add(level to message) }
+        image {}
+        Log.send(LogLevel.INFO, null)
+        image {}
+        // Other tests may log at the same time, but not in this process.
+        assertEquals(1, messages.size)
+        assertEquals(LogLevel.INFO, messages[0].first)
+        assertContains(messages[0].second, "Image")
+    }
+
+    @Test
+    fun memoryOfTenThousandFramesIsFlat() {
+        val statm = File("/proc/self/statm")
+        assumeTrue(statm.exists(), "only Linux tells a process's memory")
+        fun residentMb(): Double {
+            System.gc()
+            return statm.readText().split(' ')[1].toInt() * 4096 / 1e6
+        }
+        Session(options().copy(threads = 1u), RunningMode.IMAGE).use { session ->
+            val frame = still()
+            val sum = LongArray(1)
+            fun frames(count: Int) = repeat(count) {
+                session.process(frame).use { hologram -> hologram.usePlane(Colour.BLUE) { sum[0] += it.get(0).toLong() } }
+            }
+            frames(1000)
+            val before = residentMb()
+            frames(9000)
+            val growth = residentMb() - before
+            // Each frame's results are 15 KB: kept, they would be 138 MB.
+            assertTrue(growth < 32, "grown by $growth MB")
+            Reference.reachabilityFence(frame)
+        }
+    }
+}

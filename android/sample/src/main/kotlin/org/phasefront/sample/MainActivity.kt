@@ -1,0 +1,186 @@
+package org.phasefront.sample
+
+import android.Manifest
+import android.app.Activity
+import android.content.pm.PackageManager
+import android.graphics.Bitmap
+import android.hardware.display.DisplayManager
+import android.os.Build
+import android.os.Bundle
+import android.os.PowerManager
+import android.view.Gravity
+import android.view.MotionEvent
+import android.view.Surface
+import android.view.View
+import android.widget.ImageView
+import android.widget.LinearLayout
+import android.widget.SeekBar
+import android.widget.TextView
+import android.widget.Toast
+import org.phasefront.Display
+import org.phasefront.Hologram
+import org.phasefront.Log
+import org.phasefront.Network
+import org.phasefront.PhasefrontException
+import org.phasefront.RunningMode
+import org.phasefront.Session
+import org.phasefront.SessionEvent
+import org.phasefront.sendToLogcat
+import org.phasefront.sessionOptions
+import org.phasefront.thermalOf
+import org.phasefront.toBitmap
+
+/**
+ * Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on, the
+ * levels on an external screen where there is one, and what it costs.
+ */
+class MainActivity : Activity() {
+    private lateinit var preview: ImageView
+    private lateinit var focus: SeekBar
+    private lateinit var statistics: TextView
+    private var session: Session? = null
+    private var source: FrameSource? = null
+    private var output: PhaseOutput? = null
+    private val display = Display(width = 960u, height = 540u)
+
+    /** Written on the main thread, read on the session's. */
+    @Volatile private var zMm = 0.0
+
+    /** The latest hologram, for taps; only the main thread touches it. */
+    private var latest: Hologram? = null
+
+    override fun onCreate(savedInstanceState: Bundle?) {
+        super.onCreate(savedInstanceState)
+        Log.sendToLogcat()
+        preview = ImageView(this).apply {
+            adjustViewBounds = true
+            setOnTouchListener { view, event -> event.action == MotionEvent.ACTION_UP && tapped(view, event) }
+        }
+        focus = SeekBar(this).apply {
+            max = FOCUS_STEPS
+            progress = FOCUS_STEPS / 2
+            setOnSeekBarChangeListener(object : SeekBar.OnSeekBarChangeListener {
+                override fun onProgressChanged(bar: SeekBar, progress: Int, fromUser: Boolean) {
+                    zMm = display.volumeDepthMm * (progress.toDouble() / FOCUS_STEPS - 0.5)
+                }
+
+                override fun onStartTrackingTouch(bar: SeekBar) = Unit
+
+                override fun onStopTrackingTouch(bar: SeekBar) = Unit
+            })
+        }
+        statistics = TextView(this).apply { setPadding(24, 24, 24, 24) }
+        setContentView(
+            LinearLayout(this).apply {
+                orientation = LinearLayout.VERTICAL
+                gravity = Gravity.CENTER_VERTICAL
+                for (view in listOf(preview, focus, statistics)) addView(view)
+            },
+        )
+    }
+
+    override fun onStart() {
+        super.onStart()
+        if (checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED) {
+            run()
+        } else {
+            requestPermissions(arrayOf(Manifest.permission.CAMERA), 0)
+        }
+    }
+
+    override fun onRequestPermissionsResult(request: Int, permissions: Array<out String>, results: IntArray) {
+        super.onRequestPermissionsResult(request, permissions, results)
+        run()
+    }
+
+    private fun run() {
+        if (session != null) return
+        try {
+            session = Session(sessionOptions(Network.builtIn(), display).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
+        } catch (refused: PhasefrontException) {
+            return say(refused.message.orEmpty())
+        }
+        showOnExternalScreen()
+        if (Build.VERSION.SDK_INT >= Build.VERSION_CODES.Q) {
+            getSystemService(PowerManager::class.java).addThermalStatusListener(mainExecutor) { session?.setThermal(thermalOf(it)) }
+        }
+        val granted = checkSelfPermission(Manifest.permission.CAMERA) == PackageManager.PERMISSION_GRANTED
+        val camera = if (granted) CameraSource.find(this, displayDegrees()) else null
+        if (camera == null) say("no camera with depth: this is the sample scene")
+        source = (camera ?: SampleSource(assets)).also { source ->
+            source.start({ frame ->
+                try {
+                    session?.submit(frame)
+                } catch (refused: PhasefrontException) {
+                    android.util.Log.w("sample", refused.message.orEmpty())
+                }
+            }, { message -> runOnUiThread { say(message) } })
+        }
+    }
+
+    /** What becomes of frames, on the session's thread. */
+    private fun heard(event: SessionEvent) {
+        if (event !is SessionEvent.Made) return
+        val hologram = event.hologram
+        val view = hologram.preview(zMm, display.width.toInt() / 2, display.height.toInt() / 2).use { it.toBitmap() }
+        val levels: Bitmap? = output?.let { hologram.output().use { image -> image.toBitmap() } }
+        runOnUiThread {
+            latest?.close()
+            latest = hologram
+            preview.setImageBitmap(view)
+            levels?.let { output?.show(it) }
+            statistics.text = describe()
+        }
+    }
+
+    private fun describe(): String {
+        val of = session?.statistics() ?: return ""
+        return "%.1f holograms a second, %d dropped of %d\n%s: %.1f ms, of which the network takes %.1f".format(
+            of.rateHz,
+            of.dropped.total.toLong(),
+            of.submitted.toLong(),
+            of.backend,
+            of.times.totalMs,
+            of.times.methodMs,
+        )
+    }
+
+    private fun tapped(view: View, event: MotionEvent): Boolean {
+        val z = latest?.zAt(event.x.toDouble() / view.width, event.y.toDouble() / view.height) ?: return false
+        focus.progress = ((z / display.volumeDepthMm + 0.5) * FOCUS_STEPS).toInt()
+        view.performClick()
+        return true
+    }
+
+    private fun showOnExternalScreen() {
+        val screens = getSystemService(DisplayManager::class.java).getDisplays(DisplayManager.DISPLAY_CATEGORY_PRESENTATION)
+        output = screens.firstOrNull()?.let { PhaseOutput(this, it).apply { show() } }
+    }
+
+    @Suppress("DEPRECATION") // The newer call needs API 30.
+    private fun displayDegrees(): Int = when (windowManager.defaultDisplay.rotation) {
+        Surface.ROTATION_90 -> 90
+        Surface.ROTATION_180 -> 180
+        Surface.ROTATION_270 -> 270
+        else -> 0
+    }
+
+    private fun say(message: String) = Toast.makeText(this, message, Toast.LENGTH_LONG).show()
+
+    override fun onStop() {
+        super.onStop()
+        source?.close()
+        source = null
+        // Closing waits for the frame in flight; its listener only posts to this thread, so it cannot wait for us.
+        session?.close()
+        session = null
+        output?.dismiss()
+        output = null
+        latest?.close()
+        latest = null
+    }
+
+    private companion object {
+        const val FOCUS_STEPS = 200
+    }
+}

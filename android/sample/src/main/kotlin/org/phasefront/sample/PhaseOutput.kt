@@ -1,0 +1,40 @@
+package org.phasefront.sample
+
+import android.app.Presentation
+import android.content.Context
+import android.graphics.Bitmap
+import android.graphics.Canvas
+import android.graphics.Paint
+import android.os.Bundle
+import android.view.Display
+import android.view.View
+
+/** The modulator's levels on an external screen, pixel for pixel: the screen is the modulator's driver. */
+class PhaseOutput(context: Context, display: Display) : Presentation(context, display) {
+    private val view = LevelsView(getContext())
+
+    override fun onCreate(savedInstanceState: Bundle?) {
+        super.onCreate(savedInstanceState)
+        setContentView(view)
+    }
+
+    fun show(levels: Bitmap) {
+        view.levels = levels
+        view.invalidate()
+    }
+
+    private class LevelsView(context: Context) : View(context) {
+        var levels: Bitmap? = null
+
+        // Neither filtered nor scaled: a level between two levels is another phase.
+        private val exact = Paint().apply {
+            isFilterBitmap = false
+            isDither = false
+        }
+
+        override fun onDraw(canvas: Canvas) {
+            val levels = levels ?: return
+            canvas.drawBitmap(levels, (width - levels.width) / 2f, (height - levels.height) / 2f, exact)
+        }
+    }
+}

@@ -1,0 +1,74 @@
+package org.phasefront.sample
+
+import android.content.res.AssetManager
+import android.graphics.Bitmap
+import android.graphics.BitmapFactory
+import java.nio.ByteBuffer
+import kotlin.concurrent.thread
+import org.phasefront.ColourFormat
+import org.phasefront.ColourImage
+import org.phasefront.DepthFormat
+import org.phasefront.DepthImage
+import org.phasefront.Frame
+import org.phasefront.Plane
+
+/** The project's sample scene, 30 times a second, seen through a window that moves over it: for phones without depth. */
+class SampleSource(private val assets: AssetManager) : FrameSource {
+    @Volatile private var running = false
+
+    override fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit) {
+        running = true
+        thread(name = "sample scene") {
+            val colour = open("scene_rgb.jpg")
+            val depth = open("scene_depth.png")
+            val colours = ByteBuffer.allocateDirect(colour.byteCount).also { colour.copyPixelsToBuffer(it) }
+            val depths = ByteBuffer.allocateDirect(depth.width * depth.height)
+            for (y in 0 until depth.height) {
+                for (x in 0 until depth.width) depths.put((depth.getPixel(x, y) and 0xff).toByte())
+            }
+            // Seven eighths of the scene, to and fro.
+            val most = colour.width / 8
+            var step = 0
+            while (running) {
+                val x = if (step / most % 2 == 0) step % most else most - 1 - step % most
+                onFrame(frame(colour, colours, depth, depths, x, most))
+                step++
+                Thread.sleep(33)
+            }
+        }
+    }
+
+    private fun frame(colour: Bitmap, colours: ByteBuffer, depth: Bitmap, depths: ByteBuffer, x: Int, margin: Int): Frame {
+        val depthX = x * depth.width / colour.width
+        val depthMargin = margin * depth.width / colour.width
+        return Frame(
+            System.nanoTime(),
+            ColourImage(
+                ColourFormat.RGBA,
+                colour.width - margin,
+                colour.height - margin * colour.height / colour.width,
+                listOf(Plane(window(colours, 4 * x), 4 * colour.width, 4)),
+            ),
+            DepthImage(
+                DepthFormat.NORMALIZED_U8,
+                depth.width - depthMargin,
+                depth.height - depthMargin * depth.height / depth.width,
+                Plane(window(depths, depthX), depth.width, 1),
+            ),
+        )
+    }
+
+    private fun window(bytes: ByteBuffer, from: Int): ByteBuffer = bytes.duplicate().apply {
+        clear()
+        position(from)
+    }
+
+    private fun open(name: String): Bitmap = assets.open(name).use {
+        val options = BitmapFactory.Options().apply { inPreferredConfig = Bitmap.Config.ARGB_8888 }
+        BitmapFactory.decodeStream(it, null, options) ?: error("the asset $name is no image")
+    }
+
+    override fun close() {
+        running = false
+    }
+}

@@ -1,0 +1,111 @@
+"""The conformance suite, run from Python: the levels must be those of the suite, and Rust's to the bit."""
+
+import os
+import pathlib
+
+import numpy
+from conftest import SUITE
+
+from phasefront import (
+    Brightness,
+    ColourFormat,
+    ConfidenceFormat,
+    DepthFormat,
+    DepthRange,
+    Encoding,
+    Frame,
+    Method,
+    Orientation,
+    Response,
+    Rotation,
+    RunningMode,
+    Session,
+    YuvMatrix,
+    display_from_toml,
+    session_options,
+)
+
+COLOUR = {"rgba": ColourFormat.RGBA, "bgra": ColourFormat.BGRA, "rgb": ColourFormat.RGB, "nv12": ColourFormat.NV12}
+COLOUR |= {"yuv420": ColourFormat.YUV420}
+BYTES = {"rgba": [4], "bgra": [4], "rgb": [3], "nv12": [1, 2], "yuv420": [1, 1, 1]}
+DEPTH = {
+    "metres-f32": (DepthFormat.METRES_F32, "<f4"),
+    "metres-f16": (DepthFormat.METRES_F16, "<f2"),
+    "disparity-f32": (DepthFormat.DISPARITY_F32, "<f4"),
+    "disparity-f16": (DepthFormat.DISPARITY_F16, "<f2"),
+    "millimetres-u16": (DepthFormat.MILLIMETRES_U16, "<u2"),
+    "android-depth16": (DepthFormat.ANDROID_DEPTH16, "<u2"),
+    "normalized-u8": (DepthFormat.NORMALIZED_U8, "u1"),
+    "normalized-u16": (DepthFormat.NORMALIZED_U16, "<u2"),
+}
+TURN = {0: Rotation.UPRIGHT, 90: Rotation.CLOCKWISE90, 180: Rotation.HALF, 270: Rotation.CLOCKWISE270}
+ENCODING = {
+    "double-phase": Encoding.DOUBLE_PHASE(),
+    "anti-alias": Encoding.ANTI_ALIAS(sigma=0.7, width=3),
+    "band-limit": Encoding.BAND_LIMIT(k=1.0),
+}
+
+
+def view(memory, plane, width, height, dtype, values=1):
+    """A plane of the suite as an array in place, with its gaps."""
+    dtype = numpy.dtype(dtype)
+    shape, strides = (height, width), (plane["row_stride"], plane["pixel_stride"])
+    if values > 1:
+        shape, strides = (*shape, values), (*strides, dtype.itemsize)
+    return numpy.ndarray(shape, dtype, memory, plane["offset"], strides)
+
+
+def frame_of(case, memory):
+    colour, depth, confidence = case["colour"], case["depth"], case["confidence"]
+    planes = []
+    for i, (plane, values) in enumerate(zip(colour["planes"], BYTES[colour["format"]], strict=True)):
+        width, height = (colour["width"], colour["height"])
+        if i > 0:
+            width, height = (width + 1) // 2, (height + 1) // 2
+        planes.append(view(memory, plane, width, height, "u1", values))
+    depth_format, dtype = DEPTH[depth["format"]]
+    extra = {}
+    if confidence is not None:
+        formats = {"low-medium-high": ConfidenceFormat.LOW_MEDIUM_HIGH, "u8": ConfidenceFormat.U8}
+        extra["confidence"] = view(memory, confidence["plane"], confidence["width"], confidence["height"], "u1")
+        extra["confidence_format"] = formats[confidence["format"]]
+    return Frame(
+        planes if len(planes) > 1 else planes[0],
+        view(memory, depth["plane"], depth["width"], depth["height"], dtype),
+        timestamp_ns=case["timestamp_ns"],
+        colour_format=COLOUR[colour["format"]],
+        depth_format=depth_format,
+        matrix={"bt601": YuvMatrix.BT601, "bt709": YuvMatrix.BT709}[colour["matrix"]],
+        video_range=colour["video_range"],
+        orientation=Orientation(rotation=TURN[case["rotation"]], mirrored=case["mirrored"]),
+        **extra,
+    )
+
+
+def levels_of(case, memory, network):
+    changes = {"encoding": ENCODING[case["encoding"]]}
+    if case["lut"] is not None:
+        changes["response"] = Response.LUT(levels=bytes(case["lut"]))
+    if case["brightness"] is not None:
+        changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
+    if case["range"] is not None:
+        changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
+    method = {"network": network, "sweep": Method.SWEEP()}[case["method"]]
+    options = session_options(method, display_from_toml(case["display"]), **changes)
+    mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]
+    with Session(options, mode) as session:
+        return b"".join(session.process(frame_of(frame, memory)).levels.tobytes() for frame in case["frames"])
+
+
+def test_frames_become_the_levels_that_are_expected(suite, network):
+    cases, memory = suite
+    got = [levels_of(case, memory, network) for case in cases]
+    folder = os.environ.get("PHASEFRONT_CONFORMANCE")
+    if folder:
+        assert b"".join(got) == (pathlib.Path(folder) / "levels.bin").read_bytes(), "not the bits that Rust has"
+    expected = (SUITE / "levels.bin").read_bytes()
+    for case, levels in zip(cases, got, strict=True):
+        expected, here = expected[len(levels) :], numpy.frombuffer(expected[: len(levels)], numpy.uint8)
+        differ = numpy.count_nonzero(numpy.frombuffer(levels, numpy.uint8) != here)
+        assert differ * 200 <= len(levels), f"{case['name']}: {differ} of {len(levels)} levels differ"
+    assert expected == b""

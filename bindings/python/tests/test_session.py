@@ -1,0 +1,298 @@
+"""Sessions from Python: threads, live streams, misuse, memory."""
+
+import gc
+import threading
+
+import numpy
+import pytest
+from conftest import still
+
+import phasefront
+from phasefront import (
+    ColourFormat,
+    DropReason,
+    Dropped,
+    Failed,
+    Frame,
+    LogLevel,
+    Made,
+    Network,
+    PhasefrontError,
+    Quality,
+    RunningMode,
+    Session,
+    session_options,
+)
+
+
+class Events:
+    """Collects a live stream's events."""
+
+    def __init__(self):
+        self.all, self.threads = [], set()
+        self._changed = threading.Condition()
+
+    def __call__(self, event):
+        with self._changed:
+            self.all.append(event)
+            self.threads.add(threading.get_ident())
+            self._changed.notify_all()
+
+    def wait(self, count):
+        with self._changed:
+            assert self._changed.wait_for(lambda: len(self.all) >= count, 60)
+
+
+def test_levels_are_read_in_place_and_outlive_the_session(options):
+    with Session(options) as session:
+        hologram = session.process(still())
+        levels = hologram.levels
+    assert levels.shape == (3, 48, 64) and not levels.flags.owndata and not levels.flags.writeable
+    before = levels.copy()
+    del hologram
+    gc.collect()
+    numpy.testing.assert_array_equal(levels, before)
+    assert before.std() > 10
+
+
+def test_views_with_strides_are_taken_as_they_are(options):
+    y, x = numpy.mgrid[0:96, 0:128]
+    large = numpy.stack([x, y, x ^ y, x | y], axis=2).astype(numpy.uint8)
+    depth = numpy.linspace(0.3, 2, 48 * 64, dtype=numpy.float32).reshape(48, 64)
+    with Session(options) as session:
+        for colour, metres in [
+            (large[10:58, 20:84], depth[::2, ::2]),
+            (large[::2, ::2, :3], depth[1:25, 3:35]),
+            (large[::-2, ::2], depth[::-1]),
+        ]:
+            views = session.process(Frame(colour, metres)).levels.copy()
+            copies = session.process(Frame(colour.copy(), metres.copy())).levels
+            numpy.testing.assert_array_equal(views, copies)
+
+
+def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
+    with Session(options) as session:
+        hologram = session.process(still())
+    image = hologram.preview(0.0, 32, 24)
+    assert image.shape == (24, 32, 4) and (image[..., 3] == 255).all() and image[..., :3].std() > 10
+    assert hologram.z_at(0.5, 0.5) > hologram.z_at(0.02, 0.02)
+    with pytest.raises(PhasefrontError.Setting, match="0×24"):
+        hologram.preview(0.0, 0, 24)
+
+
+def test_output_is_what_the_modulator_takes(options):
+    with Session(options) as session:
+        hologram = session.process(still())
+    numpy.testing.assert_array_equal(hologram.output(), hologram.levels.transpose(1, 2, 0))
+    blue = hologram.output(phasefront.Placement(layout=phasefront.Layout.GREY, flip_x=True), 2)
+    numpy.testing.assert_array_equal(blue[..., 0], hologram.levels[2, :, ::-1])
+    with pytest.raises(PhasefrontError.Setting, match="no image 1"):
+        hologram.output(image=1)
+
+
+def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
+    events = Events()
+    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+        for i in range(50):
+            session.submit(still(timestamp_ns=1000 + i))
+    made = [e.hologram.info.timestamp_ns for e in events.all if isinstance(e, Made)]
+    dropped = [e.timestamp_ns for e in events.all if isinstance(e, Dropped)]
+    assert sorted(made + dropped) == list(range(1000, 1050))
+    assert made and made == sorted(made)
+    assert len(events.threads) == 1 and threading.get_ident() not in events.threads
+    assert session.statistics().submitted == 50
+
+
+def test_a_bad_frame_in_a_stream_harms_nothing(options):
+    events = Events()
+    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+        nothing = Frame(numpy.zeros((48, 64, 3), numpy.uint8), numpy.zeros((24, 32), numpy.float32), timestamp_ns=5)
+        session.submit(nothing)
+        events.wait(1)
+        with pytest.raises(PhasefrontError.Timestamp, match="5 ns"):
+            session.submit(still(timestamp_ns=5))
+        session.submit(still(timestamp_ns=6))
+        events.wait(2)
+    kinds = [type(e) for e in events.all]
+    assert kinds[-1] is Made and kinds[0] in (Failed, Made)
+
+
+def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
+    events = Events()
+
+    def listener(event):
+        events(event)
+        raise ValueError("no thanks")
+
+    with Session(options, RunningMode.LIVE_STREAM, listener) as session:
+        for i in range(3):
+            session.submit(still(timestamp_ns=i + 1))
+            events.wait(i + 1)
+    assert session.statistics().listener_failures == 3
+
+
+def test_a_listener_may_call_its_session(options):
+    done = threading.Event()
+    closed = []
+
+    def listener(event):
+        if isinstance(event, Made):
+            closed.append(session.statistics().processed)
+            session.close()
+            done.set()
+
+    session = Session(options, RunningMode.LIVE_STREAM, listener)
+    session.submit(still(timestamp_ns=1))
+    assert done.wait(60)
+    with pytest.raises(PhasefrontError.Session, match="closed"):
+        session.submit(still(timestamp_ns=2))
+    session.close()
+
+
+def test_threads_share_a_session(options):
+    with Session(options) as session:
+        want = session.process(still()).levels.tobytes()
+        got = []
+        work = lambda: got.extend(session.process(still()).levels.tobytes() for _ in range(10))  # noqa: E731
+        threads = [threading.Thread(target=work) for _ in range(4)]
+        [t.start() for t in threads]
+        [t.join() for t in threads]
+    assert got == [want] * 40
+
+
+def test_a_closed_session_says_so(options):
+    session = Session(options)
+    session.process(still())
+    session.close()
+    session.close()
+    for call in [lambda: session.process(still()), session.warm_up, session.reset, session.pause, session.resume]:
+        with pytest.raises(PhasefrontError.Session, match="closed; make a new one"):
+            call()
+    assert session.statistics().processed == 1
+
+
+def test_a_paused_session_refuses_until_it_is_resumed(options):
+    with Session(options) as session:
+        session.pause()
+        with pytest.raises(PhasefrontError.Session, match="paused"):
+            session.process(still())
+        session.resume()
+        session.process(still())
+
+
+def test_a_reset_lets_time_begin_anew(options):
+    with Session(options, RunningMode.VIDEO) as session:
+        session.process(still(timestamp_ns=100))
+        with pytest.raises(PhasefrontError.Timestamp):
+            session.process(still(timestamp_ns=99))
+        session.reset()
+        session.process(still(timestamp_ns=1))
+
+
+def test_modes_are_not_mixed(options):
+    with Session(options) as session, pytest.raises(PhasefrontError.Session, match="not live"):
+        session.submit(still())
+    with Session(options, RunningMode.LIVE_STREAM, lambda _: None) as session:
+        with pytest.raises(PhasefrontError.Session, match="submitted"):
+            session.process(still())
+    with pytest.raises(PhasefrontError.Session, match="listener"):
+        Session(options, RunningMode.LIVE_STREAM)
+    with pytest.raises(PhasefrontError.Session, match="listener"):
+        Session(options, RunningMode.IMAGE, lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("colour", "depth", "words"),
+    [
+        (numpy.zeros((0, 64, 3), "u1"), numpy.ones((4, 4), "f4"), "64×0"),
+        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((0, 0), "f4"), "depth"),
+        (numpy.zeros((48, 64, 2), "u1"), numpy.ones((4, 4), "f4"), "(H, W, 4)"),
+        (numpy.zeros((48, 64), "u1"), numpy.ones((4, 4), "f4"), "(48, 64)"),
+        (numpy.zeros((48, 64, 3), "f4"), numpy.ones((4, 4), "f4"), "float32; uint8"),
+        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 4), "i4"), "int32"),
+        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 4), ">f4"), "float32"),
+        (numpy.zeros((48, 64, 3), "u1"), [[1.0]], "depth"),
+        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 40), "f4"), "aspect"),
+        ((numpy.zeros((48, 64), "u1"),), numpy.ones((4, 4), "f4"), "NV12"),
+    ],
+)
+def test_unusable_frames_are_named(options, colour, depth, words):
+    with Session(options) as session:
+        with pytest.raises(PhasefrontError.Frame) as error:
+            session.process(Frame(colour, depth))
+        assert words in str(error.value)
+        session.process(still())
+
+
+def test_planes_of_another_number_are_refused(options):
+    luma, chroma = numpy.zeros((48, 64), "u1"), numpy.full((24, 32, 2), 128, "u1")
+    depth = numpy.ones((24, 32), "f4")
+    with pytest.raises(PhasefrontError.Frame, match="1 colour planes are given; NV12 has 2"):
+        Frame([luma], depth, colour_format=ColourFormat.NV12)
+    with Session(options) as session:
+        session.process(Frame([luma, chroma], depth, colour_format=ColourFormat.NV12))
+
+
+def test_networks_that_are_none_are_named(tmp_path):
+    with pytest.raises(PhasefrontError.File, match="nowhere.onnx"):
+        Network.from_file(str(tmp_path / "nowhere.onnx"))
+    (tmp_path / "text.onnx").write_text("not a network")
+    with pytest.raises(PhasefrontError.Network):
+        Network.from_file(str(tmp_path / "text.onnx"))
+    with pytest.raises(PhasefrontError.Network):
+        Network.from_bytes(b"")
+    info = Network.built_in().info()
+    assert (info.layers, info.pitch_um) == (8, 8.0)
+
+
+def test_settings_that_cannot_be_meant_are_named(network, display):
+    for changes, words in [
+        ({"ladder": []}, "ladder is empty"),
+        ({"threads": 0}, "0 threads"),
+        ({"target_rate_hz": float("nan")}, "target rate"),
+        ({"quality": Quality.FIXED(rung=3)}, "no rung 3"),
+        ({"response": phasefront.Response.LUT(levels=b"abc")}, "3 levels"),
+    ]:
+        with pytest.raises(PhasefrontError.Setting, match=words):
+            Session(session_options(network, display, **changes))
+    with pytest.raises(PhasefrontError.Display, match="pitch_um"):
+        Session(session_options(network, phasefront.Display(pitch_um=-1.0)))
+    with pytest.raises(PhasefrontError.Network, match="pitch"):
+        Session(session_options(network, phasefront.Display(width=64, height=48, pitch_um=3.74)))
+
+
+def test_messages_reach_the_log(options):
+    messages = []
+    phasefront.send_log(LogLevel.INFO, lambda level, message: messages.append((level, message)))
+    Session(options).close()
+    phasefront.send_log(LogLevel.INFO, None)
+    Session(options).close()
+    assert [level for level, _ in messages] == [LogLevel.INFO] and "IMAGE" in messages[0][1].upper()
+
+
+def resident_mb():
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * 4096 / 1e6
+
+
+def test_memory_of_ten_thousand_frames_is_flat(network, display):
+    with Session(session_options(network, display, threads=1)) as session:
+        frame = still()
+        for i in range(10_000):
+            levels = session.process(frame).levels
+            if i == 1000:
+                gc.collect()
+                before = resident_mb()
+        gc.collect()
+        # Each frame's results are 15 KB: kept, they would be 138 MB.
+        assert resident_mb() - before < 16
+        assert levels.shape == (3, 48, 64)
+
+
+def test_dropped_by_reset_is_told(options):
+    events = Events()
+    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+        session.pause()
+        assert session.submit(still(timestamp_ns=1)) == DropReason.PAUSED
+        events.wait(1)
+    assert events.all == [Dropped(1, DropReason.PAUSED)]

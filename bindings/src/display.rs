@@ -1,0 +1,143 @@
+//! The display, in the units of its TOML form.
+
+use crate::error::{PhasefrontError, guard};
+
+/// One modulator, its lasers, and the volume it shows. It is checked where it is used.
+#[derive(Debug, Clone, PartialEq, uniffi::Record)]
+pub struct Display {
+    /// Pixels along x.
+    #[uniffi(default = 1920)]
+    pub width: u32,
+    /// Pixels along y.
+    #[uniffi(default = 1080)]
+    pub height: u32,
+    /// Distance between neighbouring pixels, µm.
+    #[uniffi(default = 8.0)]
+    pub pitch_um: f64,
+    /// Wavelength of the red laser, nm.
+    #[uniffi(default = 638.0)]
+    pub red_nm: f64,
+    /// Wavelength of the green laser, nm.
+    #[uniffi(default = 520.0)]
+    pub green_nm: f64,
+    /// Wavelength of the blue laser, nm.
+    #[uniffi(default = 450.0)]
+    pub blue_nm: f64,
+    /// Depth of the volume, mm.
+    #[uniffi(default = 6.0)]
+    pub volume_depth_mm: f64,
+    /// z of the modulator against the middle of the volume, mm, positive toward the viewer.
+    #[uniffi(default = 0.0)]
+    pub offset_mm: f64,
+    /// Bits of a modulator level.
+    #[uniffi(default = 8)]
+    pub bits: u32,
+}
+
+/// Reads a display from its TOML form; what is left out has the default value.
+///
+/// # Errors
+/// Text that is not TOML, an unknown key, or a value out of its range.
+#[uniffi::export]
+pub fn display_from_toml(text: String) -> Result<Display, PhasefrontError> {
+    guard(|| Ok(phasefront::Display::from_toml(&text)?.into()))
+}
+
+impl From<phasefront::Display> for Display {
+    fn from(display: phasefront::Display) -> Self {
+        // Metres times 1e9 leave the last digit off (637.9999…).
+        let round = |value: f64| (value * 1e6).round() / 1e6;
+        let [red_nm, green_nm, blue_nm] = display.wavelengths_m().map(|l| round(l * 1e9));
+        Display {
+            width: display.width() as u32,
+            height: display.height() as u32,
+            pitch_um: round(display.pitch_m() * 1e6),
+            red_nm,
+            green_nm,
+            blue_nm,
+            volume_depth_mm: round(display.volume_depth_m() * 1e3),
+            offset_mm: round(display.offset_m() * 1e3),
+            bits: display.bits(),
+        }
+    }
+}
+
+impl TryFrom<&Display> for phasefront::Display {
+    type Error = PhasefrontError;
+
+    fn try_from(display: &Display) -> Result<Self, PhasefrontError> {
+        let Display {
+            width,
+            height,
+            pitch_um,
+            red_nm,
+            green_nm,
+            blue_nm,
+            volume_depth_mm,
+            offset_mm,
+            bits,
+        } = display;
+        // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same.
+        Ok(phasefront::Display::from_toml(&format!(
+            "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = [{red_nm:?}, {green_nm:?}, {blue_nm:?}]\n\
+             volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}"
+        ))?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn displays_go_and_come_back() {
+        let text = "width = 640\nheight = 480\npitch_um = 3.74\nwavelengths_nm = [639, 521.5, 450]\noffset_mm = -1.25\nbits = 4";
+        let display = display_from_toml(text.into()).unwrap();
+        assert_eq!((display.width, display.green_nm), (640, 521.5));
+        let core = phasefront::Display::try_from(&display).unwrap();
+        assert_eq!(core, phasefront::Display::from_toml(text).unwrap());
+    }
+
+    #[test]
+    fn impossible_displays_are_named() {
+        let good = display_from_toml(String::new()).unwrap();
+        for (bad, word) in [
+            (
+                Display {
+                    width: 0,
+                    ..good.clone()
+                },
+                "width",
+            ),
+            (
+                Display {
+                    pitch_um: f64::NAN,
+                    ..good.clone()
+                },
+                "pitch_um",
+            ),
+            (
+                Display {
+                    red_nm: -1.0,
+                    ..good.clone()
+                },
+                "wavelength",
+            ),
+            (
+                Display {
+                    offset_mm: f64::INFINITY,
+                    ..good
+                },
+                "offset_mm",
+            ),
+        ] {
+            match phasefront::Display::try_from(&bad) {
+                Err(PhasefrontError::Display(message)) => {
+                    assert!(message.contains(word), "{message}");
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+}

@@ -1,0 +1,90 @@
+//! Networks: from a file, from bytes, or built in.
+
+use crate::error::{PhasefrontError, guard};
+use std::sync::Arc;
+
+/// The network that is built in where the feature `built-in-network` is on.
+#[cfg(feature = "built-in-network")]
+const BUILT_IN: Option<&[u8]> = Some(include_bytes!("../../models/rgbd-8-int8.onnx"));
+#[cfg(not(feature = "built-in-network"))]
+const BUILT_IN: Option<&[u8]> = None;
+
+/// A hologram network. Immutable; one serves many sessions.
+#[derive(Debug, uniffi::Object)]
+pub struct Network {
+    pub(crate) core: Arc<phasefront::Network>,
+}
+
+/// What a network is, and the display that it was trained for.
+#[derive(Debug, Clone, PartialEq, uniffi::Record)]
+pub struct NetworkInfo {
+    /// How many convolutions.
+    pub layers: u32,
+    /// Filters of each hidden layer.
+    pub filters: u32,
+    /// The numbers that its layers compute in.
+    pub precision: String,
+    /// Distance between neighbouring pixels, µm.
+    pub pitch_um: f64,
+    /// Depth of the volume, mm.
+    pub volume_depth_mm: f64,
+}
+
+#[uniffi::export]
+impl Network {
+    /// Reads an ONNX file's bytes.
+    ///
+    /// # Errors
+    /// What is not a hologram network, with what is not so and what would be right.
+    #[uniffi::constructor]
+    pub fn from_bytes(onnx: &[u8]) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            Ok(Arc::new(Network {
+                core: Arc::new(phasefront::Network::from_onnx(onnx)?),
+            }))
+        })
+    }
+
+    /// Reads an ONNX file.
+    ///
+    /// # Errors
+    /// A file that cannot be read; as [`Self::from_bytes`].
+    #[uniffi::constructor]
+    pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            let onnx = std::fs::read(&path).map_err(|e| {
+                PhasefrontError::File(format!("the network {path} cannot be read: {e}"))
+            })?;
+            Self::from_bytes(&onnx)
+        })
+    }
+
+    /// The network of 8 layers in int8 that comes along, for the default display's pitch, colours and volume.
+    ///
+    /// # Errors
+    /// A library that was built without it.
+    #[uniffi::constructor]
+    pub fn built_in() -> Result<Arc<Self>, PhasefrontError> {
+        match BUILT_IN {
+            Some(onnx) => Self::from_bytes(onnx),
+            None => Err(PhasefrontError::Network(
+                "network: none is built in; load one from a file, or build with the feature built-in-network"
+                    .into(),
+            )),
+        }
+    }
+
+    /// What it is.
+    pub fn info(&self) -> Result<NetworkInfo, PhasefrontError> {
+        guard(|| {
+            let display = self.core.display();
+            Ok(NetworkInfo {
+                layers: self.core.layers() as u32,
+                filters: self.core.filters() as u32,
+                precision: self.core.precision().to_string(),
+                pitch_um: display.pitch_m * 1e6,
+                volume_depth_mm: display.volume_depth_m * 1e3,
+            })
+        })
+    }
+}

@@ -1,0 +1,288 @@
+//! What a session makes, and how.
+
+use crate::display::Display;
+use crate::error::PhasefrontError;
+use crate::network::Network;
+use phasefront::depth::range;
+use phasefront::session;
+use phasefront::sweep::Sweep;
+use phasefront::{encode, output, slm};
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+/// How a session runs; fixed when it is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum RunningMode {
+    /// Each frame is answered by itself.
+    Image,
+    /// Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
+    Video,
+    /// Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+    LiveStream,
+}
+
+/// How the field becomes phases.
+#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+pub enum Encoding {
+    /// Double phase on the field as it is.
+    DoublePhase,
+    /// A small Gaussian blur first (AA-DPM).
+    AntiAlias {
+        /// Standard deviation, pixels; 0.7 as published.
+        sigma: f32,
+        /// Taps, an odd number; 3 as published.
+        width: u32,
+    },
+    /// High diagonal frequencies cut first (BL-DPM).
+    BandLimit {
+        /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
+        k: f32,
+    },
+}
+
+/// What the modulator answers to a phase.
+#[derive(Debug, Clone, PartialEq, uniffi::Enum)]
+pub enum Response {
+    /// Levels in equal steps of phase, as many as the display's bits have.
+    Linear,
+    /// Of a calibrated modulator: 256 levels, the one at i shows the phase 2πi/256.
+    Lut {
+        /// The levels.
+        levels: Vec<u8>,
+    },
+}
+
+/// Which amplitude full light stands for.
+#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+pub enum Brightness {
+    /// Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
+    Steady,
+    /// This one; what is brighter is clipped.
+    Fixed {
+        /// The amplitude.
+        scale: f32,
+    },
+    /// The frame's largest.
+    FrameMax,
+}
+
+/// Which metres are shown at the ends of the volume.
+#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+pub enum DepthRange {
+    /// The 1st and 99th percentile of the readings, in video smoothed.
+    Percentiles,
+    /// These.
+    Fixed {
+        /// Metres shown nearest.
+        near_m: f32,
+        /// Metres shown farthest.
+        far_m: f32,
+    },
+}
+
+/// What makes holograms.
+#[derive(Debug, Clone, uniffi::Enum)]
+pub enum Method {
+    /// A trained network.
+    Trained {
+        /// The network, for the session's display.
+        network: Arc<Network>,
+    },
+    /// The plane sweep, for any display: slower, and nothing needs to be trained.
+    Sweep,
+}
+
+/// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
+#[derive(Debug, Clone, uniffi::Record)]
+pub struct Rung {
+    /// What makes the hologram.
+    pub method: Method,
+    /// Width of the hologram, pixels.
+    pub width: u32,
+    /// Height of the hologram, pixels.
+    pub height: u32,
+}
+
+/// Whether a session may change its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Quality {
+    /// It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up
+    /// where there is room.
+    Adaptive,
+    /// It stays on this rung.
+    Fixed {
+        /// 0 the best.
+        rung: u32,
+    },
+}
+
+/// How hot the device is, as its system says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Thermal {
+    /// Nothing to heed.
+    Nominal,
+    /// Warm: frames may take a little less time.
+    Fair,
+    /// Hot: half the time.
+    Serious,
+    /// Too hot: the lowest rung.
+    Critical,
+}
+
+/// What a session makes, and how.
+#[derive(Debug, Clone, uniffi::Record)]
+pub struct SessionOptions {
+    /// The display.
+    pub display: Display,
+    /// Qualities, the best first; at least one.
+    pub ladder: Vec<Rung>,
+    /// Whether the session may step on the ladder by itself.
+    pub quality: Quality,
+    /// Frames a second that are aimed at; none takes frames as they come and never steps.
+    pub target_rate_hz: Option<f64>,
+    /// How the field becomes phases.
+    pub encoding: Encoding,
+    /// What the modulator answers to a phase.
+    pub response: Response,
+    /// Which amplitude full light stands for.
+    pub brightness: Brightness,
+    /// Which metres are shown at the ends of the volume.
+    pub depth_range: DepthRange,
+    /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+    pub least_confidence: f32,
+    /// Threads to compute with; none for as many as the device has.
+    pub threads: Option<u32>,
+}
+
+/// How the levels of the colours lie in images for a modulator's driver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Layout {
+    /// One image, bytes red, green, blue.
+    Rgb,
+    /// One image, bytes red, green, blue, alpha 255.
+    Rgba,
+    /// One image, bytes blue, green, red, alpha 255.
+    Bgra,
+    /// Three images, one after another: red, green, blue; a byte a pixel.
+    Grey,
+}
+
+/// How a hologram is put on its modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+pub struct Placement {
+    /// How colours lie in images.
+    pub layout: Layout,
+    /// Whether left and right are exchanged, of the whole image.
+    #[uniffi(default = false)]
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole image.
+    #[uniffi(default = false)]
+    pub flip_y: bool,
+    /// How many pixels to the right of the middle the hologram stands, before flips.
+    #[uniffi(default = 0)]
+    pub shift_x: i32,
+    /// How many pixels below the middle it stands, before flips.
+    #[uniffi(default = 0)]
+    pub shift_y: i32,
+}
+
+impl From<Placement> for output::Placement {
+    fn from(placement: Placement) -> Self {
+        output::Placement {
+            layout: match placement.layout {
+                Layout::Rgb => output::Layout::Rgb,
+                Layout::Rgba => output::Layout::Rgba,
+                Layout::Bgra => output::Layout::Bgra,
+                Layout::Grey => output::Layout::Grey,
+            },
+            flip_x: placement.flip_x,
+            flip_y: placement.flip_y,
+            shift_x: placement.shift_x,
+            shift_y: placement.shift_y,
+        }
+    }
+}
+
+impl TryFrom<&SessionOptions> for session::SessionOptions {
+    type Error = PhasefrontError;
+
+    fn try_from(options: &SessionOptions) -> Result<Self, PhasefrontError> {
+        let [best, ..] = options.ladder.as_slice() else {
+            return Err(PhasefrontError::Setting(
+                "the ladder is empty; give at least one rung: a method and a resolution".into(),
+            ));
+        };
+        let display = phasefront::Display::try_from(&options.display)?;
+        let sweep = Sweep::for_display(&display);
+        let method = |rung: &Rung| match &rung.method {
+            Method::Trained { network } => phasefront::Method::Network(network.core.clone()),
+            Method::Sweep => phasefront::Method::Sweep(sweep),
+        };
+        let mut to = session::SessionOptions::new(display, method(best))?;
+        to.ladder = (options.ladder.iter())
+            .map(|rung| session::Rung {
+                method: method(rung),
+                height: rung.height as usize,
+                width: rung.width as usize,
+            })
+            .collect();
+        to.quality = options.quality.into();
+        to.target_rate_hz = options.target_rate_hz;
+        to.encoding = match options.encoding {
+            Encoding::DoublePhase => encode::Encoding::DoublePhase,
+            Encoding::AntiAlias { sigma, width } => encode::Encoding::AntiAlias {
+                sigma,
+                width: width as usize,
+            },
+            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k },
+        };
+        if let Response::Lut { levels } = &options.response {
+            let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {
+                PhasefrontError::Setting(format!(
+                    "the look-up table has {} levels; 256 are right, one for each phase step of 2π/256",
+                    levels.len()
+                ))
+            })?;
+            to.response = slm::Response::lut(levels);
+        }
+        to.brightness = match options.brightness {
+            Brightness::Steady => session::Brightness::Steady,
+            Brightness::Fixed { scale } => session::Brightness::Fixed(scale),
+            Brightness::FrameMax => session::Brightness::FrameMax,
+        };
+        to.depth.range = match options.depth_range {
+            DepthRange::Percentiles => range::DepthRange::Percentiles,
+            DepthRange::Fixed { near_m, far_m } => range::DepthRange::Fixed { near_m, far_m },
+        };
+        to.depth.least_confidence = options.least_confidence;
+        to.threads = match options.threads {
+            None => None,
+            Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {
+                PhasefrontError::Setting(
+                    "0 threads compute nothing; give at least 1, or none for all".into(),
+                )
+            })?),
+        };
+        Ok(to)
+    }
+}
+
+impl From<Quality> for session::Quality {
+    fn from(quality: Quality) -> Self {
+        match quality {
+            Quality::Adaptive => session::Quality::Adaptive,
+            Quality::Fixed { rung } => session::Quality::Fixed(rung as usize),
+        }
+    }
+}
+
+impl From<Thermal> for session::Thermal {
+    fn from(thermal: Thermal) -> Self {
+        match thermal {
+            Thermal::Nominal => session::Thermal::Nominal,
+            Thermal::Fair => session::Thermal::Fair,
+            Thermal::Serious => session::Thermal::Serious,
+            Thermal::Critical => session::Thermal::Critical,
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! Sessions: frames in, holograms out.
+
+use crate::error::{PhasefrontError, guard};
+use crate::frame::{FrameInfo, FrameMemory};
+use crate::hologram::RawHologram;
+use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
+use crate::statistics::Statistics;
+use phasefront::session::{self, Event, Session, Submission};
+use phasefront::slm::Response;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError, RwLock};
+
+/// Why a frame was not made into a hologram, without fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum DropReason {
+    /// A newer frame came while it waited.
+    Superseded,
+    /// It came sooner than the target rate asks for.
+    AboveTargetRate,
+    /// The session was paused.
+    Paused,
+    /// The session was reset before it was done.
+    Reset,
+    /// The session was closed before it was done.
+    Closed,
+    /// It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages'
+    /// streams say so.
+    Unread,
+    /// For a reason that this version of the bindings does not know.
+    Other,
+}
+
+impl From<session::DropReason> for DropReason {
+    fn from(reason: session::DropReason) -> Self {
+        match reason {
+            session::DropReason::Superseded => DropReason::Superseded,
+            session::DropReason::AboveTargetRate => DropReason::AboveTargetRate,
+            session::DropReason::Paused => DropReason::Paused,
+            session::DropReason::Reset => DropReason::Reset,
+            session::DropReason::Closed => DropReason::Closed,
+            _ => DropReason::Other,
+        }
+    }
+}
+
+/// Why a session changed its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum QualityReason {
+    /// Frames took longer than the target rate allows.
+    TooSlow,
+    /// There was room for more.
+    Room,
+    /// The device is hot.
+    Thermal,
+    /// The caller said so.
+    Asked,
+    /// For a reason that this version of the bindings does not know.
+    Other,
+}
+
+/// A step on the ladder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
+pub struct QualityChange {
+    /// The rung before.
+    pub from_rung: u32,
+    /// The rung now.
+    pub to_rung: u32,
+    /// Why.
+    pub reason: QualityReason,
+}
+
+/// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
+/// order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
+#[uniffi::export(foreign)]
+pub trait SessionListener: Send + Sync {
+    /// A frame became a hologram.
+    fn on_hologram(&self, hologram: Arc<RawHologram>) -> Result<(), PhasefrontError>;
+
+    /// A frame was dropped.
+    fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), PhasefrontError>;
+
+    /// A frame could not be processed. The session goes on.
+    fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), PhasefrontError>;
+
+    /// The frames after this one are made on another rung of the ladder.
+    fn on_quality_changed(
+        &self,
+        timestamp_ns: u64,
+        change: QualityChange,
+    ) -> Result<(), PhasefrontError>;
+}
+
+/// A session. Every call may come from any thread, at any moment.
+#[derive(uniffi::Object)]
+pub struct RawSession {
+    state: RwLock<State>,
+    response: Arc<Response>,
+    listener_failures: Arc<AtomicU64>,
+}
+
+/// A closed session gives its memory back and keeps its statistics.
+enum State {
+    Open(Arc<Session>),
+    Closed(Box<Statistics>),
+}
+
+#[uniffi::export]
+impl RawSession {
+    /// A session that runs in `mode`; live, it needs a `listener`.
+    ///
+    /// # Errors
+    /// Options that cannot be meant or planned for, a live session without a listener, another with one, or threads
+    /// that cannot be started.
+    #[uniffi::constructor]
+    pub fn new(
+        options: SessionOptions,
+        mode: RunningMode,
+        listener: Option<Arc<dyn SessionListener>>,
+    ) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| {
+            let listener_failures = Arc::new(AtomicU64::new(0));
+            let options = session::SessionOptions::try_from(&options)?;
+            let response = Arc::new(options.response.clone());
+            let running = match (mode, listener) {
+                (RunningMode::Image, None) => session::RunningMode::Image,
+                (RunningMode::Video, None) => session::RunningMode::Video,
+                (RunningMode::LiveStream, Some(listener)) => {
+                    let (failures, response) = (listener_failures.clone(), response.clone());
+                    session::RunningMode::Live(Box::new(move |event| {
+                        if let Err(error) = tell(&*listener, event, &response) {
+                            failures.fetch_add(1, Ordering::Relaxed);
+                            log::warn!("{error}");
+                        }
+                    }))
+                }
+                (RunningMode::LiveStream, None) => {
+                    return Err(PhasefrontError::Session(
+                        "session: a live one needs a listener, which hears its results".into(),
+                    ));
+                }
+                (_, Some(_)) => {
+                    return Err(PhasefrontError::Session(
+                        "session: only a live one has a listener; process gives the results of the others"
+                            .into(),
+                    ));
+                }
+            };
+            let session = Session::new(options, running)?;
+            let backend = session.statistics().backend;
+            log::info!(
+                "a session in mode {mode:?} on {}: {}",
+                backend.name,
+                backend.why
+            );
+            Ok(Arc::new(RawSession {
+                state: RwLock::new(State::Open(Arc::new(session))),
+                response,
+                listener_failures,
+            }))
+        })
+    }
+
+    /// The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,
+    /// `chroma` and `chroma_v` the others; what the frame has not, is empty.
+    ///
+    /// # Errors
+    /// A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames
+    /// that follow.
+    pub fn process(
+        &self,
+        luma_or_colour: &[u8],
+        chroma: &[u8],
+        chroma_v: &[u8],
+        depth: &[u8],
+        confidence: &[u8],
+        info: FrameInfo,
+    ) -> Result<Arc<RawHologram>, PhasefrontError> {
+        guard(|| {
+            let frame = info.frame(FrameMemory {
+                colour: [luma_or_colour, chroma, chroma_v],
+                depth,
+                confidence,
+            })?;
+            let hologram = self.session()?.process(&frame)?;
+            Ok(RawHologram::new(hologram, &self.response))
+        })
+    }
+
+    /// Hands a frame to a live session, which copies it and goes on by itself. Gives why the frame was dropped, if it
+    /// was at once; the listener hears of it too. Planes as [`Self::process`] takes them.
+    ///
+    /// # Errors
+    /// A frame that is not usable or late, or a session that is not live or is closed. None of them harms the frames
+    /// that follow.
+    pub fn submit(
+        &self,
+        luma_or_colour: &[u8],
+        chroma: &[u8],
+        chroma_v: &[u8],
+        depth: &[u8],
+        confidence: &[u8],
+        info: FrameInfo,
+    ) -> Result<Option<DropReason>, PhasefrontError> {
+        guard(|| {
+            let frame = info.frame(FrameMemory {
+                colour: [luma_or_colour, chroma, chroma_v],
+                depth,
+                confidence,
+            })?;
+            Ok(match self.session()?.submit(&frame)? {
+                Submission::Queued => None,
+                Submission::Dropped(reason) => Some(reason.into()),
+            })
+        })
+    }
+
+    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    pub fn warm_up(&self) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.warm_up()?))
+    }
+
+    /// Forgets all frames so far; the next, of any timestamp, is the first again.
+    pub fn reset(&self) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.reset()))
+    }
+
+    /// Takes no frames until [`Self::resume`].
+    pub fn pause(&self) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.pause()))
+    }
+
+    /// Takes frames again.
+    pub fn resume(&self) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.resume()))
+    }
+
+    /// Says how hot the device is.
+    pub fn set_thermal(&self, thermal: Thermal) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.set_thermal(thermal.into())))
+    }
+
+    /// Allows or forbids steps on the ladder.
+    ///
+    /// # Errors
+    /// A rung that is not on the ladder.
+    pub fn set_quality(&self, quality: Quality) -> Result<(), PhasefrontError> {
+        guard(|| Ok(self.session()?.set_quality(quality.into())?))
+    }
+
+    /// What the session has done so far; of a closed one, what it did. Never waits for a frame.
+    pub fn statistics(&self) -> Result<Statistics, PhasefrontError> {
+        guard(|| {
+            Ok(match &*self.read() {
+                State::Open(session) => self.statistics_of(session),
+                State::Closed(statistics) => (**statistics).clone(),
+            })
+        })
+    }
+
+    /// Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
+    /// be called again; called by the listener itself, it returns at once. Closing twice does nothing.
+    pub fn shut_down(&self) -> Result<(), PhasefrontError> {
+        guard(|| {
+            // Not under the lock: the listener may call while its session ends.
+            let session = match &*self.read() {
+                State::Open(session) => session.clone(),
+                State::Closed(_) => return Ok(()),
+            };
+            session.close();
+            let statistics = Box::new(self.statistics_of(&session));
+            let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
+            if let State::Open(_) = *state {
+                *state = State::Closed(statistics);
+            }
+            Ok(())
+        })
+    }
+}
+
+impl RawSession {
+    fn read(&self) -> std::sync::RwLockReadGuard<'_, State> {
+        self.state.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn session(&self) -> Result<Arc<Session>, PhasefrontError> {
+        match &*self.read() {
+            State::Open(session) => Ok(session.clone()),
+            State::Closed(_) => Err(PhasefrontError::Session(
+                "session: it is closed; make a new one".into(),
+            )),
+        }
+    }
+
+    fn statistics_of(&self, session: &Session) -> Statistics {
+        let failures = self.listener_failures.load(Ordering::Relaxed);
+        Statistics::new(session.statistics(), failures)
+    }
+}
+
+/// Tells `listener` of `event`.
+fn tell(
+    listener: &dyn SessionListener,
+    event: Event,
+    response: &Arc<Response>,
+) -> Result<(), PhasefrontError> {
+    match event {
+        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram, response)),
+        Event::Dropped {
+            timestamp_ns,
+            reason,
+        } => listener.on_dropped(timestamp_ns, reason.into()),
+        Event::Failed {
+            timestamp_ns,
+            error,
+        } => {
+            log::warn!("the frame of {timestamp_ns} ns failed: {error}");
+            listener.on_failed(timestamp_ns, error.to_string())
+        }
+        Event::QualityChanged {
+            timestamp_ns,
+            change,
+        } => {
+            let reason = match change.reason {
+                session::QualityReason::TooSlow => QualityReason::TooSlow,
+                session::QualityReason::Room => QualityReason::Room,
+                session::QualityReason::Thermal => QualityReason::Thermal,
+                session::QualityReason::Asked => QualityReason::Asked,
+                _ => QualityReason::Other,
+            };
+            log::info!("from rung {} to {}: {reason:?}", change.from, change.to);
+            let change = QualityChange {
+                from_rung: change.from as u32,
+                to_rung: change.to as u32,
+                reason,
+            };
+            listener.on_quality_changed(timestamp_ns, change)
+        }
+        other => {
+            log::debug!("an event that these bindings do not know: {other:?}");
+            Ok(())
+        }
+    }
+}

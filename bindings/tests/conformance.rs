@@ -1,0 +1,565 @@
+//! The conformance suite, run from Rust: frames in every format, and the levels that they must become. Swift, Kotlin and
+//! Python run the same from `tests/conformance/`; the bits of all four must be equal.
+//!
+//! `PHASEFRONT_BLESS=1` writes the suite anew. Where `PHASEFRONT_CONFORMANCE` names a folder, the levels are left in its
+//! `levels.bin`, for the other languages to compare with.
+#![allow(clippy::unwrap_used)]
+
+use phasefront_ffi::{
+    Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
+    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, Quality, RawHologram,
+    RawSession, Response, Rotation, Rung, RunningMode, SessionOptions, YuvMatrix,
+    display_from_toml,
+};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/conformance")
+}
+
+/// The levels that `hologram` holds, read as the other languages read them.
+fn levels(hologram: &RawHologram) -> Vec<u8> {
+    let len = hologram.plane_len().unwrap() as usize;
+    (0..3)
+        .flat_map(|colour| {
+            let address = hologram.plane_address(colour).unwrap() as usize;
+            // SAFETY: the hologram is alive, and its plane of `len` bytes lies there.
+            #[allow(unsafe_code)]
+            unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
+        })
+        .collect()
+}
+
+fn int(value: &Value) -> u32 {
+    value.as_u64().unwrap() as u32
+}
+
+fn plane(value: &Value) -> PlaneInfo {
+    PlaneInfo {
+        row_stride: int(&value["row_stride"]),
+        pixel_stride: int(&value["pixel_stride"]),
+    }
+}
+
+/// The bytes of a plane in `frames.bin`.
+fn bytes<'a>(frames: &'a [u8], plane: &Value) -> &'a [u8] {
+    match plane {
+        Value::Null => &[],
+        _ => &frames[int(&plane["offset"]) as usize..][..int(&plane["length"]) as usize],
+    }
+}
+
+fn options(case: &Value) -> SessionOptions {
+    let display = display_from_toml(case["display"].as_str().unwrap().into()).unwrap();
+    SessionOptions {
+        ladder: vec![Rung {
+            method: match case["method"].as_str().unwrap() {
+                "network" => Method::Trained {
+                    network: Network::built_in().unwrap(),
+                },
+                "sweep" => Method::Sweep,
+                other => panic!("{other}"),
+            },
+            width: display.width,
+            height: display.height,
+        }],
+        display,
+        quality: Quality::Adaptive,
+        target_rate_hz: None,
+        encoding: match case["encoding"].as_str().unwrap() {
+            "double-phase" => Encoding::DoublePhase,
+            "anti-alias" => Encoding::AntiAlias {
+                sigma: 0.7,
+                width: 3,
+            },
+            "band-limit" => Encoding::BandLimit { k: 1.0 },
+            other => panic!("{other}"),
+        },
+        response: match &case["lut"] {
+            Value::Null => Response::Linear,
+            levels => Response::Lut {
+                levels: levels
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .map(|l| int(l) as u8)
+                    .collect(),
+            },
+        },
+        brightness: match &case["brightness"] {
+            Value::Null => Brightness::Steady,
+            scale => Brightness::Fixed {
+                scale: scale.as_f64().unwrap() as f32,
+            },
+        },
+        depth_range: match &case["range"] {
+            Value::Null => DepthRange::Percentiles,
+            range => DepthRange::Fixed {
+                near_m: range[0].as_f64().unwrap() as f32,
+                far_m: range[1].as_f64().unwrap() as f32,
+            },
+        },
+        least_confidence: 0.25,
+        threads: None,
+    }
+}
+
+fn info(frame: &Value) -> FrameInfo {
+    let (colour, depth, confidence) = (&frame["colour"], &frame["depth"], &frame["confidence"]);
+    FrameInfo {
+        timestamp_ns: frame["timestamp_ns"].as_u64().unwrap(),
+        colour: ColourInfo {
+            format: match colour["format"].as_str().unwrap() {
+                "rgba" => ColourFormat::Rgba,
+                "bgra" => ColourFormat::Bgra,
+                "rgb" => ColourFormat::Rgb,
+                "nv12" => ColourFormat::Nv12,
+                "yuv420" => ColourFormat::Yuv420,
+                other => panic!("{other}"),
+            },
+            width: int(&colour["width"]),
+            height: int(&colour["height"]),
+            planes: colour["planes"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(plane)
+                .collect(),
+            matrix: match colour["matrix"].as_str().unwrap() {
+                "bt601" => YuvMatrix::Bt601,
+                "bt709" => YuvMatrix::Bt709,
+                other => panic!("{other}"),
+            },
+            video_range: colour["video_range"].as_bool().unwrap(),
+        },
+        depth: DepthInfo {
+            format: match depth["format"].as_str().unwrap() {
+                "metres-f32" => DepthFormat::MetresF32,
+                "metres-f16" => DepthFormat::MetresF16,
+                "disparity-f32" => DepthFormat::DisparityF32,
+                "disparity-f16" => DepthFormat::DisparityF16,
+                "millimetres-u16" => DepthFormat::MillimetresU16,
+                "android-depth16" => DepthFormat::AndroidDepth16,
+                "normalized-u8" => DepthFormat::NormalizedU8,
+                "normalized-u16" => DepthFormat::NormalizedU16,
+                other => panic!("{other}"),
+            },
+            width: int(&depth["width"]),
+            height: int(&depth["height"]),
+            plane: plane(&depth["plane"]),
+        },
+        confidence: match confidence {
+            Value::Null => None,
+            _ => Some(ConfidenceInfo {
+                format: match confidence["format"].as_str().unwrap() {
+                    "low-medium-high" => ConfidenceFormat::LowMediumHigh,
+                    "u8" => ConfidenceFormat::U8,
+                    other => panic!("{other}"),
+                },
+                width: int(&confidence["width"]),
+                height: int(&confidence["height"]),
+                plane: plane(&confidence["plane"]),
+            }),
+        },
+        orientation: Orientation {
+            rotation: match frame["rotation"].as_u64().unwrap() {
+                0 => Rotation::Upright,
+                90 => Rotation::Clockwise90,
+                180 => Rotation::Half,
+                270 => Rotation::Clockwise270,
+                other => panic!("{other}"),
+            },
+            mirrored: frame["mirrored"].as_bool().unwrap(),
+        },
+        cameras: None,
+    }
+}
+
+/// The levels of a case's frames, one after another.
+fn run(case: &Value, frames: &[u8]) -> Vec<u8> {
+    let mode = match case["mode"].as_str().unwrap() {
+        "image" => RunningMode::Image,
+        "video" => RunningMode::Video,
+        other => panic!("{other}"),
+    };
+    let session = RawSession::new(options(case), mode, None).unwrap();
+    let mut all = Vec::new();
+    for frame in case["frames"].as_array().unwrap() {
+        let colour = |index: usize| bytes(frames, &frame["colour"]["planes"][index]);
+        let hologram: Arc<RawHologram> = session
+            .process(
+                colour(0),
+                colour(1),
+                colour(2),
+                bytes(frames, &frame["depth"]["plane"]),
+                bytes(frames, &frame["confidence"]["plane"]),
+                info(frame),
+            )
+            .unwrap();
+        all.extend(levels(&hologram));
+    }
+    all
+}
+
+/// How many levels differ, and the most that one differs by around the circle of `levels` of them.
+fn difference(a: &[u8], b: &[u8], levels: i32) -> (usize, i32) {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).fold((0, 0), |(count, most), (a, b)| {
+        let apart = (i32::from(*a) - i32::from(*b)).rem_euclid(levels);
+        let apart = apart.min(levels - apart);
+        (count + usize::from(apart > 0), most.max(apart))
+    })
+}
+
+#[test]
+fn frames_become_the_levels_that_are_expected() {
+    if std::env::var_os("PHASEFRONT_BLESS").is_some() {
+        write::suite();
+    }
+    let suite = std::fs::read_to_string(folder().join("cases.json")).unwrap();
+    let suite: Value = serde_json::from_str(&suite).unwrap();
+    let frames = std::fs::read(folder().join("frames.bin")).unwrap();
+    let expected = std::fs::read(folder().join("levels.bin")).unwrap();
+    let mut all = Vec::new();
+    for case in suite["cases"].as_array().unwrap() {
+        let got = run(case, &frames);
+        let want = &expected[all.len()..][..got.len()];
+        // Another processor rounds otherwise in the last bit, which turns a level here and there. A calibrated
+        // modulator's levels are in no order, so a turned one may be any other.
+        let (count, most) = difference(&got, want, int(&case["levels"]) as i32);
+        let name = &case["name"];
+        assert!(
+            count * 200 <= got.len(),
+            "{name}: {count} of {} levels differ",
+            got.len()
+        );
+        assert!(
+            most <= 1 || !case["lut"].is_null(),
+            "{name}: a level differs by {most}"
+        );
+        all.extend(got);
+    }
+    assert_eq!(all.len(), expected.len());
+    if let Some(folder) = std::env::var_os("PHASEFRONT_CONFORMANCE") {
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(PathBuf::from(folder).join("levels.bin"), all).unwrap();
+    }
+}
+
+/// Makes the suite: a picture and its depth, as each format holds them.
+mod write {
+    use super::*;
+
+    const DISPLAY: (usize, usize) = (48, 36);
+
+    /// Colour and metres at (x, y) of a picture whose sides are 0..1, at the time t: a ball before a striped wall.
+    fn scene(x: f64, y: f64, t: f64) -> ([f64; 3], f64) {
+        let (dx, dy) = (x - 0.45 - 0.1 * t, (y - 0.5) * 0.75);
+        let r = (dx * dx + dy * dy).sqrt() / 0.22;
+        if r < 1.0 {
+            let light = 0.35 + 0.6 * (1.0 - r * r).sqrt();
+            return (
+                [light, 0.55 * light, 0.2 + 0.1 * y],
+                0.6 - 0.15 * (1.0 - r * r).sqrt(),
+            );
+        }
+        let stripe = if (x * 9.0 + y * 4.0).floor() as i64 % 2 == 0 {
+            0.8
+        } else {
+            0.25
+        };
+        (
+            [
+                0.3 * stripe,
+                0.3 + 0.5 * stripe * y,
+                stripe * (1.0 - 0.4 * x),
+            ],
+            1.2 + 0.5 * x,
+        )
+    }
+
+    fn at(i: usize, n: usize) -> f64 {
+        (i as f64 + 0.5) / n as f64
+    }
+
+    fn byte(value: f64) -> u8 {
+        (value.clamp(0.0, 1.0) * 255.0).round() as u8
+    }
+
+    /// The whole suite's memory.
+    #[derive(Default)]
+    struct Frames(Vec<u8>);
+
+    impl Frames {
+        /// A plane whose rows and pixels have gaps, filled with what must not be read.
+        fn plane(
+            &mut self,
+            width: usize,
+            height: usize,
+            size: usize,
+            pixel: usize,
+            pad: usize,
+            fill: impl Fn(usize, usize) -> Vec<u8>,
+        ) -> Value {
+            let row = width * pixel + pad;
+            let mut bytes = vec![0xa5; row * (height - 1) + (width - 1) * pixel + size];
+            for y in 0..height {
+                for x in 0..width {
+                    bytes[y * row + x * pixel..][..size].copy_from_slice(&fill(x, y));
+                }
+            }
+            let offset = self.0.len();
+            self.0.extend(&bytes);
+            json!({"offset": offset, "length": bytes.len(), "row_stride": row, "pixel_stride": pixel})
+        }
+
+        fn colour(
+            &mut self,
+            format: &str,
+            width: usize,
+            height: usize,
+            matrix: &str,
+            video_range: bool,
+            t: f64,
+        ) -> Value {
+            let rgb = |x: usize, y: usize| scene(at(x, width), at(y, height), t).0;
+            let (kr, kb) = if matrix == "bt709" {
+                (0.2126, 0.0722)
+            } else {
+                (0.299, 0.114)
+            };
+            let yuv = |[r, g, b]: [f64; 3]| {
+                let y = kr * r + (1.0 - kr - kb) * g + kb * b;
+                let (u, v) = ((b - y) / (2.0 - 2.0 * kb), (r - y) / (2.0 - 2.0 * kr));
+                match video_range {
+                    true => [
+                        (16.0 + 219.0 * y) / 255.0,
+                        (128.0 + 224.0 * u) / 255.0,
+                        (128.0 + 224.0 * v) / 255.0,
+                    ],
+                    false => [y, u + 128.0 / 255.0, v + 128.0 / 255.0],
+                }
+            };
+            let (half_w, half_h) = (width.div_ceil(2), height.div_ceil(2));
+            let chroma = |x: usize, y: usize| yuv(scene(at(x, half_w), at(y, half_h), t).0);
+            let luma = |x, y| vec![byte(yuv(rgb(x, y))[0])];
+            let planes = match format {
+                "rgba" => vec![self.plane(width, height, 4, 4, 12, |x, y| {
+                    let [r, g, b] = rgb(x, y);
+                    vec![byte(r), byte(g), byte(b), 7]
+                })],
+                "bgra" => vec![self.plane(width, height, 4, 4, 0, |x, y| {
+                    let [r, g, b] = rgb(x, y);
+                    vec![byte(b), byte(g), byte(r), 9]
+                })],
+                "rgb" => {
+                    vec![self.plane(width, height, 3, 3, 1, |x, y| rgb(x, y).map(byte).to_vec())]
+                }
+                "nv12" => vec![
+                    self.plane(width, height, 1, 1, 8, luma),
+                    self.plane(half_w, half_h, 2, 2, 8, |x, y| {
+                        chroma(x, y)[1..].iter().map(|v| byte(*v)).collect()
+                    }),
+                ],
+                "yuv420" => vec![
+                    self.plane(width, height, 1, 1, 3, luma),
+                    self.plane(half_w, half_h, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[1])]),
+                    self.plane(half_w, half_h, 1, 2, 5, |x, y| vec![byte(chroma(x, y)[2])]),
+                ],
+                other => panic!("{other}"),
+            };
+            json!({"format": format, "width": width, "height": height, "matrix": matrix, "video_range": video_range, "planes": planes})
+        }
+
+        fn depth(&mut self, format: &str, width: usize, height: usize, t: f64) -> Value {
+            let hole = |x: usize, y: usize| (x * 7 + y * 3) % 19 == 0;
+            let pixel = if format.ends_with("f32") {
+                4
+            } else if format.ends_with("u8") {
+                1
+            } else {
+                2
+            };
+            let plane = self.plane(width, height, pixel, pixel, 2 * pixel, |x, y| {
+                let metres = scene(at(x, width), at(y, height), t).1;
+                let measured = if hole(x, y) { 0.0 } else { metres };
+                let normalized = (metres - 0.4) / 1.4;
+                match format {
+                    "metres-f32" => (if hole(x, y) { f32::NAN } else { metres as f32 })
+                        .to_le_bytes()
+                        .to_vec(),
+                    "metres-f16" => f16_bits(measured).to_le_bytes().to_vec(),
+                    "disparity-f32" => (if hole(x, y) { 0.0 } else { 1.0 / metres as f32 })
+                        .to_le_bytes()
+                        .to_vec(),
+                    "disparity-f16" => f16_bits(if hole(x, y) { 0.0 } else { 1.0 / metres })
+                        .to_le_bytes()
+                        .to_vec(),
+                    "millimetres-u16" => ((measured * 1000.0) as u16).to_le_bytes().to_vec(),
+                    "android-depth16" => {
+                        let code = if hole(x, y) { 1 } else { (x as u16 % 3) * 3 };
+                        ((metres * 1000.0) as u16 | code << 13)
+                            .to_le_bytes()
+                            .to_vec()
+                    }
+                    "normalized-u8" => vec![byte(normalized)],
+                    "normalized-u16" => ((normalized * 65535.0) as u16).to_le_bytes().to_vec(),
+                    other => panic!("{other}"),
+                }
+            });
+            json!({"format": format, "width": width, "height": height, "plane": plane})
+        }
+
+        fn confidence(&mut self, format: &str, width: usize, height: usize) -> Value {
+            let plane = self.plane(width, height, 1, 1, 1, |x, y| {
+                let low = (x * 5 + y * 11) % 13 == 0;
+                vec![match (format, low) {
+                    (_, true) => 0,
+                    ("u8", false) => 200,
+                    _ => 2,
+                }]
+            });
+            json!({"format": format, "width": width, "height": height, "plane": plane})
+        }
+    }
+
+    /// The 16-bit float nearest below a value that is 0 or in 2^-14..2^15.
+    fn f16_bits(value: f64) -> u16 {
+        if value == 0.0 {
+            return 0;
+        }
+        let exponent = value.log2().floor();
+        ((exponent as i32 + 15) as u16) << 10 | ((value / exponent.exp2() - 1.0) * 1024.0) as u16
+    }
+
+    pub(super) fn suite() {
+        let mut frames = Frames::default();
+        let (w, h) = DISPLAY;
+        let display = format!("width = {w}\nheight = {h}\n");
+        let still = |colour: Value, depth: Value| json!({"timestamp_ns": 1, "colour": colour, "depth": depth, "confidence": null, "rotation": 0, "mirrored": false});
+        let case = |name: &str, frames: Vec<Value>| {
+            json!({"name": name, "method": "network", "mode": "image", "display": display, "levels": 256, "encoding": "anti-alias", "lut": null,
+                   "brightness": null, "range": null, "frames": frames})
+        };
+        let mut cases = Vec::new();
+
+        let colour = frames.colour("rgba", 64, 48, "bt601", false, 0.0);
+        let depth = frames.depth("metres-f32", 32, 24, 0.0);
+        let plain = still(colour, depth);
+        cases.push(case("RGBA and metres", vec![plain.clone()]));
+
+        let mut one = case("BGRA and 16-bit metres, sensor turned", vec![]);
+        let mut frame = still(
+            frames.colour("bgra", 36, 48, "bt601", false, 0.0),
+            frames.depth("metres-f16", 18, 24, 0.0),
+        );
+        frame["rotation"] = json!(90);
+        frame["mirrored"] = json!(true);
+        one["frames"] = json!([frame]);
+        cases.push(one);
+
+        let mut frame = still(
+            frames.colour("rgb", 61, 47, "bt601", false, 0.0),
+            frames.depth("disparity-f32", 31, 24, 0.0),
+        );
+        frame["rotation"] = json!(180);
+        cases.push(case(
+            "RGB of odd size and disparity, upside down",
+            vec![frame],
+        ));
+
+        let mut frame = still(
+            frames.colour("nv12", 64, 48, "bt709", true, 0.0),
+            frames.depth("disparity-f16", 32, 24, 0.0),
+        );
+        frame["confidence"] = frames.confidence("low-medium-high", 32, 24);
+        cases.push(case(
+            "420v of BT.709 and 16-bit disparity with confidence",
+            vec![frame],
+        ));
+
+        let mut frame = still(
+            frames.colour("yuv420", 63, 47, "bt601", false, 0.0),
+            frames.depth("millimetres-u16", 40, 30, 0.0),
+        );
+        frame["confidence"] = frames.confidence("u8", 40, 30);
+        cases.push(case(
+            "YUV_420_888 of odd size and millimetres with confidence",
+            vec![frame],
+        ));
+
+        let mut frame = still(
+            frames.colour("yuv420", 48, 64, "bt601", true, 0.0),
+            frames.depth("android-depth16", 24, 32, 0.0),
+        );
+        frame["rotation"] = json!(270);
+        cases.push(case(
+            "YUV_420_888 of video range and DEPTH16, sensor turned",
+            vec![frame],
+        ));
+
+        let frame = still(
+            frames.colour("nv12", 64, 48, "bt601", false, 0.0),
+            frames.depth("normalized-u8", 64, 48, 0.0),
+        );
+        cases.push(case("420f and normalized depth", vec![frame]));
+
+        let mut one = case(
+            "a small frame, 16-bit normalized depth, modulator off the volume, double phase, 5 bits",
+            vec![],
+        );
+        one["frames"] = json!([still(
+            frames.colour("rgba", 24, 18, "bt601", false, 0.0),
+            frames.depth("normalized-u16", 24, 18, 0.0)
+        )]);
+        one["display"] = json!(format!("{display}offset_mm = 4.5\nbits = 5\n"));
+        one["levels"] = json!(32);
+        one["encoding"] = json!("double-phase");
+        cases.push(one);
+
+        let mut one = case(
+            "band limit, fixed brightness, fixed range, a calibrated modulator",
+            vec![plain.clone()],
+        );
+        one["encoding"] = json!("band-limit");
+        one["brightness"] = json!(1.25);
+        one["range"] = json!([0.5, 1.5]);
+        one["lut"] = (0..256).map(|i| (i * 3 / 4 + 20) as u8).collect();
+        cases.push(one);
+
+        let mut one = case(
+            "the plane sweep, for a display that no network is for",
+            vec![plain],
+        );
+        one["method"] = json!("sweep");
+        one["display"] = json!(format!(
+            "{display}pitch_um = 4.5\nwavelengths_nm = [650, 530, 440]\nvolume_depth_mm = 2.0\n"
+        ));
+        cases.push(one);
+
+        let mut one = case("video", vec![]);
+        one["mode"] = json!("video");
+        one["frames"] = (0..4u64)
+            .map(|i| {
+                let t = i as f64 / 3.0;
+                let mut frame = still(
+                    frames.colour("bgra", 48, 36, "bt601", false, t),
+                    frames.depth("metres-f32", 24, 18, t),
+                );
+                frame["timestamp_ns"] = json!(1_000_000_000 + i * 33_000_000);
+                frame
+            })
+            .collect();
+        cases.push(one);
+
+        let folder = folder();
+        let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0)).collect();
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("frames.bin"), &frames.0).unwrap();
+        std::fs::write(folder.join("levels.bin"), levels).unwrap();
+        let text = serde_json::to_string_pretty(&json!({"cases": cases})).unwrap();
+        std::fs::write(folder.join("cases.json"), text + "\n").unwrap();
+    }
+}

@@ -1,0 +1,105 @@
+import ARKit
+import Phasefront
+import UIKit
+
+/// Where frames come from.
+@MainActor
+protocol FrameSource {
+    /// Submits frame after frame to `session`, until it is stopped.
+    func start(_ session: Phasefront.Session)
+    func stop()
+}
+
+/// Colour and depth by ARKit, on devices with LiDAR.
+final class CameraSource: NSObject, FrameSource, ARSessionDelegate {
+    static var isSupported: Bool { ARWorldTrackingConfiguration.supportsFrameSemantics(.smoothedSceneDepth) }
+
+    private let camera = ARSession()
+    /// Written before the camera runs, read on its queue.
+    nonisolated(unsafe) private var session: Phasefront.Session?
+
+    func start(_ session: Phasefront.Session) {
+        self.session = session
+        let configuration = ARWorldTrackingConfiguration()
+        configuration.frameSemantics.insert(.smoothedSceneDepth)
+        camera.delegate = self
+        camera.delegateQueue = DispatchQueue(label: "camera")
+        camera.run(configuration)
+    }
+
+    func stop() { camera.pause() }
+
+    nonisolated func session(_: ARSession, didUpdate frame: ARFrame) {
+        do {
+            try session?.submit(frame)
+        } catch {
+            print(error.localizedDescription)
+        }
+    }
+}
+
+/// The project's sample scene, 30 times a second, seen through a window that moves over it: for devices without LiDAR.
+final class SampleSource: FrameSource {
+    private var task: Task<Void, Never>?
+
+    func start(_ session: Phasefront.Session) {
+        task = Task.detached {
+            guard let colour = pixels("scene_rgb", "jpg", channels: 4), let depth = pixels("scene_depth", "png", channels: 1)
+            else { return }
+            // Seven eighths of the scene, to and fro.
+            let most = colour.width / 8
+            var step = 0
+            while !Task.isCancelled {
+                let x = step / most % 2 == 0 ? step % most : most - 1 - step % most
+                let frame = Frame(
+                    timestampNs: DispatchTime.now().uptimeNanoseconds,
+                    colour: window(colour, x: x, channels: 4) { width, height, plane in
+                        ColourImage(format: .rgba, width: width, height: height, planes: [plane])
+                    },
+                    depth: window(depth, x: x * depth.width / colour.width, channels: 1) { width, height, plane in
+                        DepthImage(format: .normalizedU8, width: width, height: height, plane: plane)
+                    })
+                do {
+                    try session.submit(frame)
+                    try await Task.sleep(nanoseconds: 33_000_000)
+                } catch {
+                    return
+                }
+                step += 1
+            }
+        }
+    }
+
+    func stop() { task?.cancel() }
+}
+
+private struct Pixels: Sendable {
+    let bytes: Data
+    let width, height: Int
+}
+
+/// Seven eighths of `pixels`, from column `x` on.
+private func window<Image>(
+    _ pixels: Pixels, x: Int, channels: Int, _ make: (Int, Int, Plane) -> Image
+) -> Image {
+    let bytes = pixels.bytes.dropFirst(channels * x)
+    let plane = Plane(bytes: bytes, rowStride: channels * pixels.width, pixelStride: channels)
+    return make(pixels.width - pixels.width / 8, pixels.height - pixels.height / 8, plane)
+}
+
+/// The pixels of an image of the app: RGBA or grey.
+private func pixels(_ name: String, _ type: String, channels: Int) -> Pixels? {
+    guard let path = Bundle.module.path(forResource: name, ofType: type),
+        let image = UIImage(contentsOfFile: path)?.cgImage
+    else { return nil }
+    var bytes = Data(count: channels * image.width * image.height)
+    bytes.withUnsafeMutableBytes { memory in
+        let context = CGContext(
+            data: memory.baseAddress, width: image.width, height: image.height, bitsPerComponent: 8,
+            bytesPerRow: channels * image.width,
+            space: channels == 1 ? CGColorSpaceCreateDeviceGray() : CGColorSpaceCreateDeviceRGB(),
+            bitmapInfo: (channels == 1 ? CGImageAlphaInfo.none : .noneSkipLast).rawValue)
+        context?.draw(image, in: CGRect(x: 0, y: 0, width: image.width, height: image.height))
+    }
+    return Pixels(bytes: bytes, width: image.width, height: image.height)
+}

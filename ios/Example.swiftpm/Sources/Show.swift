@@ -1,0 +1,65 @@
+import ARKit
+import Phasefront
+import UIKit
+
+/// Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on, the
+/// levels on an external screen where there is one, and what it costs.
+@MainActor
+final class Show: ObservableObject {
+    @Published var preview: CGImage?
+    @Published var statistics = ""
+    @Published var zMm = 0.0
+    @Published var hasError = false
+    private(set) var message = ""
+    private var latest: Hologram?
+    private let screen = ExternalScreen()
+    private let display = Display(width: 960, height: 540)
+
+    func run() async {
+        do {
+            try Log.sendToSystem()
+            var options = SessionOptions(display: display, network: try Network.builtIn())
+            options.targetRateHz = 30
+            let session = try Session(options, mode: .liveStream)
+            let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()
+            source.start(session)
+            defer { source.stop() }
+            for await event in session.events {
+                try session.setThermal(Thermal(ProcessInfo.processInfo.thermalState))
+                switch event {
+                case .hologram(let hologram): try await show(hologram, of: session)
+                case .failed(_, let message): say(message)
+                case .dropped, .qualityChanged: break
+                }
+            }
+        } catch {
+            say(error.localizedDescription)
+        }
+    }
+
+    private func show(_ hologram: Hologram, of session: Session) async throws {
+        let (zMm, display, needsLevels) = (zMm, display, screen.isConnected)
+        // Some milliseconds of work: not on the main thread.
+        let images = try await Task.detached {
+            let view = try hologram.preview(zMm: zMm, width: Int(display.width) / 2, height: Int(display.height) / 2)
+            return (try view.cgImage(), needsLevels ? try hologram.output().cgImage(colourSpace: nil) : nil)
+        }.value
+        latest = hologram
+        preview = images.0
+        if let levels = images.1 { screen.show(levels) }
+        let of = try session.statistics()
+        statistics = String(
+            format: "%.1f holograms a second, %d dropped of %d\n%@: %.1f ms, of which the network takes %.1f",
+            of.rateHz, of.dropped.total, of.submitted, of.backend, of.times.totalMs, of.times.methodMs)
+    }
+
+    /// Focuses on what is seen at a point, each side of the picture 0...1.
+    func focus(atX x: Double, y: Double) {
+        if let z = try? latest?.z(atX: x, y: y) { zMm = z }
+    }
+
+    private func say(_ message: String) {
+        self.message = message
+        hasError = true
+    }
+}

@@ -1,0 +1,38 @@
+#if canImport(ARKit)
+    import ARKit
+    import PhasefrontCore
+
+    extension Session {
+        /// The hologram of what ARKit sees, in an image or a video session. The configuration needs
+        /// `frameSemantics.insert(.sceneDepth)` or `.smoothedSceneDepth`; ``Frame`` says what is thrown.
+        ///
+        /// - Parameter orientation: how ARKit's picture, which is always that of the sensor, must be turned to stand upright.
+        public func process(_ frame: ARFrame, orientation: Orientation = .upright) throws -> Hologram {
+            try withFrame(frame, orientation: orientation) { try process($0) }
+        }
+
+        /// Hands what ARKit sees to a live stream; see ``submit(_:)``. The `ARFrame` is not kept.
+        @discardableResult
+        public func submit(_ frame: ARFrame, orientation: Orientation = .upright) throws -> DropReason? {
+            try withFrame(frame, orientation: orientation) { try submit($0) }
+        }
+    }
+
+    private func withFrame<R>(
+        _ frame: ARFrame, orientation: Orientation, _ body: (Frame) throws -> R
+    ) throws -> R {
+        guard let depth = frame.smoothedSceneDepth ?? frame.sceneDepth else {
+            throw PhasefrontError.Frame(
+                message: "frame: ARKit gave no depth; run a configuration with the frame semantics sceneDepth, on a device with LiDAR"
+            )
+        }
+        return try withColourImage(frame.capturedImage) { colour in
+            try withDepthImage(depth.depthMap, confidence: depth.confidenceMap) { depth in
+                try body(
+                    Frame(
+                        timestampNs: UInt64(max(0, frame.timestamp) * 1e9), colour: colour, depth: depth,
+                        orientation: orientation))
+            }
+        }
+    }
+#endif

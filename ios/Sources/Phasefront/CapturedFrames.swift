@@ -1,0 +1,39 @@
+#if canImport(AVFoundation) && canImport(UIKit)
+    import AVFoundation
+    import PhasefrontCore
+
+    extension Session {
+        /// The hologram of a camera image and its depth, in an image or a video session. ``Frame`` says what is thrown.
+        ///
+        /// - Parameters:
+        ///   - depth: of the same moment and the same field of view; `AVCaptureDataOutputSynchronizer` brings both together.
+        ///   - orientation: how both must be turned to stand upright.
+        public func process(
+            _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation = .upright
+        ) throws -> Hologram {
+            try withFrame(image, depth: depth, orientation: orientation) { try process($0) }
+        }
+
+        /// Hands a camera image and its depth to a live stream; see ``submit(_:)``. The buffers are not kept.
+        @discardableResult
+        public func submit(
+            _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation = .upright
+        ) throws -> DropReason? {
+            try withFrame(image, depth: depth, orientation: orientation) { try submit($0) }
+        }
+    }
+
+    private func withFrame<R>(
+        _ image: CMSampleBuffer, depth: AVDepthData, orientation: Orientation, _ body: (Frame) throws -> R
+    ) throws -> R {
+        guard let buffer = CMSampleBufferGetImageBuffer(image) else {
+            throw PhasefrontError.Frame(message: "frame: the sample buffer holds no image")
+        }
+        let timestampNs = CMSampleBufferGetPresentationTimeStamp(image).phasefrontTimestampNs
+        return try withColourImage(buffer) { colour in
+            try withDepthImage(depth.depthDataMap) { depth in
+                try body(Frame(timestampNs: timestampNs, colour: colour, depth: depth, orientation: orientation))
+            }
+        }
+    }
+#endif

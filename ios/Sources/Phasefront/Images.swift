@@ -1,0 +1,35 @@
+#if canImport(CoreGraphics)
+    import CoreGraphics
+    import PhasefrontCore
+
+    extension PixelImage {
+        /// The image for Core Graphics and UIKit, without a copy: it keeps this one alive. `colourSpace` is how its values are
+        /// meant: sRGB for previews; nil for device values that must reach a modulator unchanged.
+        ///
+        /// - Throws: ``PhasefrontError/Setting(message:)`` for an image that is not of 4 bytes a pixel.
+        public func cgImage(colourSpace: CGColorSpace? = CGColorSpace(name: CGColorSpace.sRGB)) throws -> CGImage {
+            guard pixelBytes == 4 else {
+                throw PhasefrontError.Setting(
+                    message: "an image of \(pixelBytes) bytes a pixel; the layout RGBA is needed for Core Graphics")
+            }
+            let provider = try withBytes { bytes in
+                CGDataProvider(
+                    dataInfo: Unmanaged.passRetained(self).toOpaque(), data: bytes.baseAddress!, size: bytes.count,
+                    releaseData: { owner, _, _ in
+                        if let owner { Unmanaged<PixelImage>.fromOpaque(owner).release() }
+                    })
+            }
+            let image = provider.flatMap {
+                CGImage(
+                    width: width, height: height, bitsPerComponent: 8, bitsPerPixel: 32, bytesPerRow: 4 * width,
+                    space: colourSpace ?? CGColorSpaceCreateDeviceRGB(),
+                    bitmapInfo: CGBitmapInfo(rawValue: CGImageAlphaInfo.noneSkipLast.rawValue), provider: $0,
+                    decode: nil, shouldInterpolate: colourSpace != nil, intent: .defaultIntent)
+            }
+            guard let image else {
+                throw PhasefrontError.Setting(message: "Core Graphics makes no image of \(width)×\(height) pixels")
+            }
+            return image
+        }
+    }
+#endif

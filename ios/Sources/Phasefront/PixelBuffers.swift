@@ -1,0 +1,108 @@
+#if canImport(CoreVideo)
+    @_exported import PhasefrontCore
+
+    import CoreMedia
+    import CoreVideo
+
+    /// `body` with the image that lies in `buffer`, which is locked meanwhile: 32BGRA, 32RGBA, 420f or 420v, as cameras and
+    /// ARKit give it. Nothing is copied.
+    ///
+    /// - Throws: ``PhasefrontError/Frame(message:)`` for another pixel format, which the message names.
+    public func withColourImage<R>(_ buffer: CVPixelBuffer, _ body: (ColourImage) throws -> R) throws -> R {
+        let format: ColourFormat
+        var isVideoRange = false
+        switch CVPixelBufferGetPixelFormatType(buffer) {
+        case kCVPixelFormatType_32BGRA: format = .bgra
+        case kCVPixelFormatType_32RGBA: format = .rgba
+        case kCVPixelFormatType_420YpCbCr8BiPlanarFullRange: format = .nv12
+        case kCVPixelFormatType_420YpCbCr8BiPlanarVideoRange:
+            format = .nv12
+            isVideoRange = true
+        case let other:
+            throw PhasefrontError.Frame(
+                message: "frame: colour is \(fourCharacters(other)); BGRA, RGBA, 420f or 420v are needed")
+        }
+        let matrix = CVBufferCopyAttachment(buffer, kCVImageBufferYCbCrMatrixKey, nil) as? String
+        return try withLocked(buffer) {
+            let planes =
+                switch format {
+                case .nv12: [try plane(0, of: buffer, pixelStride: 1), try plane(1, of: buffer, pixelStride: 2)]
+                default: [try plane(0, of: buffer, pixelStride: 4)]
+                }
+            return try body(
+                ColourImage(
+                    format: format, width: CVPixelBufferGetWidth(buffer), height: CVPixelBufferGetHeight(buffer),
+                    planes: planes,
+                    matrix: matrix == kCVImageBufferYCbCrMatrix_ITU_R_709_2 as String ? .bt709 : .bt601,
+                    videoRange: isVideoRange))
+        }
+    }
+
+    /// `body` with the depth that lies in `buffer`, which is locked meanwhile: 16- or 32-bit floats of depth or disparity. The
+    /// format is the buffer's own, whatever it was expected to be. Nothing is copied.
+    ///
+    /// - Parameter confidence: ARKit's confidence map of the same size.
+    /// - Throws: ``PhasefrontError/Frame(message:)`` for another pixel format, which the message names.
+    public func withDepthImage<R>(
+        _ buffer: CVPixelBuffer, confidence: CVPixelBuffer? = nil, _ body: (DepthImage) throws -> R
+    ) throws -> R {
+        let format: DepthFormat
+        switch CVPixelBufferGetPixelFormatType(buffer) {
+        case kCVPixelFormatType_DepthFloat32: format = .metresF32
+        case kCVPixelFormatType_DepthFloat16: format = .metresF16
+        case kCVPixelFormatType_DisparityFloat32: format = .disparityF32
+        case kCVPixelFormatType_DisparityFloat16: format = .disparityF16
+        case let other:
+            throw PhasefrontError.Frame(
+                message: "frame: depth is \(fourCharacters(other)); 16- or 32-bit floats of depth or disparity are needed")
+        }
+        return try withLocked(buffer) {
+            var depth = DepthImage(
+                format: format, width: CVPixelBufferGetWidth(buffer), height: CVPixelBufferGetHeight(buffer),
+                plane: try plane(0, of: buffer, pixelStride: format.pixelBytes))
+            guard let confidence else { return try body(depth) }
+            return try withLocked(confidence) {
+                depth.confidence = ConfidenceMap(
+                    format: .lowMediumHigh, width: CVPixelBufferGetWidth(confidence),
+                    height: CVPixelBufferGetHeight(confidence), plane: try plane(0, of: confidence, pixelStride: 1))
+                return try body(depth)
+            }
+        }
+    }
+
+    extension CMTime {
+        /// Nanoseconds, as ``Frame/timestampNs`` takes them.
+        public var phasefrontTimestampNs: UInt64 {
+            let time = CMTimeConvertScale(self, timescale: 1_000_000_000, method: .roundTowardZero)
+            return UInt64(max(0, time.value))
+        }
+    }
+
+    private func withLocked<R>(_ buffer: CVPixelBuffer, _ body: () throws -> R) throws -> R {
+        let status = CVPixelBufferLockBaseAddress(buffer, .readOnly)
+        guard status == kCVReturnSuccess else {
+            throw PhasefrontError.Frame(message: "frame: its pixel buffer cannot be locked (CVReturn \(status))")
+        }
+        defer { CVPixelBufferUnlockBaseAddress(buffer, .readOnly) }
+        return try body()
+    }
+
+    /// Plane `index` of a locked buffer.
+    private func plane(_ index: Int, of buffer: CVPixelBuffer, pixelStride: Int) throws -> Plane {
+        let isPlanar = CVPixelBufferIsPlanar(buffer)
+        let address =
+            isPlanar ? CVPixelBufferGetBaseAddressOfPlane(buffer, index) : CVPixelBufferGetBaseAddress(buffer)
+        guard let address else {
+            throw PhasefrontError.Frame(message: "frame: plane \(index) of its pixel buffer is not in memory")
+        }
+        let rowStride =
+            isPlanar ? CVPixelBufferGetBytesPerRowOfPlane(buffer, index) : CVPixelBufferGetBytesPerRow(buffer)
+        let height = isPlanar ? CVPixelBufferGetHeightOfPlane(buffer, index) : CVPixelBufferGetHeight(buffer)
+        return Plane(unsafeAddress: address, count: rowStride * height, rowStride: rowStride, pixelStride: pixelStride)
+    }
+
+    private func fourCharacters(_ code: OSType) -> String {
+        let bytes = [24, 16, 8, 0].map { UInt8(truncatingIfNeeded: code >> $0) }
+        return String(bytes: bytes, encoding: .ascii) ?? String(code)
+    }
+#endif

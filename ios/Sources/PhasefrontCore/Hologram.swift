@@ -1,0 +1,72 @@
+import Foundation
+
+/// A colour of a hologram.
+public enum Colour: UInt32, CaseIterable, Sendable {
+    case red, green, blue
+}
+
+/// The hologram of one frame: modulator levels of three colours, and what is known of them. Its memory goes back to the
+/// session when the last reference to it is gone.
+public final class Hologram: Sendable {
+    /// What is known of it.
+    public let info: HologramInfo
+    let raw: RawHologram
+
+    init(_ raw: RawHologram) throws {
+        self.raw = raw
+        info = try raw.info()
+    }
+
+    /// Reads the levels of `colour` in place: `info.width` × `info.height` bytes, row by row without gaps. The pointer
+    /// is valid in `body` only.
+    public func withPlane<R>(_ colour: Colour, _ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
+        let (address, count) = try (raw.planeAddress(colour: colour.rawValue), raw.planeLen())
+        return try withExtendedLifetime(self) {
+            try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
+        }
+    }
+
+    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, in mm: where to focus
+    /// when it is tapped on.
+    public func z(atX x: Double, y: Double) throws -> Double {
+        try raw.zAt(x: x, y: y)
+    }
+
+    /// What an eye focused at `zMm` sees: red, green, blue, alpha. Takes some milliseconds; not for the main thread.
+    public func preview(zMm: Double, width: Int, height: Int) throws -> PixelImage {
+        try PixelImage(
+            raw.preview(zMm: zMm, width: UInt32(clamping: width), height: UInt32(clamping: height)))
+    }
+
+    /// Image `index` of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
+    /// layouts but grey have one.
+    public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
+        try PixelImage(raw.output(placement: placement, image: UInt32(clamping: index)))
+    }
+}
+
+/// An image, row by row without gaps.
+public final class PixelImage: Sendable {
+    /// Pixels along x.
+    public let width: Int
+    /// Pixels along y.
+    public let height: Int
+    /// Bytes of a pixel.
+    public let pixelBytes: Int
+    let raw: RawImage
+
+    init(_ raw: RawImage) throws {
+        self.raw = raw
+        width = try Int(raw.width())
+        height = try Int(raw.height())
+        pixelBytes = try Int(raw.pixelBytes())
+    }
+
+    /// Reads the image in place. The pointer is valid in `body` only.
+    public func withBytes<R>(_ body: (UnsafeRawBufferPointer) throws -> R) throws -> R {
+        let (address, count) = try (raw.address(), raw.byteLen())
+        return try withExtendedLifetime(self) {
+            try body(UnsafeRawBufferPointer(start: UnsafeRawPointer(bitPattern: UInt(address)), count: Int(count)))
+        }
+    }
+}

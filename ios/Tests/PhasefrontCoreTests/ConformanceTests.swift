@@ -1,0 +1,124 @@
+import Foundation
+import XCTest
+
+@testable import PhasefrontCore
+
+/// The conformance suite, run from Swift: the levels must be those of the suite, and Rust's to the bit.
+final class ConformanceTests: XCTestCase {
+    private struct Suite: Decodable {
+        let cases: [Case]
+    }
+
+    private struct Case: Decodable {
+        let name, method, mode, display, encoding: String
+        let levels: Int
+        let lut: [UInt8]?
+        let brightness: Float?
+        let range: [Float]?
+        let frames: [Still]
+    }
+
+    private struct Still: Decodable {
+        let timestamp_ns: UInt64
+        let colour: Colours
+        let depth: Image
+        let confidence: Image?
+        let rotation: Int
+        let mirrored: Bool
+    }
+
+    private struct Memory: Decodable {
+        let offset, length, row_stride, pixel_stride: Int
+
+        func plane(_ frames: Data) -> Plane {
+            // A slice, whose indices do not begin at 0.
+            Plane(bytes: frames[offset..<offset + length], rowStride: row_stride, pixelStride: pixel_stride)
+        }
+    }
+
+    private struct Colours: Decodable {
+        let format, matrix: String
+        let width, height: Int
+        let video_range: Bool
+        let planes: [Memory]
+    }
+
+    private struct Image: Decodable {
+        let format: String
+        let width, height: Int
+        let plane: Memory
+    }
+
+    private static let colours: [String: ColourFormat] = [
+        "rgba": .rgba, "bgra": .bgra, "rgb": .rgb, "nv12": .nv12, "yuv420": .yuv420,
+    ]
+    private static let depths: [String: DepthFormat] = [
+        "metres-f32": .metresF32, "metres-f16": .metresF16, "disparity-f32": .disparityF32,
+        "disparity-f16": .disparityF16, "millimetres-u16": .millimetresU16, "android-depth16": .androidDepth16,
+        "normalized-u8": .normalizedU8, "normalized-u16": .normalizedU16,
+    ]
+    private static let confidences: [String: ConfidenceFormat] = ["low-medium-high": .lowMediumHigh, "u8": .u8]
+    private static let matrices: [String: YuvMatrix] = ["bt601": .bt601, "bt709": .bt709]
+    private static let rotations: [Int: Rotation] = [0: .upright, 90: .clockwise90, 180: .half, 270: .clockwise270]
+    private static let encodings: [String: Encoding] = [
+        "double-phase": .doublePhase, "anti-alias": .antiAlias(sigma: 0.7, width: 3), "band-limit": .bandLimit(k: 1),
+    ]
+    private static let modes: [String: RunningMode] = ["image": .image, "video": .video]
+
+    private func frame(_ still: Still, _ frames: Data) throws -> Frame {
+        let confidence = try still.confidence.map {
+            ConfidenceMap(
+                format: try XCTUnwrap(Self.confidences[$0.format]), width: $0.width, height: $0.height,
+                plane: $0.plane.plane(frames))
+        }
+        let colour = ColourImage(
+            format: try XCTUnwrap(Self.colours[still.colour.format]), width: still.colour.width,
+            height: still.colour.height, planes: still.colour.planes.map { $0.plane(frames) },
+            matrix: try XCTUnwrap(Self.matrices[still.colour.matrix]), videoRange: still.colour.video_range)
+        let depth = DepthImage(
+            format: try XCTUnwrap(Self.depths[still.depth.format]), width: still.depth.width,
+            height: still.depth.height, plane: still.depth.plane.plane(frames), confidence: confidence)
+        let rotation = try XCTUnwrap(Self.rotations[still.rotation])
+        return Frame(
+            timestampNs: still.timestamp_ns, colour: colour, depth: depth,
+            orientation: Orientation(rotation: rotation, mirrored: still.mirrored))
+    }
+
+    private func levels(_ one: Case, _ frames: Data) throws -> Data {
+        let method = try XCTUnwrap([String: Method](
+            uniqueKeysWithValues: [("network", .trained(network: try network.get())), ("sweep", .sweep)])[one.method])
+        var options = SessionOptions(display: try displayFromToml(text: one.display), method: method)
+        options.encoding = try XCTUnwrap(Self.encodings[one.encoding])
+        if let lut = one.lut { options.response = .lut(levels: Data(lut)) }
+        if let scale = one.brightness { options.brightness = .fixed(scale: scale) }
+        if let range = one.range { options.depthRange = .fixed(nearM: range[0], farM: range[1]) }
+        let session = try Session(options, mode: try XCTUnwrap(Self.modes[one.mode]))
+        return try one.frames.reduce(into: Data()) { all, still in
+            try all.append(session.process(try frame(still, frames)).levels())
+        }
+    }
+
+    func testFramesBecomeTheLevelsThatAreExpected() throws {
+        let folder = URL(fileURLWithPath: #filePath).appendingPathComponent("../../../../tests/conformance").standardized
+        let suite = try JSONDecoder().decode(Suite.self, from: Data(contentsOf: folder.appendingPathComponent("cases.json")))
+        let frames = try Data(contentsOf: folder.appendingPathComponent("frames.bin"))
+        let got = try suite.cases.map { try levels($0, frames) }
+        if let rust = ProcessInfo.processInfo.environment["PHASEFRONT_CONFORMANCE"] {
+            let rust = try Data(contentsOf: URL(fileURLWithPath: rust).appendingPathComponent("levels.bin"))
+            XCTAssertEqual(got.reduce(Data(), +), rust, "not the bits that Rust has")
+        }
+        let expected = [UInt8](try Data(contentsOf: folder.appendingPathComponent("levels.bin")))
+        var from = 0
+        for (one, levels) in zip(suite.cases, got) {
+            let apart = zip(levels, expected[from...]).map { a, b in
+                let apart = abs(Int(a) - Int(b))
+                return min(apart, one.levels - apart)
+            }
+            let differ = apart.filter { $0 != 0 }.count
+            XCTAssertLessThanOrEqual(differ * 200, levels.count, "\(one.name): \(differ) levels differ")
+            if one.lut == nil { XCTAssertLessThanOrEqual(apart.max() ?? 0, 1, one.name) }
+            from += levels.count
+        }
+        XCTAssertEqual(from, expected.count)
+    }
+}

@@ -1,0 +1,45 @@
+import Foundation
+
+@testable import PhasefrontCore
+
+let network = Result { try Network.builtIn() }
+let smallDisplay = Display(width: 64, height: 48)
+
+func options() throws -> SessionOptions { SessionOptions(display: smallDisplay, network: try network.get()) }
+
+/// RGBA of 64×48 with something in it.
+func colourBytes() -> Data {
+    var bytes = Data()
+    for y in 0..<48 {
+        for x in 0..<64 { bytes.append(contentsOf: [UInt8(x * 4), UInt8(y * 5), UInt8(255 - x * 3), 0]) }
+    }
+    return bytes
+}
+
+/// Metres of 32×24: something before a wall.
+func depthBytes(metres: Float = 0.5) -> Data {
+    var bytes = Data()
+    for y in 0..<24 {
+        for x in 0..<32 {
+            let isNear = (6...17).contains(y) && (8...23).contains(x)
+            withUnsafeBytes(of: isNear ? metres / 2 : metres) { bytes.append(contentsOf: $0) }
+        }
+    }
+    return bytes
+}
+
+func still(timestampNs: UInt64 = 0, colour: Data = colourBytes(), depth: Data = depthBytes()) -> Frame {
+    Frame(
+        timestampNs: timestampNs,
+        colour: ColourImage(format: .rgba, width: 64, height: 48, bytes: colour),
+        depth: DepthImage(format: .metresF32, width: 32, height: 24, bytes: depth))
+}
+
+extension Hologram {
+    /// The levels of all three colours.
+    func levels() throws -> Data {
+        try Colour.allCases.reduce(into: Data()) { all, colour in
+            try withPlane(colour) { all.append(contentsOf: $0) }
+        }
+    }
+}

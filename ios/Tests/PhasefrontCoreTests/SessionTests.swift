@@ -1,0 +1,291 @@
+import Foundation
+import XCTest
+
+@testable import PhasefrontCore
+
+/// Sessions from Swift: threads, live streams, misuse, memory.
+final class SessionTests: XCTestCase {
+    /// The message of the `PhasefrontError` that `call` throws.
+    private func message<T>(_ call: () throws -> T, line: UInt = #line) -> String {
+        do {
+            _ = try call()
+            XCTFail("nothing was thrown", line: line)
+        } catch let error as PhasefrontError {
+            XCTAssertFalse(error.message.contains("\n"), error.message, line: line)
+            XCTAssertEqual(error.localizedDescription, error.message)
+            return error.message
+        } catch {
+            XCTFail("\(error)", line: line)
+        }
+        return ""
+    }
+
+    private func assertRefused<T>(_ words: String, line: UInt = #line, _ call: () throws -> T) {
+        let message = message(call, line: line)
+        XCTAssert(message.contains(words), message, line: line)
+    }
+
+    func testLevelsAreReadInPlaceAndOutliveTheSession() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let before = try hologram.levels()
+        XCTAssertGreaterThan(Set(before).count, 100)
+        try hologram.withPlane(.green) { XCTAssertEqual($0.count, 64 * 48) }
+        let other = try Session(options(), mode: .image).process(still(depth: depthBytes(metres: 2)))
+        XCTAssertEqual(try hologram.levels(), before)
+        XCTAssertEqual(other.info.width, 64)
+    }
+
+    func testSlicesAndForeignMemoryAreHeeded() throws {
+        let session = try Session(options(), mode: .image)
+        let want = try session.process(still()).levels()
+        let padded = Data(repeating: 9, count: 60) + colourBytes() + Data(repeating: 9, count: 30)
+        XCTAssertEqual(try session.process(still(colour: padded[60..<padded.count - 30])).levels(), want)
+        try colourBytes().withUnsafeBytes { bytes in
+            var frame = still()
+            let address = try XCTUnwrap(bytes.baseAddress)
+            frame.colour.planes = [Plane(unsafeAddress: address, count: bytes.count, rowStride: 256, pixelStride: 4)]
+            XCTAssertEqual(try session.process(frame).levels(), want)
+        }
+    }
+
+    func testUnusableFramesAreNamed() throws {
+        let session = try Session(options(), mode: .image)
+        func colour(_ width: Int, _ height: Int, _ planes: [Plane]) -> Frame {
+            var frame = still()
+            frame.colour = ColourImage(format: .rgba, width: width, height: height, planes: planes)
+            return frame
+        }
+        func plane(_ rowStride: Int, _ pixelStride: Int) -> Plane {
+            Plane(bytes: colourBytes(), rowStride: rowStride, pixelStride: pixelStride)
+        }
+        assertRefused("too few") { try session.process(still(colour: Data())) }
+        assertRefused("too few") { try session.process(still(depth: Data())) }
+        assertRefused("64×0") { try session.process(colour(64, 0, [plane(256, 4)])) }
+        assertRefused("0×48") { try session.process(colour(-64, 48, [plane(256, 4)])) }
+        assertRefused("row stride") { try session.process(colour(64, 48, [plane(200, 4)])) }
+        assertRefused("pixel stride") { try session.process(colour(64, 48, [plane(256, 1)])) }
+        assertRefused("planes") { try session.process(colour(64, 48, [])) }
+        assertRefused("planes") { try session.process(colour(64, 48, [Plane](repeating: plane(256, 4), count: 4))) }
+        _ = try session.process(still())
+    }
+
+    func testAPreviewShowsThePictureAndATapGivesZ() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let image = try hologram.preview(zMm: 0, width: 32, height: 24)
+        try image.withBytes { bytes in
+            XCTAssertEqual(bytes.count, 4 * 32 * 24)
+            XCTAssert(stride(from: 3, to: bytes.count, by: 4).allSatisfy { bytes[$0] == 255 })
+            XCTAssertGreaterThan(Set(bytes).count, 20)
+        }
+        XCTAssertGreaterThan(try hologram.z(atX: 0.5, y: 0.5), try hologram.z(atX: 0.02, y: 0.02))
+        assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
+    }
+
+    func testOutputIsWhatTheModulatorTakes() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let levels = [UInt8](try hologram.levels())
+        try hologram.output().withBytes { rgba in
+            XCTAssertEqual((0..<64 * 48).map { rgba[4 * $0] }, Array(levels[..<(64 * 48)]))
+        }
+        let blue = try hologram.output(Placement(layout: .grey, flipX: true), image: 2)
+        XCTAssertEqual(blue.pixelBytes, 1)
+        XCTAssertEqual(try blue.withBytes { $0[0] }, levels[2 * 64 * 48 + 63])
+        assertRefused("no image 1") { try hologram.output(image: 1) }
+    }
+
+    func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {
+        let answered = Locked<(timestamps: [UInt64], threads: Set<Thread>)>(([], []))
+        let session = try Session(options(), mode: .liveStream) { event in
+            answered.withLock {
+                $0.threads.insert(Thread.current)
+                switch event {
+                case .hologram(let hologram): $0.timestamps.append(hologram.info.timestampNs)
+                case .dropped(let timestampNs, _): $0.timestamps.append(timestampNs)
+                default: XCTFail("\(event)")
+                }
+            }
+        }
+        for i in 1000..<1050 as Range<UInt64> { try session.submit(still(timestampNs: i)) }
+        try session.close()
+        let (timestamps, threads) = answered.withLock { $0 }
+        XCTAssertEqual(timestamps.sorted(), Array(1000..<1050))
+        XCTAssertEqual(threads.count, 1)
+        XCTAssertFalse(threads.contains(Thread.current))
+        let statistics = try session.statistics()
+        XCTAssertEqual(statistics.processed + statistics.dropped.total, 50)
+    }
+
+    func testAsyncEventsTellTheSame() async throws {
+        let session = try Session(options(), mode: .liveStream)
+        let submitting = Task.detached {
+            for i in 1...50 as ClosedRange<UInt64> { try session.submit(still(timestampNs: i)) }
+            try session.close()
+        }
+        var timestamps: [UInt64] = []
+        for await event in session.events {
+            switch event {
+            case .hologram(let hologram): timestamps.append(hologram.info.timestampNs)
+            case .dropped(let timestampNs, _): timestamps.append(timestampNs)
+            default: XCTFail("\(event)")
+            }
+        }
+        try await submitting.value
+        XCTAssertEqual(timestamps.sorted(), Array(1...50))
+    }
+
+    func testUnreadEventsHoldTwoHologramsAtMost() async throws {
+        let session = try Session(options(), mode: .liveStream)
+        for i in 1...8 as ClosedRange<UInt64> {
+            try session.submit(still(timestampNs: i))
+            while try session.statistics().pending > 0 { usleep(1000) }
+        }
+        try session.close()
+        var (holograms, unread) = (0, 0)
+        for await event in session.events {
+            switch event {
+            case .hologram: holograms += 1
+            case .dropped(_, .unread): unread += 1
+            default: XCTFail("\(event)")
+            }
+        }
+        XCTAssertEqual([holograms, unread], [2, 6])
+    }
+
+    func testACancelledReaderEnds() async throws {
+        let session = try Session(options(), mode: .liveStream)
+        let reading = Task { for await _ in session.events {} }
+        try await Task.sleep(nanoseconds: 20_000_000)
+        reading.cancel()
+        await reading.value
+        try session.close()
+    }
+
+    func testALateFrameInAStreamHarmsNothing() throws {
+        let made = DispatchSemaphore(value: 0)
+        let session = try Session(options(), mode: .liveStream) { if case .hologram = $0 { made.signal() } }
+        try session.submit(still(timestampNs: 5))
+        XCTAssertEqual(made.wait(timeout: .now() + 60), .success)
+        assertRefused("5 ns") { try session.submit(still(timestampNs: 5)) }
+        XCTAssertNil(try session.submit(still(timestampNs: 6)))
+        XCTAssertEqual(made.wait(timeout: .now() + 60), .success)
+    }
+
+    func testAListenerMayCloseItsSession() throws {
+        let closed = DispatchSemaphore(value: 0)
+        let box = Locked<Session?>(nil)
+        let session = try Session(options(), mode: .liveStream) { _ in
+            XCTAssertNoThrow(try box.withLock { $0 }?.close())
+            closed.signal()
+        }
+        box.withLock { $0 = session }
+        try session.submit(still(timestampNs: 1))
+        XCTAssertEqual(closed.wait(timeout: .now() + 60), .success)
+        assertRefused("closed") { try session.submit(still(timestampNs: 2)) }
+        try session.close()
+        box.withLock { $0 = nil }
+    }
+
+    func testThreadsShareASession() throws {
+        let session = try Session(options(), mode: .image)
+        let want = try session.process(still()).levels()
+        let wrong = Locked(0)
+        DispatchQueue.concurrentPerform(iterations: 40) { _ in
+            if (try? session.process(still()).levels()) != want { wrong.withLock { $0 += 1 } }
+        }
+        XCTAssertEqual(wrong.withLock { $0 }, 0)
+    }
+
+    func testAClosedSessionSaysSo() throws {
+        let session = try Session(options(), mode: .image)
+        _ = try session.process(still())
+        try session.close()
+        try session.close()
+        for call in [session.warmUp, session.reset, session.pause, session.resume] {
+            assertRefused("closed; make a new one") { try call() }
+        }
+        assertRefused("closed; make a new one") { try session.process(still()) }
+        XCTAssertEqual(try session.statistics().processed, 1)
+    }
+
+    func testAPausedSessionRefusesAndAResetLetsTimeBeginAnew() throws {
+        let session = try Session(options(), mode: .video)
+        try session.warmUp()
+        _ = try session.process(still(timestampNs: 100))
+        assertRefused("99 ns") { try session.process(still(timestampNs: 99)) }
+        try session.reset()
+        _ = try session.process(still(timestampNs: 1))
+        try session.pause()
+        assertRefused("paused") { try session.process(still(timestampNs: 2)) }
+        try session.resume()
+        _ = try session.process(still(timestampNs: 3))
+    }
+
+    func testModesAreNotMixed() async throws {
+        let image = try Session(options(), mode: .image)
+        assertRefused("not live") { try image.submit(still()) }
+        for await event in image.events { XCTFail("\(event)") }
+        let live = try Session(options(), mode: .liveStream)
+        assertRefused("submitted") { try live.process(still()) }
+        assertRefused("listener") { try Session(options(), mode: .video) { _ in } }
+    }
+
+    func testNetworksThatAreNoneAreNamed() throws {
+        assertRefused("nowhere.onnx") { try Network.fromFile(path: "/nowhere.onnx") }
+        assertRefused("network") { try Network.fromBytes(onnx: Data()) }
+        assertRefused("network") { try Network.fromBytes(onnx: Data("not a network".utf8)) }
+        let info = try network.get().info()
+        XCTAssertEqual(info.layers, 8)
+        XCTAssertEqual(info.pitchUm, 8)
+    }
+
+    func testSettingsThatCannotBeMeantAreNamed() throws {
+        func make(_ change: (inout SessionOptions) -> Void) -> () throws -> Session {
+            {
+                var changed = try options()
+                change(&changed)
+                return try Session(changed, mode: .image)
+            }
+        }
+        assertRefused("ladder is empty", make { $0.ladder = [] })
+        assertRefused("0 threads", make { $0.threads = 0 })
+        assertRefused("target rate", make { $0.targetRateHz = .nan })
+        assertRefused("no rung 3", make { $0.quality = .fixed(rung: 3) })
+        assertRefused("3 levels", make { $0.response = .lut(levels: Data([1, 2, 3])) })
+        assertRefused("pitch_um", make { $0.display = Display(pitchUm: -1) })
+        assertRefused("pitch", make { $0.display = Display(width: 64, height: 48, pitchUm: 3.74) })
+        assertRefused("line 1") { try displayFromToml(text: "width = ") }
+    }
+
+    func testMessagesReachTheLog() throws {
+        let messages = Locked<[(LogLevel, String)]>([])
+        try Log.send(.info) { level, message in messages.withLock { $0.append((level, message)) } }
+        _ = try Session(options(), mode: .image)
+        try Log.send(.info, to: nil)
+        _ = try Session(options(), mode: .image)
+        let heard = messages.withLock { $0 }
+        XCTAssertEqual(heard.map(\.0), [.info])
+        XCTAssert(heard[0].1.contains("Image"))
+    }
+
+    func testMemoryOfTenThousandFramesIsFlat() throws {
+        func residentMb() throws -> Double {
+            let statm = try String(contentsOfFile: "/proc/self/statm", encoding: .utf8)
+            return try XCTUnwrap(Double(statm.split(separator: " ")[1])) * 4096 / 1e6
+        }
+        try XCTSkipUnless(FileManager.default.fileExists(atPath: "/proc/self/statm"), "only Linux tells it so")
+        var small = try options()
+        small.threads = 1
+        let session = try Session(small, mode: .image)
+        let frame = still()
+        var sum = 0
+        func frames(_ count: Int) throws {
+            for _ in 0..<count { sum += try Int(session.process(frame).withPlane(.blue) { $0[0] }) }
+        }
+        try frames(1000)
+        let before = try residentMb()
+        try frames(9000)
+        // Each frame's results are 15 KB: kept, they would be 138 MB.
+        XCTAssertLessThan(try residentMb() - before, 16)
+        XCTAssertGreaterThan(sum, 0)
+    }
+}

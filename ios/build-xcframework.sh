@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Builds PhasefrontFFI.xcframework for Package.swift, on a Mac with Xcode and Rust: devices, and the simulator on both
+# processors. With --release it is also zipped, and the checksum for the Package.swift at the root is printed.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+targets=(aarch64-apple-ios aarch64-apple-ios-sim x86_64-apple-ios)
+export IPHONEOS_DEPLOYMENT_TARGET=16.0
+build="${CARGO_TARGET_DIR:-target}/xcframework"
+rm -rf "$build" ios/PhasefrontFFI.xcframework
+mkdir -p "$build/Headers/PhasefrontFFI" "$build/simulator"
+
+rustup target add "${targets[@]}"
+for target in "${targets[@]}"; do
+    cargo rustc --profile mobile --package phasefront-ffi --target "$target" --crate-type staticlib
+done
+library() { echo "${CARGO_TARGET_DIR:-target}/$1/mobile/libphasefront_ffi.a"; }
+
+# Headers in a folder of their own: module maps of several frameworks would meet in one.
+cp ios/Generated/PhasefrontFFI.h ios/Generated/module.modulemap "$build/Headers/PhasefrontFFI/"
+for target in "${targets[@]}"; do strip -S "$(library "$target")"; done
+lipo -create "$(library aarch64-apple-ios-sim)" "$(library x86_64-apple-ios)" -output "$build/simulator/libphasefront_ffi.a"
+xcodebuild -create-xcframework \
+    -library "$(library aarch64-apple-ios)" -headers "$build/Headers" \
+    -library "$build/simulator/libphasefront_ffi.a" -headers "$build/Headers" \
+    -output ios/PhasefrontFFI.xcframework
+
+if [ "${1:-}" = --release ]; then
+    (cd ios && zip --quiet --recurse-paths --symlinks - PhasefrontFFI.xcframework) >"$build/PhasefrontFFI.xcframework.zip"
+    echo "$build/PhasefrontFFI.xcframework.zip"
+    swift package compute-checksum "$build/PhasefrontFFI.xcframework.zip"
+fi

@@ -1,0 +1,281 @@
+//! RGB-D video: frames from a folder or a pipe, as a camera would give them.
+
+use crate::error::{Error, Result};
+use crate::files;
+use ndarray::Array2;
+use phasefront::depth::DepthUnit;
+use phasefront::depth::image::{DepthFormat, DepthImage};
+use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// One frame in memory: colour as rows of RGB bytes, depth as little-endian numbers of `format`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoFrame {
+    colour: Vec<u8>,
+    colour_shape: (usize, usize),
+    depth: Vec<u8>,
+    depth_shape: (usize, usize),
+    format: DepthFormat,
+}
+
+impl VideoFrame {
+    /// (H, W) of its colour.
+    pub fn shape(&self) -> (usize, usize) {
+        self.colour_shape
+    }
+
+    /// What a session takes.
+    ///
+    /// # Errors
+    /// Images that are too large.
+    pub fn camera_frame(&self, timestamp_ns: u64) -> Result<CameraFrame<'_>> {
+        let (height, width) = self.colour_shape;
+        let plane = Plane::new(&self.colour, 3 * width, 3);
+        let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[plane])?;
+        let (height, width) = self.depth_shape;
+        let pixel = self.format.pixel_bytes();
+        let plane = Plane::new(&self.depth, width * pixel, pixel);
+        let depth = DepthImage::new(self.format, width, height, plane)?;
+        Ok(CameraFrame::new(timestamp_ns, colour, depth))
+    }
+}
+
+/// The colour and depth files of a folder, in the order of their numbers: `color_7.jpg` or `rgb_007.png` belongs to
+/// `depth_7.png` or `depth_007.npy`.
+///
+/// # Errors
+/// A folder that cannot be read, without frames, or with colour or depth that has no partner.
+pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
+    let mut colours = BTreeMap::new();
+    let mut depths = BTreeMap::new();
+    let entries = std::fs::read_dir(dir).map_err(|e| Error::file(dir, e))?;
+    for entry in entries {
+        let path = entry.map_err(|e| Error::file(dir, e))?.path();
+        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
+            continue;
+        };
+        let number = |prefix: &str| -> Option<u64> {
+            stem.strip_prefix(prefix)?
+                .trim_start_matches(['_', '-'])
+                .parse()
+                .ok()
+        };
+        if let Some(number) = ["color", "colour", "rgb"].into_iter().find_map(number) {
+            colours.insert(number, path);
+        } else if let Some(number) = number("depth") {
+            depths.insert(number, path);
+        }
+    }
+    let alone = (colours
+        .iter()
+        .find(|(number, _)| !depths.contains_key(number)))
+    .or_else(|| {
+        depths
+            .iter()
+            .find(|(number, _)| !colours.contains_key(number))
+    });
+    if let Some((number, path)) = alone {
+        return Err(Error::file(
+            path,
+            format!(
+                "has no partner; frame {number} needs both a color_{number} and a depth_{number}"
+            ),
+        ));
+    }
+    if colours.is_empty() {
+        return Err(Error::file(
+            dir,
+            "holds no frames; they are named color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …",
+        ));
+    }
+    Ok(colours.into_values().zip(depths.into_values()).collect())
+}
+
+/// Reads a frame's files.
+///
+/// # Errors
+/// Files that cannot be read.
+pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoFrame> {
+    let (colour_shape, bytes) = files::read_rgb_bytes(colour)?;
+    let normalized = unit == DepthUnit::Normalized;
+    let readings = files::read_depth(depth, normalized)?;
+    if normalized && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d)) {
+        return Err(Error::file(
+            depth,
+            format!("holds {bad}; normalized depth of video must lie in 0..=1"),
+        ));
+    }
+    let (format, depth_bytes) = depth_bytes(&readings, unit);
+    Ok(VideoFrame {
+        colour: bytes,
+        colour_shape,
+        depth: depth_bytes,
+        depth_shape: readings.dim(),
+        format,
+    })
+}
+
+fn depth_bytes(readings: &Array2<f32>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
+    match unit {
+        DepthUnit::Normalized => (
+            DepthFormat::NormalizedU16,
+            (readings.iter())
+                .flat_map(|d| ((d * 65535.0).round() as u16).to_le_bytes())
+                .collect(),
+        ),
+        unit => (
+            DepthFormat::MetresF32,
+            (readings.iter())
+                .flat_map(|d| unit.metres(*d).unwrap_or(f32::NAN).to_le_bytes())
+                .collect(),
+        ),
+    }
+}
+
+/// How raw frames follow each other in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawVideo {
+    /// (H, W) of colour.
+    pub colour: (usize, usize),
+    /// (H, W) of depth.
+    pub depth: (usize, usize),
+    /// What the numbers of depth mean.
+    pub unit: DepthUnit,
+}
+
+impl RawVideo {
+    /// The next frame; None at the end.
+    ///
+    /// # Errors
+    /// A pipe that breaks or ends within a frame.
+    pub fn read(&self, from: &mut dyn Read) -> Result<Option<VideoFrame>> {
+        let mut colour = vec![0; 3 * self.colour.0 * self.colour.1];
+        let mut depth = vec![0; 2 * self.depth.0 * self.depth.1];
+        let got = fill(from, &mut colour)?;
+        if got == 0 {
+            return Ok(None);
+        }
+        let got = got
+            + if got == colour.len() {
+                fill(from, &mut depth)?
+            } else {
+                0
+            };
+        if got < colour.len() + depth.len() {
+            return Err(Error::Input(format!(
+                "the raw video ends {got} bytes into a frame of {}; is the size right?",
+                colour.len() + depth.len()
+            )));
+        }
+        let (format, depth) = match self.unit {
+            DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
+            DepthUnit::Normalized => (DepthFormat::NormalizedU16, depth),
+            unit => {
+                let numbers = depth.as_chunks::<2>().0;
+                let readings = numbers.iter().map(|n| f32::from(u16::from_le_bytes(*n)));
+                let readings = Array2::from_shape_vec(self.depth, readings.collect())
+                    .map_err(|e| Error::Input(e.to_string()))?;
+                depth_bytes(&readings, unit)
+            }
+        };
+        Ok(Some(VideoFrame {
+            colour,
+            colour_shape: self.colour,
+            depth,
+            depth_shape: self.depth,
+            format,
+        }))
+    }
+}
+
+/// Reads until `bytes` is full or the pipe ends; gives how much.
+fn fill(from: &mut dyn Read, bytes: &mut [u8]) -> Result<usize> {
+    let mut got = 0;
+    while got < bytes.len() {
+        match from.read(&mut bytes[got..]) {
+            Ok(0) => break,
+            Ok(n) => got += n,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(Error::Input(format!("the raw video cannot be read: {e}"))),
+        }
+    }
+    Ok(got)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn frames_of_a_folder_are_paired_in_the_order_of_their_numbers() {
+        let dir = tempfile::tempdir().unwrap();
+        let touch = |name: &str| std::fs::write(dir.path().join(name), "").unwrap();
+        let refused = || frames_of_folder(dir.path()).unwrap_err().to_string();
+        assert!(refused().contains("no frames"));
+        for name in [
+            "color_10.jpg",
+            "depth_10.png",
+            "rgb_2.png",
+            "depth_0002.npy",
+            "notes.txt",
+        ] {
+            touch(name);
+        }
+        let frames = frames_of_folder(dir.path()).unwrap();
+        let names: Vec<_> = frames
+            .iter()
+            .map(|(c, d)| (c.file_name(), d.file_name()))
+            .collect();
+        assert_eq!(
+            names[0],
+            (Some("rgb_2.png".as_ref()), Some("depth_0002.npy".as_ref()))
+        );
+        assert_eq!(
+            names[1],
+            (Some("color_10.jpg".as_ref()), Some("depth_10.png".as_ref()))
+        );
+        touch("depth_11.png");
+        assert!(refused().contains("depth_11.png") && refused().contains("no partner"));
+    }
+
+    #[test]
+    fn raw_video_is_cut_into_frames_and_a_cut_frame_is_named() {
+        let raw = RawVideo {
+            colour: (2, 3),
+            depth: (1, 2),
+            unit: DepthUnit::Millimetres,
+        };
+        let bytes: Vec<u8> = (0..44).collect();
+        let mut pipe = &bytes[..];
+        let first = raw.read(&mut pipe).unwrap().unwrap();
+        assert_eq!(
+            (first.shape(), first.colour[17], first.depth[0]),
+            ((2, 3), 17, 18)
+        );
+        assert_eq!(
+            raw.read(&mut pipe).unwrap().unwrap().depth,
+            [40, 41, 42, 43]
+        );
+        assert_eq!(raw.read(&mut pipe).unwrap(), None);
+        let cut = raw
+            .read(&mut &bytes[..30])
+            .and_then(|_| raw.read(&mut &bytes[22..40]));
+        assert!(
+            cut.unwrap_err()
+                .to_string()
+                .contains("18 bytes into a frame of 22")
+        );
+        let units = RawVideo {
+            unit: DepthUnit::Raw {
+                units_per_m: 5000.0,
+            },
+            ..raw
+        };
+        let frame = units.read(&mut &bytes[..22]).unwrap().unwrap();
+        let metres = f32::from(u16::from_le_bytes([18, 19])) / 5000.0;
+        assert_eq!(frame.depth[..4], metres.to_le_bytes());
+    }
+}

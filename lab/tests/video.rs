@@ -1,0 +1,245 @@
+//! `phasefront video`: folders and pipes, one by one and live; every frame answered or reported dropped.
+#![allow(clippy::unwrap_used)]
+
+use phasefront_lab::files::{self, Hologram};
+use serde_json::Value;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 48;
+
+fn phasefront(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_phasefront"));
+    command.args(arguments).env_remove("RUST_LOG");
+    command
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = phasefront(arguments).arg("--json").output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn refusal(arguments: &[&str]) -> String {
+    let output = phasefront(arguments).stdin(Stdio::null()).output().unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    errors
+}
+
+/// Colour and depth in millimetres of a square that moves over a wall.
+fn frame(
+    index: u32,
+) -> (
+    image::RgbImage,
+    image::ImageBuffer<image::Luma<u16>, Vec<u16>>,
+) {
+    let square =
+        |x: u32, y: u32| (8 + index * 4..24 + index * 4).contains(&x) && (12..30).contains(&y);
+    let colour = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
+        true => image::Rgb([240, 180, 40]),
+        false => image::Rgb([20, 60, 2 * x as u8]),
+    });
+    let depth = image::ImageBuffer::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
+        true => image::Luma([800]),
+        false if x == 3 => image::Luma([0]),
+        false => image::Luma([2000]),
+    });
+    (colour, depth)
+}
+
+fn folder(frames: u32) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("in");
+    std::fs::create_dir(&input).unwrap();
+    for index in 0..frames {
+        let (colour, depth) = frame(index);
+        colour
+            .save(input.join(format!("color_{index}.png")))
+            .unwrap();
+        depth
+            .save(input.join(format!("depth_{index}.png")))
+            .unwrap();
+    }
+    (dir, input)
+}
+
+/// Every frame is told of once.
+fn sums_agree(report: &Value) {
+    let count = |v: &Value| v.as_u64().unwrap();
+    let dropped: u64 = report["dropped"]
+        .as_object()
+        .unwrap()
+        .values()
+        .map(count)
+        .sum();
+    let told = ["processed", "failed", "refused"]
+        .map(|key| count(&report[key]))
+        .iter()
+        .sum::<u64>();
+    assert_eq!(count(&report["submitted"]), told + dropped, "{report}");
+}
+
+#[test]
+fn a_folder_becomes_phase_maps_previews_and_statistics() {
+    let (dir, input) = folder(4);
+    let out = dir.path().join("out");
+    let (input, out_name) = (input.to_str().unwrap(), out.to_str().unwrap());
+    let report = json(&[
+        "video",
+        input,
+        "--depth-unit",
+        "mm",
+        "--preview-mm",
+        "3",
+        "--offset-mm",
+        "1",
+        "-o",
+        out_name,
+    ]);
+    assert_eq!(
+        (report["processed"].as_u64(), report["failed"].as_u64()),
+        (Some(4), Some(0))
+    );
+    sums_agree(&report);
+    let written: Value =
+        serde_json::from_slice(&std::fs::read(out.join("statistics.json")).unwrap()).unwrap();
+    assert_eq!(written, report);
+    for index in 0..4 {
+        let path = out.join(format!("phase_{index:06}.png"));
+        let Hologram::PhaseOnly(levels, info) = files::read_hologram(&path).unwrap() else {
+            panic!("a phase map");
+        };
+        assert_eq!(levels.dim(), (3, HEIGHT as usize, WIDTH as usize));
+        assert!(info.scale.unwrap() > 0.0 && info.display.offset_m() == 1e-3);
+        // The square is bright where it is, the wall is not.
+        let preview = image::open(out.join(format!("preview_{index:06}.png")))
+            .unwrap()
+            .into_rgb8();
+        let at = |x: u32| preview.get_pixel(x, 21)[0];
+        assert!(
+            at(16 + index * 4) > 150 && at(48 + index * 4 % 8) < 90,
+            "{index}"
+        );
+    }
+    // A frame's phase map can be looked at like any hologram.
+    let phase = out.join("phase_000002.png");
+    let seen = dir.path().join("seen.png");
+    let refocused = phasefront(&["refocus", phase.to_str().unwrap(), "--z-mm", "3", "-o"])
+        .arg(&seen)
+        .status();
+    assert!(refocused.unwrap().success() && seen.exists());
+}
+
+#[test]
+fn a_live_stream_answers_or_drops_every_frame() {
+    let (_dir, input) = folder(3);
+    let input = input.to_str().unwrap();
+    for extra in [&[][..], &["--adaptive"]] {
+        let mut arguments = vec![
+            "video",
+            input,
+            "--depth-unit",
+            "mm",
+            "--live",
+            "--rate",
+            "1000",
+            "--repeat",
+            "60",
+        ];
+        arguments.extend(extra);
+        let report = json(&arguments);
+        assert_eq!(report["submitted"], 180);
+        assert!(report["processed"].as_u64().unwrap() > 0);
+        sums_agree(&report);
+    }
+}
+
+#[test]
+fn raw_frames_come_through_a_pipe_and_equal_those_of_files() {
+    let (dir, input) = folder(3);
+    let (files, pipe) = (dir.path().join("files"), dir.path().join("pipe"));
+    let (files_name, pipe_name) = (files.to_str().unwrap(), pipe.to_str().unwrap());
+    json(&[
+        "video",
+        input.to_str().unwrap(),
+        "--depth-unit",
+        "mm",
+        "-o",
+        files_name,
+    ]);
+    let mut child = phasefront(&[
+        "video",
+        "-",
+        "--raw",
+        "64x48",
+        "--depth-unit",
+        "mm",
+        "-o",
+        pipe_name,
+    ])
+    .stdin(Stdio::piped())
+    .stdout(Stdio::null())
+    .spawn()
+    .unwrap();
+    let mut stdin = child.stdin.take().unwrap();
+    for index in 0..3 {
+        let (colour, depth) = frame(index);
+        stdin.write_all(colour.as_raw()).unwrap();
+        let bytes: Vec<u8> = depth
+            .as_raw()
+            .iter()
+            .flat_map(|v| v.to_le_bytes())
+            .collect();
+        stdin.write_all(&bytes).unwrap();
+    }
+    drop(stdin);
+    assert!(child.wait().unwrap().success());
+    for index in 0..3 {
+        let name = format!("phase_{index:06}.png");
+        let levels = |dir: &Path| image::open(dir.join(&name)).unwrap().into_rgb8().into_raw();
+        assert_eq!(levels(&files), levels(&pipe), "{name}");
+    }
+}
+
+#[test]
+fn wrong_input_is_named() {
+    let (dir, input) = folder(2);
+    let name = input.to_str().unwrap();
+    assert!(refusal(&["video", "-"]).contains("--raw"));
+    assert!(refusal(&["video", "-", "--raw", "64x48"]).contains("no frame"));
+    assert!(refusal(&["video", name, "--raw", "64x48"]).contains("give - as input"));
+    assert!(refusal(&["video", name, "--near", "1"]).contains("--far"));
+    assert!(refusal(&["video", name, "--rate", "0"]).contains("--rate"));
+    // Millimetres are no normalized depth.
+    std::fs::remove_file(input.join("depth_1.png")).unwrap();
+    assert!(refusal(&["video", name]).contains("no partner"));
+    let empty = dir.path().join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    assert!(refusal(&["video", empty.to_str().unwrap()]).contains("no frames"));
+}
+
+/// A real sensor's holes, noise and misaligned colour, as video and as a live stream.
+#[test]
+fn a_captured_sequence_runs_as_video_and_live() {
+    let redwood = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/redwood");
+    let Some(input) = redwood.to_str().filter(|_| redwood.exists()) else {
+        eprintln!("skipped: no captured sequence beside the project");
+        return;
+    };
+    let size = ["--depth-unit", "mm", "--size", "320x240"];
+    let report = json(&[&["video", input, "--repeat", "2"], &size[..]].concat());
+    assert_eq!(report["processed"], 10);
+    sums_agree(&report);
+    let live = ["video", input, "--live", "--rate", "200", "--repeat", "20"];
+    let report = json(&[&live, &size[..]].concat());
+    assert_eq!(
+        (report["submitted"].as_u64(), report["failed"].as_u64()),
+        (Some(100), Some(0))
+    );
+    sums_agree(&report);
+}

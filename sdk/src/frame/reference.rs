@@ -1,0 +1,105 @@
+//! The conversion of camera images, naively: every output pixel by itself, in f64, from the definition. The oracle of
+//! [`super::convert`].
+
+use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
+use super::plane::Orientation;
+use super::resample::Crop;
+
+/// The amplitudes, (3, H, W), that (`height`, `width`) shows of `image` turned by `orientation`: [`Crop::cover`] of
+/// it, each pixel the mean of the image's under a triangle as wide as itself (at least as wide as a sample). A chroma
+/// sample lies in the middle of its four pixels.
+pub fn convert(
+    image: &ColourImage<'_>,
+    orientation: Orientation,
+    height: usize,
+    width: usize,
+) -> Vec<f32> {
+    let upright = orientation.upright_shape(image.shape().0, image.shape().1);
+    let crop = Crop::cover(upright, (height, width));
+    let mut rgb = vec![0.0; 3 * height * width];
+    for y in 0..height {
+        for x in 0..width {
+            let centre = (
+                crop.x + (x as f64 + 0.5) * crop.width / width as f64,
+                crop.y + (y as f64 + 0.5) * crop.height / height as f64,
+            );
+            let sizes = (crop.width / width as f64, crop.height / height as f64);
+            let mean =
+                |plane, byte, share| mean(image, orientation, plane, byte, share, centre, sizes);
+            let colour = match image.format() {
+                ColourFormat::Rgba | ColourFormat::Rgb => [0, 1, 2].map(|b| mean(0, b, 1) / 255.0),
+                ColourFormat::Bgra => [2, 1, 0].map(|b| mean(0, b, 1) / 255.0),
+                ColourFormat::Nv12(encoding) => {
+                    rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(1, 1, 2)], encoding)
+                }
+                ColourFormat::Yuv420(encoding) => {
+                    rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(2, 0, 2)], encoding)
+                }
+            };
+            for (c, value) in colour.into_iter().enumerate() {
+                rgb[(c * height + y) * width + x] = value.clamp(0.0, 1.0) as f32;
+            }
+        }
+    }
+    rgb
+}
+
+/// The mean under the triangle around `centre`, in upright pixels, of one byte of a plane each of whose samples stands
+/// for `share` × `share` pixels.
+fn mean(
+    image: &ColourImage<'_>,
+    orientation: Orientation,
+    plane: usize,
+    byte: usize,
+    share: usize,
+    centre: (f64, f64),
+    size: (f64, f64),
+) -> f64 {
+    let (height, width) = image.shape();
+    let plane = image.planes()[plane];
+    let (upright_height, upright_width) = orientation.upright_shape(height, width);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for row in 0..height.div_ceil(share) {
+        for column in 0..width.div_ceil(share) {
+            // Where the sample's middle lies in the sensor's picture, and in the upright one.
+            let x = (column as f64 + 0.5) * share as f64 / width as f64;
+            let y = (row as f64 + 0.5) * share as f64 / height as f64;
+            let (x, y) = turn(orientation, x, y);
+            let (x, y) = (x * upright_width as f64, y * upright_height as f64);
+            let weight =
+                |apart: f64, size: f64| (1.0 - apart.abs() / size.max(share as f64)).max(0.0);
+            let weight = weight(x - centre.0, size.0) * weight(y - centre.1, size.1);
+            let at = row * plane.row_stride + column * plane.pixel_stride + byte;
+            sum += weight * f64::from(plane.bytes[at]);
+            weights += weight;
+        }
+    }
+    sum / weights
+}
+
+/// A point of the sensor's picture, its sides 0..1, in the upright one.
+fn turn(orientation: Orientation, x: f64, y: f64) -> (f64, f64) {
+    use super::plane::Rotation;
+    let (x, y) = match orientation.rotation {
+        Rotation::None => (x, y),
+        Rotation::Clockwise90 => (1.0 - y, x),
+        Rotation::Half => (1.0 - x, 1.0 - y),
+        Rotation::Clockwise270 => (y, 1.0 - x),
+    };
+    (if orientation.mirrored { 1.0 - x } else { x }, y)
+}
+
+/// ITU-R BT.601 and BT.709: Y = Kr·R + Kg·G + Kb·B, U = (B − Y)/(2 − 2Kb), V = (R − Y)/(2 − 2Kr), solved for colour.
+fn rgb_of_yuv([y, u, v]: [f64; 3], encoding: YuvEncoding) -> [f64; 3] {
+    let (kr, kb) = match encoding.matrix {
+        YuvMatrix::Bt601 => (0.299, 0.114),
+        YuvMatrix::Bt709 => (0.2126, 0.0722),
+    };
+    let (y, u, v) = match encoding.video_range {
+        true => ((y - 16.0) / 219.0, (u - 128.0) / 224.0, (v - 128.0) / 224.0),
+        false => (y / 255.0, (u - 128.0) / 255.0, (v - 128.0) / 255.0),
+    };
+    let red = y + (2.0 - 2.0 * kr) * v;
+    let blue = y + (2.0 - 2.0 * kb) * u;
+    [red, (y - kr * red - kb * blue) / (1.0 - kr - kb), blue]
+}

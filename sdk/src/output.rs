@@ -1,0 +1,393 @@
+//! A hologram's levels as the images that a modulator's driver takes: colours in one image or one after another,
+//! flipped, shifted, at the modulator's resolution with the hologram in its middle.
+//!
+//! Around the hologram the modulator shows amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light
+//! does not pass the aperture. One level everywhere would be a bright frame.
+
+use crate::display::Display;
+use crate::error::{Error, Result};
+use crate::slm::Response;
+use std::f32::consts::FRAC_PI_2;
+
+/// How the levels of the colours lie in images. Levels of fewer bits than their place in the image stand in its upper
+/// bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Layout {
+    /// One image, bytes red, green, blue.
+    Rgb,
+    /// One image, bytes red, green, blue, alpha 255.
+    Rgba,
+    /// One image, bytes blue, green, red, alpha 255.
+    Bgra,
+    /// One image, 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
+    /// RGBA_1010102, Metal's rgb10a2.
+    Rgb10,
+    /// Three images, one after another: red, green, blue; a byte a pixel.
+    Grey,
+    /// Three images, one after another: red, green, blue; a 16-bit little-endian word a pixel.
+    Grey16,
+}
+
+/// A hologram's levels, (3, H, W).
+#[derive(Debug, Clone, Copy)]
+pub enum Levels<'a> {
+    /// As the planned response makes them, up to 8 bits.
+    Bytes(&'a [u8]),
+    /// Of the display's bits, 9 or 10.
+    Words(&'a [u16]),
+}
+
+impl Layout {
+    /// How many images a hologram becomes.
+    pub fn images(self) -> usize {
+        match self {
+            Layout::Grey | Layout::Grey16 => 3,
+            _ => 1,
+        }
+    }
+
+    /// Bytes of a pixel.
+    pub fn pixel_bytes(self) -> usize {
+        match self {
+            Layout::Rgb => 3,
+            Layout::Rgba | Layout::Bgra | Layout::Rgb10 => 4,
+            Layout::Grey => 1,
+            Layout::Grey16 => 2,
+        }
+    }
+
+    /// Bits of a level's place.
+    fn place_bits(self) -> u32 {
+        match self {
+            Layout::Rgb10 => 10,
+            Layout::Grey16 => 16,
+            _ => 8,
+        }
+    }
+
+    /// A pixel of image `image` from `level` of each colour, levels being as wide as their place.
+    fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
+        let byte = |colour| level(colour) as u8;
+        match self {
+            Layout::Rgb => pixel.copy_from_slice(&[byte(0), byte(1), byte(2)]),
+            Layout::Rgba => pixel.copy_from_slice(&[byte(0), byte(1), byte(2), 255]),
+            Layout::Bgra => pixel.copy_from_slice(&[byte(2), byte(1), byte(0), 255]),
+            Layout::Rgb10 => {
+                let colours = (0..3).map(|c| u32::from(level(c)) << (10 * c));
+                let word = colours.fold(3 << 30, |word, colour| word | colour);
+                pixel.copy_from_slice(&word.to_le_bytes());
+            }
+            Layout::Grey => pixel[0] = byte(image),
+            Layout::Grey16 => pixel.copy_from_slice(&level(image).to_le_bytes()),
+        }
+    }
+}
+
+/// How a hologram is put on its modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// How colours lie in images.
+    pub layout: Layout,
+    /// Whether left and right are exchanged, of the whole image.
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole image.
+    pub flip_y: bool,
+    /// How many pixels to the right of the middle the hologram stands, before flips. What leaves the modulator is cut.
+    pub shift_x: i32,
+    /// How many pixels below the middle it stands, before flips.
+    pub shift_y: i32,
+}
+
+impl Placement {
+    /// In the middle, not flipped.
+    pub fn centred(layout: Layout) -> Self {
+        Placement {
+            layout,
+            flip_x: false,
+            flip_y: false,
+            shift_x: 0,
+            shift_y: 0,
+        }
+    }
+}
+
+/// A plan for one modulator, hologram shape and placement. Immutable; shared between threads.
+#[derive(Debug, Clone)]
+pub struct Output {
+    modulator: (usize, usize),
+    hologram: (usize, usize),
+    placement: Placement,
+    /// Of the image's upper left pixel, its place in the hologram, which may lie outside.
+    from: (i64, i64),
+    /// Bits of a level in bytes, and of one in words.
+    bits: (u32, u32),
+    /// Levels of darkness in bytes: where x + y of the hologram is even and where it is odd.
+    dark: [u8; 2],
+}
+
+impl Output {
+    /// Plans images of `display`'s resolution for (`height`, `width`) holograms whose levels `response` made.
+    ///
+    /// # Errors
+    /// A hologram larger than the modulator.
+    pub fn new(
+        display: &Display,
+        (height, width): (usize, usize),
+        response: &Response,
+        placement: Placement,
+    ) -> Result<Self> {
+        let modulator = (display.height(), display.width());
+        if height > modulator.0 || width > modulator.1 {
+            return Err(Error::Plan(format!(
+                "a hologram of {width}×{height} does not fit the modulator of {}×{}",
+                modulator.1, modulator.0
+            )));
+        }
+        let from = |modulator: usize, hologram: usize, shift: i32| {
+            -(((modulator - hologram) / 2) as i64 + i64::from(shift))
+        };
+        Ok(Output {
+            modulator,
+            hologram: (height, width),
+            placement,
+            from: (
+                from(modulator.0, height, placement.shift_y),
+                from(modulator.1, width, placement.shift_x),
+            ),
+            bits: match response {
+                Response::Linear { bits } => (*bits, display.bits()),
+                Response::Lut { .. } => (8, display.bits()),
+            },
+            dark: [FRAC_PI_2, 3.0 * FRAC_PI_2].map(|phase| response.level(phase)),
+        })
+    }
+
+    /// Bytes of an image.
+    pub fn image_bytes(&self) -> usize {
+        self.modulator.0 * self.modulator.1 * self.placement.layout.pixel_bytes()
+    }
+
+    /// (H, W) of an image.
+    pub fn shape(&self) -> (usize, usize) {
+        self.modulator
+    }
+
+    /// Image `image` of a hologram of `levels`, (3, H, W), into `bytes`, rows without gaps. Allocates nothing.
+    ///
+    /// # Errors
+    /// An image that the layout has not.
+    ///
+    /// # Panics
+    /// If `levels` or `bytes` has another length than planned.
+    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
+        let size = 3 * self.hologram.0 * self.hologram.1;
+        let (byte_bits, word_bits) = self.bits;
+        match levels {
+            Levels::Bytes(levels) => {
+                assert_eq!(levels.len(), size);
+                let level = |at: usize| u16::from(levels[at]);
+                self.write_levels(level, byte_bits, self.dark.map(u16::from), image, bytes)
+            }
+            Levels::Words(levels) => {
+                assert_eq!(levels.len(), size);
+                // Of π/2 and 3π/2.
+                let quarter = (1u16 << word_bits) / 4;
+                let dark = [quarter, 3 * quarter];
+                self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
+            }
+        }
+    }
+
+    fn write_levels(
+        &self,
+        level: impl Fn(usize) -> u16,
+        bits: u32,
+        dark: [u16; 2],
+        image: usize,
+        bytes: &mut [u8],
+    ) -> Result<()> {
+        let layout = self.placement.layout;
+        let (height, width) = self.hologram;
+        let (out_height, out_width) = self.modulator;
+        assert_eq!(bytes.len(), self.image_bytes());
+        if image >= layout.images() {
+            return Err(Error::Plan(format!(
+                "there is no image {image}; {layout:?} has {}",
+                layout.images()
+            )));
+        }
+        let place = layout.place_bits();
+        let placed = |level: u16| match bits <= place {
+            true => level << (place - bits),
+            false => level >> (bits - place),
+        };
+        let pixel_bytes = layout.pixel_bytes();
+        let flip = |at: usize, n: usize, flipped: bool| if flipped { n - 1 - at } else { at };
+        for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
+            let y = self.from.0 + flip(y, out_height, self.placement.flip_y) as i64;
+            for (x, pixel) in row.chunks_exact_mut(pixel_bytes).enumerate() {
+                let x = self.from.1 + flip(x, out_width, self.placement.flip_x) as i64;
+                let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
+                let level = |colour: usize| match inside {
+                    true => placed(level((colour * height + y as usize) * width + x as usize)),
+                    false => placed(dark[(x + y).rem_euclid(2) as usize]),
+                };
+                layout.write_pixel(image, level, pixel);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn display(width: usize, height: usize) -> Display {
+        Display::from_toml(&format!("width = {width}\nheight = {height}")).unwrap()
+    }
+
+    /// Levels that say colour, row and column.
+    fn levels(height: usize, width: usize) -> Vec<u8> {
+        (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                (100 + 50 * c + 10 * y + x) as u8
+            })
+            .collect()
+    }
+
+    fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
+        let mut bytes = vec![7; output.image_bytes()];
+        output
+            .write(Levels::Bytes(levels), image, &mut bytes)
+            .unwrap();
+        bytes
+    }
+
+    #[test]
+    fn each_layout_holds_each_colour_in_its_place() {
+        let response = Response::linear(8).unwrap();
+        let levels = levels(2, 3);
+        for (layout, expected) in [
+            (Layout::Rgb, vec![100, 150, 200, 101, 151, 201]),
+            (Layout::Rgba, vec![100, 150, 200, 255, 101, 151]),
+            (Layout::Bgra, vec![200, 150, 100, 255, 201, 151]),
+            (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
+            (Layout::Grey16, vec![0, 100, 0, 101, 0, 102]),
+        ] {
+            let output = Output::new(
+                &display(3, 2),
+                (2, 3),
+                &response,
+                Placement::centred(layout),
+            );
+            let output = output.unwrap();
+            assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
+            assert!(
+                output
+                    .write(
+                        Levels::Bytes(&levels),
+                        layout.images(),
+                        &mut vec![0; output.image_bytes()]
+                    )
+                    .is_err()
+            );
+            if layout == Layout::Grey {
+                assert_eq!(image(&output, &levels, 2), [200, 201, 202, 210, 211, 212]);
+            }
+        }
+    }
+
+    #[test]
+    fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
+        let response = Response::linear(8).unwrap();
+        let levels = levels(2, 3);
+        // In a 7×4 modulator two columns and one row are left of and above it.
+        let place = |x: usize, y: usize, p: &Placement| {
+            let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
+            let y = if p.flip_y { 3 - y } else { y } as i32 - 1 - p.shift_y;
+            match (0..3).contains(&x) && (0..2).contains(&y) {
+                true => (100 + 10 * y + x) as u8,
+                // π/2 and 3π/2 go on the hologram's checkerboard.
+                false => [64, 192][(x + y).rem_euclid(2) as usize],
+            }
+        };
+        for (flip_x, flip_y, shift_x, shift_y) in [
+            (false, false, 0, 0),
+            (true, false, 0, 0),
+            (false, true, 1, 0),
+            (true, true, -3, 2),
+            (false, false, 100, 0),
+        ] {
+            let placement = Placement {
+                flip_x,
+                flip_y,
+                shift_x,
+                shift_y,
+                ..Placement::centred(Layout::Grey)
+            };
+            let output = Output::new(&display(7, 4), (2, 3), &response, placement).unwrap();
+            for (i, byte) in image(&output, &levels, 0).into_iter().enumerate() {
+                assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
+            }
+        }
+        assert!(
+            Output::new(
+                &display(2, 4),
+                (2, 3),
+                &response,
+                Placement::centred(Layout::Rgb)
+            )
+            .is_err()
+        );
+    }
+
+    #[test]
+    fn few_bits_stand_in_the_upper_ones() {
+        for bits in 1..=8 {
+            let response = Response::linear(bits).unwrap();
+            let placement = Placement::centred(Layout::Grey);
+            let output = Output::new(&display(1, 1), (1, 1), &response, placement).unwrap();
+            let top = ((1u32 << bits) - 1) as u8;
+            assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
+        }
+    }
+
+    #[test]
+    fn ten_bits_stand_in_words() {
+        let display = Display::from_toml("width = 2\nheight = 1\nbits = 10").unwrap();
+        let response = Response::linear(8).unwrap();
+        let words = [1023, 5, 512, 6, 256, 7];
+        for (layout, expected) in [
+            (
+                Layout::Rgb10,
+                (1023u32 | 512 << 10 | 256 << 20 | 3 << 30)
+                    .to_le_bytes()
+                    .to_vec(),
+            ),
+            (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
+            (Layout::Rgb, vec![255, 128, 64]),
+        ] {
+            let output =
+                Output::new(&display, (1, 2), &response, Placement::centred(layout)).unwrap();
+            let mut bytes = vec![0; output.image_bytes()];
+            output.write(Levels::Words(&words), 0, &mut bytes).unwrap();
+            assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
+        }
+        let around = Output::new(
+            &display,
+            (1, 1),
+            &response,
+            Placement::centred(Layout::Grey16),
+        )
+        .unwrap();
+        let mut bytes = vec![0; around.image_bytes()];
+        around
+            .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes)
+            .unwrap();
+        assert_eq!(bytes[..4], [0x80, 0, 0, 0xc0]);
+    }
+}

@@ -1,0 +1,430 @@
+//! Many frames: what an app feeds with camera frames and gets holograms from.
+//!
+//! A [`Session`] is made for one of three running modes. An image session answers each frame by itself; a video session
+//! answers each frame too, and steadies depth and brightness from one to the next; a live session takes frames without
+//! ever waiting, works on one while the newest waits, and tells its listener of every result and every drop.
+//!
+//! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
+//! happens to a frame; `quality` is the ladder. One frame by itself, without a camera's formats, is
+//! [`crate::Pipeline`]'s.
+
+mod brightness;
+mod event;
+mod hologram;
+mod live;
+mod owned_frame;
+mod quality;
+mod queue;
+mod stages;
+mod statistics;
+
+pub use crate::depth::stream::DepthOptions;
+pub use brightness::Brightness;
+pub use event::{DropReason, Event};
+pub use hologram::Hologram;
+pub use quality::{Quality, QualityChange, QualityReason, Rung, Thermal};
+pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
+
+use crate::display::Display;
+use crate::encode::Encoding;
+use crate::error::{Error, Result};
+use crate::frame::CameraFrame;
+use crate::method::Method;
+use crate::slm::Response;
+use live::{Live, Report, Work, guarded, lock};
+use owned_frame::OwnedFrame;
+use queue::{Gate, Queue};
+use stages::{Made, Stages};
+use statistics::Recent;
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+/// What a session makes, and how. [`SessionOptions::new`] has what is usual; change what is not.
+#[derive(Clone)]
+#[non_exhaustive]
+pub struct SessionOptions {
+    /// The display.
+    pub display: Display,
+    /// Qualities, the best first.
+    pub ladder: Vec<Rung>,
+    /// Whether the session may step on the ladder by itself.
+    pub quality: Quality,
+    /// Frames a second that are aimed at: a live session drops frames that come sooner, and an adaptive one steps down
+    /// where it cannot hold it. None takes frames as they come and never steps.
+    pub target_rate_hz: Option<f64>,
+    /// How the field becomes phases.
+    pub encoding: Encoding,
+    /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
+    pub response: Response,
+    /// Which amplitude full light stands for.
+    pub brightness: Brightness,
+    /// What becomes of depth.
+    pub depth: DepthOptions,
+    /// Threads to compute with; None for as many as the device has.
+    pub threads: Option<NonZeroUsize>,
+}
+
+impl SessionOptions {
+    /// Holograms of `display`'s resolution by `method`: AA-DPM, a linear response of the display's bits, steady
+    /// brightness, near and far by percentiles, no target rate.
+    ///
+    /// # Errors
+    /// None for a display that could be made.
+    pub fn new(display: Display, method: Method) -> Result<Self> {
+        let rung = Rung {
+            method,
+            height: display.height(),
+            width: display.width(),
+        };
+        Ok(SessionOptions {
+            ladder: vec![rung],
+            quality: Quality::Adaptive,
+            target_rate_hz: None,
+            encoding: Encoding::ANTI_ALIAS,
+            // Of levels with more bits the upper ones are what is looked at.
+            response: Response::linear(display.bits().min(8))?,
+            brightness: Brightness::default(),
+            depth: DepthOptions::default(),
+            threads: None,
+            display,
+        })
+    }
+
+    fn check(&self) -> Result<()> {
+        quality::check(
+            &self.ladder,
+            self.quality,
+            (self.display.height(), self.display.width()),
+        )?;
+        if let Some(rate) = self.target_rate_hz
+            && !(rate.is_finite() && (0.01..=1000.0).contains(&rate))
+        {
+            return Err(Error::Plan(format!(
+                "a target rate of {rate} frames a second cannot be aimed at; it must lie in 0.01..=1000"
+            )));
+        }
+        if self.display.bits() > 8 && self.response != Response::linear(8)? {
+            return Err(Error::Plan(format!(
+                "a display of {} bits answers linearly; a table is for one of 8 bits",
+                self.display.bits()
+            )));
+        }
+        self.brightness.check()?;
+        self.depth.check()
+    }
+}
+
+/// How a session runs; fixed when it is made.
+pub enum RunningMode {
+    /// [`Session::process`] answers each frame by itself.
+    Image,
+    /// [`Session::process`] answers each frame; depth and brightness are steadied from one to the next. Timestamps
+    /// must rise.
+    Video,
+    /// [`Session::submit`] takes frames without waiting, and the listener hears what becomes of them. Timestamps must
+    /// rise.
+    Live(Box<dyn FnMut(Event) + Send>),
+}
+
+/// What became of a submitted frame at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Submission {
+    /// It waits to be processed.
+    Queued,
+    /// It was dropped; the listener hears of it too.
+    Dropped(DropReason),
+}
+
+/// What the caller may change while a session runs.
+#[derive(Debug, Clone, Copy)]
+struct Control {
+    /// Rungs of the ladder.
+    rungs: usize,
+    quality: Quality,
+    thermal: Thermal,
+}
+
+/// What callers and the session's thread share.
+struct Shared {
+    stages: Mutex<Stages>,
+    control: Mutex<Control>,
+    recent: Mutex<Recent>,
+}
+
+enum Mode {
+    Image(Mutex<Gate>),
+    Video(Mutex<Gate>),
+    Live(Live<LiveWork>),
+}
+
+/// Frames in, holograms out. Every method may be called from any thread, at any moment.
+///
+/// ```no_run
+/// use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
+/// use phasefront::depth::image::{DepthFormat, DepthImage};
+/// use phasefront::session::{Event, RunningMode, SessionOptions};
+/// use phasefront::{Display, Method, Network, Session};
+/// use std::sync::Arc;
+///
+/// # fn camera() -> (u64, Vec<u8>, Vec<u8>) { unimplemented!() }
+/// let network = Network::from_onnx(&std::fs::read("rgbd-8-int8.onnx").expect("a network"))?;
+/// let method = Method::Network(Arc::new(network));
+/// let options = SessionOptions::new(Display::default(), method)?;
+/// let session = Session::new(options, RunningMode::Live(Box::new(|event| match event {
+///     Event::Hologram(hologram) => println!("{} bytes", hologram.levels().len()),
+///     other => println!("{other:?}"),
+/// })))?;
+/// loop {
+///     let (timestamp_ns, colour, depth) = camera();
+///     let colour = Plane::new(&colour, 4 * 1920, 4);
+///     let colour = ColourImage::new(ColourFormat::Bgra, 1920, 1440, &[colour])?;
+///     let depth = DepthImage::new(DepthFormat::MetresF32, 256, 192, Plane::new(&depth, 4 * 256, 4))?;
+///     session.submit(&CameraFrame::new(timestamp_ns, colour, depth))?;
+/// }
+/// # #[allow(unreachable_code)]
+/// # Ok::<(), phasefront::Error>(())
+/// ```
+pub struct Session {
+    shared: Arc<Shared>,
+    mode: Mode,
+}
+
+/// The work of a live session's thread.
+struct LiveWork(Arc<Shared>);
+
+impl Work for LiveWork {
+    type Frame = OwnedFrame;
+    type Output = Made;
+
+    fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
+        self.0
+            .process(&mut lock(&self.0.stages), &frame.frame()?, !fresh)
+    }
+
+    fn recover(&mut self) {
+        lock(&self.0.stages).recover();
+    }
+}
+
+impl Shared {
+    fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<Made> {
+        let Control {
+            quality, thermal, ..
+        } = *lock(&self.control);
+        let made = stages.process(frame, past, thermal, quality)?;
+        let mut recent = lock(&self.recent);
+        recent.push(Instant::now(), made.hologram.times());
+        if made.change.is_some() {
+            recent.backend = stages.backend();
+            recent.rung = stages.rung();
+        }
+        Ok(made)
+    }
+}
+
+impl Session {
+    /// A session that runs in `mode`.
+    ///
+    /// # Errors
+    /// Options that cannot be meant or planned for, or threads that cannot be started.
+    pub fn new(options: SessionOptions, mode: RunningMode) -> Result<Self> {
+        options.check()?;
+        let control = Control {
+            rungs: options.ladder.len(),
+            quality: options.quality,
+            thermal: Thermal::Nominal,
+        };
+        let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
+        let stages = Stages::new(options)?;
+        let recent = Recent::new(stages.backend(), stages.rung());
+        let shared = Arc::new(Shared {
+            stages: Mutex::new(stages),
+            control: Mutex::new(control),
+            recent: Mutex::new(recent),
+        });
+        let mode = match mode {
+            RunningMode::Image => Mode::Image(Mutex::new(Gate::new())),
+            RunningMode::Video => Mode::Video(Mutex::new(Gate::new())),
+            RunningMode::Live(mut listener) => {
+                let of = shared.clone();
+                let listener = move |report| tell(&of, &mut listener, report);
+                Mode::Live(Live::start(LiveWork(shared.clone()), period_ns, listener)?)
+            }
+        };
+        Ok(Session { shared, mode })
+    }
+
+    /// Makes the hologram of `frame`, in an image or a video session, and waits for it. Calls from several threads are
+    /// answered one after another.
+    ///
+    /// # Errors
+    /// A frame that is not usable, a late one in a video session, a session that is live, paused or closed, or a panic
+    /// inside. None of them harms the frames that follow.
+    pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
+        let (gate, video) = match &self.mode {
+            Mode::Image(gate) => (gate, false),
+            Mode::Video(gate) => (gate, true),
+            Mode::Live(_) => {
+                return Err(Error::Session(
+                    "it is live, so frames are submitted; process is for image and video sessions"
+                        .into(),
+                ));
+            }
+        };
+        let mut stages = lock(&self.shared.stages);
+        let fresh = {
+            let mut gate = lock(gate);
+            gate.admit(frame.timestamp_ns, video)?;
+            if gate.paused {
+                gate.counts.dropped.count(DropReason::Paused);
+                return Err(Error::Session("it is paused; resume it first".into()));
+            }
+            std::mem::take(&mut gate.fresh)
+        };
+        let (result, panicked) = guarded(|| {
+            frame.check()?;
+            self.shared.process(&mut stages, frame, video && !fresh)
+        });
+        if panicked {
+            stages.recover();
+        }
+        let counts = &mut lock(gate).counts;
+        match result {
+            Ok(made) => {
+                counts.processed += 1;
+                Ok(made.hologram)
+            }
+            Err(error) => {
+                counts.failed += 1;
+                Err(error)
+            }
+        }
+    }
+
+    /// Hands `frame` to a live session, which copies it and goes on by itself. Never waits for a frame to be processed.
+    ///
+    /// # Errors
+    /// Colour and depth that do not belong together, a late frame, or a session that is not live or is closed. None of
+    /// them harms the frames that follow.
+    pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Submission> {
+        let Mode::Live(live) = &self.mode else {
+            return Err(Error::Session(
+                "it is not live; process frames, or make a live session".into(),
+            ));
+        };
+        frame.check()?;
+        let dropped = live.submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))?;
+        Ok(dropped.map_or(Submission::Queued, Submission::Dropped))
+    }
+
+    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    ///
+    /// # Errors
+    /// A panic inside.
+    pub fn warm_up(&self) -> Result<()> {
+        let mut stages = lock(&self.shared.stages);
+        let (result, panicked) = guarded(|| stages.warm_up());
+        if panicked {
+            stages.recover();
+        }
+        result
+    }
+
+    /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
+    /// first again.
+    pub fn reset(&self) {
+        match &self.mode {
+            Mode::Image(gate) | Mode::Video(gate) => lock(gate).reset(),
+            Mode::Live(live) => live.change(Queue::reset),
+        }
+    }
+
+    /// Takes no frames until [`Self::resume`]. A live session drops what waits, ends what is in flight, and drops what
+    /// is submitted; the others refuse to process.
+    pub fn pause(&self) {
+        match &self.mode {
+            Mode::Image(gate) | Mode::Video(gate) => lock(gate).paused = true,
+            Mode::Live(live) => live.change(Queue::pause),
+        }
+    }
+
+    /// Takes frames again.
+    pub fn resume(&self) {
+        match &self.mode {
+            Mode::Image(gate) | Mode::Video(gate) => lock(gate).paused = false,
+            Mode::Live(live) => live.change(|queue| {
+                queue.resume();
+                None
+            }),
+        }
+    }
+
+    /// Takes no more frames. A live session drops what waits or is in flight; when this returns, its listener has heard
+    /// everything and will not be called again (called by the listener itself, it returns at once). Results that were
+    /// handed out stay valid. Dropping a session closes it.
+    pub fn close(&self) {
+        match &self.mode {
+            Mode::Image(gate) | Mode::Video(gate) => lock(gate).closed = true,
+            Mode::Live(live) => live.close(),
+        }
+    }
+
+    /// Says how hot the device is; an adaptive session heeds it from the next frame on.
+    pub fn set_thermal(&self, thermal: Thermal) {
+        lock(&self.shared.control).thermal = thermal;
+    }
+
+    /// Allows or forbids steps on the ladder, from the next frame on.
+    ///
+    /// # Errors
+    /// A rung that is not on the ladder.
+    pub fn set_quality(&self, quality: Quality) -> Result<()> {
+        let mut control = lock(&self.shared.control);
+        quality.check(control.rungs)?;
+        control.quality = quality;
+        Ok(())
+    }
+
+    /// What the session has done so far. Never waits for a frame.
+    pub fn statistics(&self) -> Statistics {
+        let counts = match &self.mode {
+            Mode::Image(gate) | Mode::Video(gate) => lock(gate).counts,
+            Mode::Live(live) => live.look(|queue| queue.gate.counts),
+        };
+        lock(&self.shared.recent).statistics(counts)
+    }
+}
+
+/// A report as the listener's events.
+fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) {
+    match report {
+        Report::Done {
+            timestamp_ns,
+            output,
+        } => {
+            listener(Event::Hologram(output.hologram));
+            if let Some(change) = output.change {
+                listener(Event::QualityChanged {
+                    timestamp_ns,
+                    change,
+                });
+            }
+        }
+        Report::Dropped {
+            timestamp_ns,
+            reason,
+        } => listener(Event::Dropped {
+            timestamp_ns,
+            reason,
+        }),
+        Report::Failed {
+            timestamp_ns,
+            error,
+        } => listener(Event::Failed {
+            timestamp_ns,
+            error,
+        }),
+        Report::ListenerPanicked => lock(&shared.recent).listener_panics += 1,
+    }
+}

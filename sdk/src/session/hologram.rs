@@ -1,0 +1,230 @@
+//! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
+
+use super::live::lock;
+use super::statistics::FrameTimes;
+use crate::display::Display;
+use crate::error::{Error, Result};
+use crate::output::Levels;
+use crate::preview::{Preview, PreviewScratch};
+use crate::slm::Response;
+use std::sync::{Arc, Mutex, Weak};
+
+/// Buffers that a session keeps for the results to come; what is over goes back to the system.
+const KEPT: usize = 4;
+
+/// Memory that results give back.
+#[derive(Debug)]
+pub(super) struct Pool<T>(Arc<Mutex<Vec<Vec<T>>>>);
+
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Pool(Arc::default())
+    }
+}
+
+impl<T: Copy + Default> Pool<T> {
+    /// A buffer of `len` values of any content.
+    pub(super) fn take(&self, len: usize) -> Pooled<T> {
+        let mut kept = lock(&self.0);
+        // Buffers of another rung's size are of no use any more.
+        kept.retain(|buffer| buffer.len() == len);
+        let values = kept.pop().unwrap_or_else(|| vec![T::default(); len]);
+        Pooled {
+            values,
+            pool: Arc::downgrade(&self.0),
+        }
+    }
+}
+
+/// A buffer that goes back to its pool.
+#[derive(Debug)]
+pub(super) struct Pooled<T> {
+    pub(super) values: Vec<T>,
+    pool: Weak<Mutex<Vec<Vec<T>>>>,
+}
+
+impl<T> Drop for Pooled<T> {
+    fn drop(&mut self) {
+        if let Some(pool) = self.pool.upgrade() {
+            let mut kept = lock(&pool);
+            if kept.len() < KEPT {
+                kept.push(std::mem::take(&mut self.values));
+            }
+        }
+    }
+}
+
+/// What looking at results needs; shared by all of a session's.
+pub(super) struct Viewer {
+    pub(super) display: Display,
+    pub(super) response: Response,
+    plan: Mutex<Option<ViewPlan>>,
+}
+
+struct ViewPlan {
+    shape: (usize, usize),
+    z_m: f64,
+    preview: Preview,
+    scratch: PreviewScratch,
+}
+
+impl Viewer {
+    pub(super) fn new(display: Display, response: Response) -> Self {
+        Viewer {
+            display,
+            response,
+            plan: Mutex::new(None),
+        }
+    }
+}
+
+/// The hologram of one frame: modulator levels and what is known of them. Cheap to keep and to send to another thread; its
+/// memory goes back to the session when it is dropped, also after the session's end.
+pub struct Hologram {
+    pub(super) timestamp_ns: u64,
+    pub(super) shape: (usize, usize),
+    pub(super) levels: Pooled<u8>,
+    /// Where the display has over 8 bits.
+    pub(super) words: Option<Pooled<u16>>,
+    /// d·65535.
+    pub(super) depth: Pooled<u16>,
+    pub(super) scale: f32,
+    pub(super) times: FrameTimes,
+    pub(super) range_m: Option<(f32, f32)>,
+    pub(super) valid_depth: f32,
+    pub(super) rung: usize,
+    pub(super) viewer: Arc<Viewer>,
+}
+
+impl std::fmt::Debug for Hologram {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Hologram")
+            .field("timestamp_ns", &self.timestamp_ns)
+            .field("shape", &self.shape)
+            .field("scale", &self.scale)
+            .field("rung", &self.rung)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Hologram {
+    /// The frame's timestamp.
+    pub fn timestamp_ns(&self) -> u64 {
+        self.timestamp_ns
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.shape
+    }
+
+    /// The modulator levels, (3, H, W): red, green, blue; of a display of over 8 bits the upper 8.
+    pub fn levels(&self) -> &[u8] {
+        &self.levels.values
+    }
+
+    /// The levels of a display of over 8 bits, (3, H, W), whose upper 8 bits [`Self::levels`] has; None for others.
+    pub fn words(&self) -> Option<&[u16]> {
+        self.words.as_ref().map(|words| &words.values[..])
+    }
+
+    /// The levels as [`crate::output::Output`] takes them.
+    pub fn output_levels(&self) -> Levels<'_> {
+        match self.words() {
+            Some(words) => Levels::Words(words),
+            None => Levels::Bytes(self.levels()),
+        }
+    }
+
+    /// The levels of one colour, (H, W): 0 red, 1 green, 2 blue.
+    ///
+    /// # Errors
+    /// Another colour.
+    pub fn plane(&self, colour: usize) -> Result<&[u8]> {
+        let size = self.shape.0 * self.shape.1;
+        self.levels().chunks_exact(size).nth(colour).ok_or_else(|| {
+            Error::Plan(format!(
+                "there is no plane {colour}; 0 is red, 1 green, 2 blue"
+            ))
+        })
+    }
+
+    /// The amplitude that full light stands for.
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
+    /// How long each stage took.
+    pub fn times(&self) -> FrameTimes {
+        self.times
+    }
+
+    /// Metres at the near and the far end of the volume; None for normalized depth.
+    pub fn range_m(&self) -> Option<(f32, f32)> {
+        self.range_m
+    }
+
+    /// The share of the depth sensor's pixels that had a usable reading.
+    pub fn valid_depth(&self) -> f32 {
+        self.valid_depth
+    }
+
+    /// The rung of the ladder that it was made on, 0 the best.
+    pub fn rung(&self) -> usize {
+        self.rung
+    }
+
+    /// The display that it is for.
+    pub fn display(&self) -> &Display {
+        &self.viewer.display
+    }
+
+    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, metres: where to focus
+    /// when it is tapped on. What lies beyond an edge is the edge.
+    pub fn z_at(&self, x: f64, y: f64) -> f64 {
+        let (height, width) = self.shape;
+        let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
+        let d = self.depth.values[at(y, height) * width + at(x, width)];
+        self.viewer.display.z_of_depth(f64::from(d) / 65535.0)
+    }
+
+    /// What an eye focused at `z_m` sees, as (`height`, `width`) rows of red, green, blue, alpha 255 into `rgba`. The
+    /// plan is kept for the next call, of this or another result of the session, with the same z and size.
+    ///
+    /// # Errors
+    /// An empty image, a length of `rgba` other than 4·height·width, or a z too far away.
+    pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
+        if rgba.len() != height.saturating_mul(width).saturating_mul(4) {
+            return Err(Error::Plan(format!(
+                "a preview of {width}×{height} needs 4 bytes a pixel; the image has {}",
+                rgba.len()
+            )));
+        }
+        let mut plan = lock(&self.viewer.plan);
+        let fits = |plan: &&mut ViewPlan| {
+            plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
+        };
+        if plan.as_mut().filter(fits).is_none() {
+            let preview = Preview::new(self.shape, &self.viewer.display, z_m, (height, width))?;
+            *plan = Some(ViewPlan {
+                shape: self.shape,
+                z_m,
+                scratch: preview.scratch(),
+                preview,
+            });
+        }
+        if let Some(ViewPlan {
+            preview, scratch, ..
+        }) = &mut *plan
+        {
+            preview.look(
+                self.levels(),
+                &self.viewer.response,
+                self.scale,
+                rgba,
+                scratch,
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,406 @@
+//! The thread of a live session: takes frames from the queue, processes them, tells the listener. What processing is,
+//! is not known here.
+
+use super::event::DropReason;
+use super::queue::{Queue, Ticket};
+use crate::error::{Error, Result};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{JoinHandle, ThreadId};
+
+/// What a live session does with its frames.
+pub(super) trait Work: Send + 'static {
+    /// A frame in the session's own memory.
+    type Frame: Send + 'static;
+    /// What it becomes.
+    type Output;
+
+    /// Makes `frame` into what it becomes; `fresh` says that it has no past.
+    fn process(&mut self, frame: &Self::Frame, fresh: bool) -> Result<Self::Output>;
+
+    /// Makes good what a panic may have left half done.
+    fn recover(&mut self);
+}
+
+/// What the listener of a [`Live`] hears.
+#[derive(Debug)]
+pub(super) enum Report<O> {
+    Done {
+        timestamp_ns: u64,
+        output: O,
+    },
+    Dropped {
+        timestamp_ns: u64,
+        reason: DropReason,
+    },
+    Failed {
+        timestamp_ns: u64,
+        error: Error,
+    },
+    /// The listener itself panicked at the report before.
+    ListenerPanicked,
+}
+
+struct Shared<F> {
+    queue: Mutex<Queue<F>>,
+    wake: Condvar,
+    /// Memory for frames to come.
+    spare: Mutex<Vec<F>>,
+}
+
+/// Locks also after a panic: what is behind these locks is whole between any two statements.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a panic said.
+pub(super) fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
+    (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+        .or_else(|| payload.downcast_ref::<String>().cloned())
+        .unwrap_or_else(|| "a panic".into())
+        .replace('\n', " ")
+}
+
+/// `process`, with a panic made an error.
+pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, bool) {
+    match catch_unwind(AssertUnwindSafe(process)) {
+        Ok(result) => (result, false),
+        Err(payload) => (Err(Error::Internal(panic_message(&*payload))), true),
+    }
+}
+
+/// A running live session.
+pub(super) struct Live<W: Work> {
+    shared: Arc<Shared<W::Frame>>,
+    thread: Mutex<Option<JoinHandle<()>>>,
+    id: ThreadId,
+}
+
+impl<W: Work> Live<W> {
+    /// Starts the thread.
+    ///
+    /// # Errors
+    /// A thread that cannot be started.
+    pub(super) fn start(
+        work: W,
+        period_ns: Option<u64>,
+        listener: impl FnMut(Report<W::Output>) + Send + 'static,
+    ) -> Result<Self> {
+        let shared = Arc::new(Shared {
+            queue: Mutex::new(Queue::new(period_ns)),
+            wake: Condvar::new(),
+            spare: Mutex::new(Vec::new()),
+        });
+        let thread = std::thread::Builder::new()
+            .name("phasefront session".into())
+            .spawn({
+                let shared = shared.clone();
+                move || run(&shared, work, listener)
+            })
+            .map_err(|e| Error::Session(format!("its thread cannot be started: {e}")))?;
+        Ok(Live {
+            shared,
+            id: thread.thread().id(),
+            thread: Mutex::new(Some(thread)),
+        })
+    }
+
+    /// Lets a frame in: `fill` makes it, from memory of an earlier one where there is some. Never waits for a frame to
+    /// be processed. Gives why it was dropped, if it was.
+    ///
+    /// # Errors
+    /// A closed session, or a frame that is not later than the last.
+    pub(super) fn submit(
+        &self,
+        timestamp_ns: u64,
+        fill: impl FnOnce(Option<W::Frame>) -> W::Frame,
+    ) -> Result<Option<DropReason>> {
+        /// An admitted frame is put or, should copying panic, given up: the thread waits for each at the end.
+        struct Copying<'a, F>(&'a Shared<F>, Option<Ticket>);
+        impl<F> Drop for Copying<'_, F> {
+            fn drop(&mut self) {
+                if let Some(ticket) = self.1.take() {
+                    lock(&self.0.queue).give_up(ticket);
+                    self.0.wake.notify_all();
+                }
+            }
+        }
+        let admitted = lock(&self.shared.queue).admit(timestamp_ns)?;
+        let ticket = match admitted {
+            Ok(ticket) => ticket,
+            Err(reason) => {
+                self.shared.wake.notify_all();
+                return Ok(Some(reason));
+            }
+        };
+        let mut copying = Copying(&self.shared, Some(ticket));
+        let spare = lock(&self.shared.spare).pop();
+        let frame = fill(spare);
+        if let Some(ticket) = copying.1.take() {
+            let unneeded = lock(&self.shared.queue).put(ticket, frame);
+            self.keep(unneeded);
+        }
+        Ok(None)
+    }
+
+    /// What `change` does to the queue; the thread hears of it. A frame that it gives back is kept for its memory.
+    pub(super) fn change(&self, change: impl FnOnce(&mut Queue<W::Frame>) -> Option<W::Frame>) {
+        let unneeded = change(&mut lock(&self.shared.queue));
+        self.keep(unneeded);
+    }
+
+    /// What `look` sees of the queue.
+    pub(super) fn look<T>(&self, look: impl FnOnce(&Queue<W::Frame>) -> T) -> T {
+        look(&lock(&self.shared.queue))
+    }
+
+    /// Drops what is on its way and ends the thread; when it is back, all events have been told. Called by the
+    /// listener, it cannot wait for that and does not.
+    pub(super) fn close(&self) {
+        self.change(Queue::close);
+        if std::thread::current().id() == self.id {
+            return;
+        }
+        // Held while joining, so that whoever closes too waits as well.
+        if let Some(thread) = lock(&self.thread).take() {
+            // Panics of work and listener are caught inside.
+            let _ = thread.join();
+        }
+    }
+
+    fn keep(&self, frame: Option<W::Frame>) {
+        lock(&self.shared.spare).extend(frame);
+        self.shared.wake.notify_all();
+    }
+}
+
+impl<W: Work> Drop for Live<W> {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+enum Next<F> {
+    Drop(u64, DropReason),
+    Frame(super::queue::Taken<F>),
+    End,
+}
+
+fn run<W: Work>(
+    shared: &Shared<W::Frame>,
+    mut work: W,
+    mut listener: impl FnMut(Report<W::Output>),
+) {
+    let mut tell = |report| {
+        let told = catch_unwind(AssertUnwindSafe(|| listener(report)));
+        if told.is_err() {
+            let _ = catch_unwind(AssertUnwindSafe(|| listener(Report::ListenerPanicked)));
+        }
+    };
+    loop {
+        let mut queue = lock(&shared.queue);
+        let next = loop {
+            if let Some((timestamp_ns, reason)) = queue.next_drop() {
+                break Next::Drop(timestamp_ns, reason);
+            }
+            if let Some(taken) = queue.take() {
+                break Next::Frame(taken);
+            }
+            if queue.is_done() {
+                break Next::End;
+            }
+            queue = (shared.wake.wait(queue)).unwrap_or_else(PoisonError::into_inner);
+        };
+        drop(queue);
+        match next {
+            Next::End => return,
+            Next::Drop(timestamp_ns, reason) => tell(Report::Dropped {
+                timestamp_ns,
+                reason,
+            }),
+            Next::Frame(taken) => {
+                let timestamp_ns = taken.timestamp_ns;
+                let (result, panicked) = guarded(|| work.process(&taken.frame, taken.fresh));
+                if panicked {
+                    work.recover();
+                }
+                lock(&shared.spare).push(taken.frame);
+                if lock(&shared.queue).finish(result.is_err()) {
+                    tell(match result {
+                        Ok(output) => Report::Done {
+                            timestamp_ns,
+                            output,
+                        },
+                        Err(error) => Report::Failed {
+                            timestamp_ns,
+                            error,
+                        },
+                    });
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::sync::atomic::{AtomicU64, Ordering};
+    use std::sync::mpsc;
+
+    /// Work that costs a few turns of the scheduler, fails at times and panics at times.
+    struct Fake {
+        random: ChaCha8Rng,
+        broken: bool,
+    }
+
+    impl Work for Fake {
+        type Frame = Vec<u64>;
+        type Output = u64;
+
+        fn process(&mut self, frame: &Vec<u64>, _fresh: bool) -> Result<u64> {
+            assert!(!self.broken, "not recovered");
+            for _ in 0..self.random.random_range(0..4) {
+                std::thread::yield_now();
+            }
+            match self.random.random_range(0..20) {
+                0 => Err(Error::Frame("bad".into())),
+                1 => {
+                    self.broken = true;
+                    // Without the hook's message on stderr.
+                    std::panic::resume_unwind(Box::new("worse"))
+                }
+                _ => Ok(frame[0]),
+            }
+        }
+
+        fn recover(&mut self) {
+            self.broken = false;
+        }
+    }
+
+    /// Two cameras, one that resets and pauses, and a close at any moment, on real threads.
+    #[test]
+    fn any_schedule_ends_with_every_frame_told() {
+        for seed in 0..1500 {
+            let told = Arc::new(AtomicU64::new(0));
+            let panics = Arc::new(AtomicU64::new(0));
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let fake = Fake {
+                random: ChaCha8Rng::seed_from_u64(seed + 1),
+                broken: false,
+            };
+            let listener = {
+                let (told, panics) = (told.clone(), panics.clone());
+                let mut random = ChaCha8Rng::seed_from_u64(seed + 2);
+                move |report| match report {
+                    Report::ListenerPanicked => {
+                        panics.fetch_add(1, Ordering::Relaxed);
+                    }
+                    report => {
+                        told.fetch_add(1, Ordering::Relaxed);
+                        if let Report::Done {
+                            timestamp_ns,
+                            output,
+                        } = report
+                        {
+                            assert_eq!(timestamp_ns, output);
+                        }
+                        if random.random_bool(0.05) {
+                            std::panic::resume_unwind(Box::new("listener"));
+                        }
+                    }
+                }
+            };
+            let live = Live::start(fake, None, listener).unwrap();
+            let clock = AtomicU64::new(0);
+            let frames = random.random_range(0..60);
+            std::thread::scope(|scope| {
+                for _ in 0..2 {
+                    scope.spawn(|| {
+                        for _ in 0..frames {
+                            let now = clock.fetch_add(1, Ordering::Relaxed);
+                            // Closed or late: refused.
+                            let _ = live.submit(now, |spare: Option<Vec<u64>>| {
+                                let mut frame = spare.unwrap_or_default();
+                                frame.clear();
+                                frame.push(now);
+                                frame
+                            });
+                        }
+                    });
+                }
+                for _ in 0..random.random_range(0..20) {
+                    match random.random_range(0..4) {
+                        0 => live.change(Queue::reset),
+                        1 => live.change(Queue::pause),
+                        2 => live.change(|queue| {
+                            queue.resume();
+                            None
+                        }),
+                        _ => std::thread::yield_now(),
+                    }
+                }
+                if random.random_bool(0.5) {
+                    live.close();
+                }
+            });
+            live.close();
+            let counts = live.look(|queue| queue.gate.counts);
+            assert_eq!(counts.pending(), 0, "seed {seed}");
+            assert_eq!(counts.submitted, 2 * frames);
+            let known = counts.processed + counts.failed + counts.dropped.total();
+            assert_eq!(told.load(Ordering::Relaxed), known, "seed {seed}");
+            assert!(panics.load(Ordering::Relaxed) <= known);
+        }
+    }
+
+    #[test]
+    fn a_panic_is_an_error_of_its_frame_and_the_next_works() {
+        let fake = Fake {
+            random: ChaCha8Rng::seed_from_u64(0),
+            broken: false,
+        };
+        let (sender, reports) = mpsc::channel();
+        let live = Live::start(fake, None, move |report| sender.send(report).unwrap()).unwrap();
+        let (mut done, mut internal) = (0, 0);
+        for timestamp in 0..400 {
+            live.submit(timestamp, |_| vec![timestamp]).unwrap();
+            match reports.recv().unwrap() {
+                Report::Done { output, .. } => {
+                    assert_eq!(output, timestamp);
+                    done += 1;
+                }
+                Report::Failed {
+                    timestamp_ns,
+                    error: Error::Internal(message),
+                } => {
+                    assert_eq!((timestamp_ns, message.as_str()), (timestamp, "worse"));
+                    internal += 1;
+                }
+                Report::Failed { error, .. } => assert_eq!(error, Error::Frame("bad".into())),
+                other => panic!("{other:?}"),
+            }
+        }
+        assert!(done > 300 && internal > 5);
+    }
+
+    /// Copying that panics leaves no frame behind that the thread would wait for.
+    #[test]
+    fn a_frame_that_cannot_be_copied_is_given_up() {
+        let fake = Fake {
+            random: ChaCha8Rng::seed_from_u64(0),
+            broken: false,
+        };
+        let live = Live::start(fake, None, |_| {}).unwrap();
+        let copied = catch_unwind(AssertUnwindSafe(|| {
+            live.submit(1, |_| std::panic::resume_unwind(Box::new("no memory")))
+        }));
+        assert!(copied.is_err());
+        live.close();
+        assert_eq!(live.look(|queue| queue.gate.counts.dropped.total()), 1);
+    }
+}

@@ -1,0 +1,104 @@
+//! A camera frame copied into the session's own memory: what a live session keeps when the camera takes its buffer
+//! back.
+
+use crate::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
+use crate::error::Result;
+use crate::frame::{Alignment, CameraFrame, ColourFormat, ColourImage, Orientation, Plane};
+
+/// Memory of one plane, with its strides.
+#[derive(Debug, Default)]
+struct OwnedPlane {
+    bytes: Vec<u8>,
+    row_stride: usize,
+    pixel_stride: usize,
+}
+
+impl OwnedPlane {
+    fn copy(&mut self, plane: &Plane<'_>) {
+        self.bytes.clear();
+        self.bytes.extend_from_slice(plane.bytes);
+        self.row_stride = plane.row_stride;
+        self.pixel_stride = plane.pixel_stride;
+    }
+
+    fn plane(&self) -> Plane<'_> {
+        Plane::new(&self.bytes, self.row_stride, self.pixel_stride)
+    }
+}
+
+/// What is not in the planes.
+#[derive(Debug)]
+struct Description {
+    timestamp_ns: u64,
+    colour: (ColourFormat, (usize, usize)),
+    depth: (DepthFormat, (usize, usize)),
+    confidence: Option<ConfidenceFormat>,
+    orientation: Orientation,
+    alignment: Alignment,
+}
+
+/// A copied frame; its memory serves the next.
+#[derive(Debug)]
+pub(super) struct OwnedFrame {
+    description: Description,
+    colour: [OwnedPlane; 3],
+    depth: OwnedPlane,
+    confidence: OwnedPlane,
+}
+
+impl OwnedFrame {
+    /// Copies `frame` into the memory of an earlier one, where there is some.
+    pub(super) fn copy(frame: &CameraFrame<'_>, spare: Option<OwnedFrame>) -> Self {
+        let description = Description {
+            timestamp_ns: frame.timestamp_ns,
+            colour: (frame.colour.format(), frame.colour.shape()),
+            depth: (frame.depth.format(), frame.depth.shape()),
+            confidence: frame.depth.confidence().map(|(format, _)| format),
+            orientation: frame.orientation,
+            alignment: frame.alignment,
+        };
+        let mut copy = match spare {
+            Some(spare) => OwnedFrame {
+                description,
+                ..spare
+            },
+            None => OwnedFrame {
+                description,
+                colour: Default::default(),
+                depth: OwnedPlane::default(),
+                confidence: OwnedPlane::default(),
+            },
+        };
+        for (to, plane) in copy.colour.iter_mut().zip(frame.colour.planes()) {
+            to.copy(plane);
+        }
+        copy.depth.copy(&frame.depth.plane());
+        if let Some((_, plane)) = frame.depth.confidence() {
+            copy.confidence.copy(&plane);
+        }
+        copy
+    }
+
+    /// The frame, borrowed.
+    ///
+    /// # Errors
+    /// None that the original had not.
+    pub(super) fn frame(&self) -> Result<CameraFrame<'_>> {
+        let d = &self.description;
+        let (format, (height, width)) = d.colour;
+        let planes: [Plane<'_>; 3] = std::array::from_fn(|i| self.colour[i].plane());
+        let colour = ColourImage::new(format, width, height, &planes[..format.planes()])?;
+        let (format, (height, width)) = d.depth;
+        let mut depth = DepthImage::new(format, width, height, self.depth.plane())?;
+        if let Some(format) = d.confidence {
+            depth = depth.with_confidence(format, width, height, self.confidence.plane())?;
+        }
+        Ok(CameraFrame {
+            timestamp_ns: d.timestamp_ns,
+            colour,
+            depth,
+            orientation: d.orientation,
+            alignment: d.alignment,
+        })
+    }
+}

@@ -1,0 +1,306 @@
+//! The ladder of qualities, and when a session steps on it.
+
+use crate::error::{Error, Result};
+use crate::method::Method;
+use std::time::Duration;
+
+/// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
+#[derive(Clone)]
+pub struct Rung {
+    /// What makes the midpoint hologram.
+    pub method: Method,
+    /// Height of the hologram, pixels.
+    pub height: usize,
+    /// Width of the hologram, pixels.
+    pub width: usize,
+}
+
+/// Whether a session may change its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up where
+    /// there is room.
+    #[default]
+    Adaptive,
+    /// It stays on this rung.
+    Fixed(usize),
+}
+
+impl Quality {
+    /// # Errors
+    /// A fixed rung that is not on a ladder of `rungs`.
+    pub(super) fn check(self, rungs: usize) -> Result<()> {
+        match self {
+            Quality::Fixed(rung) if rung >= rungs => Err(Error::Plan(format!(
+                "there is no rung {rung} on a ladder of {rungs}; the best is 0"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// How hot the device is, as its system says (iOS' ProcessInfo.thermalState, Android's PowerManager).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Thermal {
+    /// Nothing to heed.
+    #[default]
+    Nominal,
+    /// Warm: frames may take 85 % of the time that the target rate allows.
+    Fair,
+    /// Hot: half of it.
+    Serious,
+    /// Too hot: the lowest rung.
+    Critical,
+}
+
+impl Thermal {
+    /// The share of a frame's time that may be used.
+    fn share(self) -> f64 {
+        match self {
+            Thermal::Nominal => 1.0,
+            Thermal::Fair => 0.85,
+            Thermal::Serious => 0.5,
+            Thermal::Critical => 0.0,
+        }
+    }
+}
+
+/// Why a session changed its quality.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum QualityReason {
+    /// Frames took longer than the target rate allows.
+    TooSlow,
+    /// There was room for more.
+    Room,
+    /// The device is hot.
+    Thermal,
+    /// The caller said so.
+    Asked,
+}
+
+/// A step on the ladder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QualityChange {
+    /// The rung before.
+    pub from: usize,
+    /// The rung now.
+    pub to: usize,
+    /// Why.
+    pub reason: QualityReason,
+}
+
+/// Frames over their time before a step down.
+const SLOW_FRAMES: u32 = 6;
+/// Frames with room before a step up; doubled with each step up that had to be taken back.
+const ROOMY_FRAMES: u32 = 60;
+/// Frames with room that one without outweighs.
+const TIGHT_FRAME: u32 = 20;
+/// The most frames with room that a step up may need.
+const MOST_ROOMY_FRAMES: u32 = 60 * 32;
+/// A step up is tried where frames take less than this share of their time.
+const ROOM: f64 = 0.7;
+
+/// Decides on steps from what frames cost. Knows no clock and no frames.
+#[derive(Debug)]
+pub(super) struct Ladder {
+    rungs: usize,
+    rung: usize,
+    slow: u32,
+    roomy: u32,
+    roomy_needed: u32,
+    /// Frames since the last step up, while it may still have to be taken back.
+    since_up: Option<u32>,
+}
+
+impl Ladder {
+    pub(super) fn new(rungs: usize, rung: usize) -> Self {
+        Ladder {
+            rungs,
+            rung,
+            slow: 0,
+            roomy: 0,
+            roomy_needed: ROOMY_FRAMES,
+            since_up: None,
+        }
+    }
+
+    pub(super) fn rung(&self) -> usize {
+        self.rung
+    }
+
+    /// Hears that a frame took `cost` of the `period` that the target rate allows; says whether to step.
+    pub(super) fn observe(
+        &mut self,
+        cost: Duration,
+        period: Option<Duration>,
+        thermal: Thermal,
+        quality: Quality,
+    ) -> Option<QualityChange> {
+        if let Quality::Fixed(rung) = quality {
+            return self.step(rung, QualityReason::Asked);
+        }
+        if thermal == Thermal::Critical {
+            return self.step(self.rungs - 1, QualityReason::Thermal);
+        }
+        let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
+        self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
+        // A frame that took long for another reason does not undo all room before it.
+        self.roomy = match used < ROOM {
+            true => self.roomy + 1,
+            false => self.roomy.saturating_sub(TIGHT_FRAME),
+        };
+        if let Some(frames) = &mut self.since_up {
+            *frames += 1;
+            if *frames > self.roomy_needed {
+                // It held: the next step up is tried as readily as the first.
+                self.since_up = None;
+                self.roomy_needed = ROOMY_FRAMES;
+            }
+        }
+        if self.slow >= SLOW_FRAMES && self.rung + 1 < self.rungs {
+            if self.since_up.take().is_some() {
+                self.roomy_needed = (self.roomy_needed * 2).min(MOST_ROOMY_FRAMES);
+            }
+            let reason = match cost <= period? {
+                true => QualityReason::Thermal,
+                false => QualityReason::TooSlow,
+            };
+            return self.step(self.rung + 1, reason);
+        }
+        if self.roomy >= self.roomy_needed && self.rung > 0 {
+            let change = self.step(self.rung - 1, QualityReason::Room);
+            self.since_up = Some(0);
+            return change;
+        }
+        None
+    }
+
+    fn step(&mut self, to: usize, reason: QualityReason) -> Option<QualityChange> {
+        let from = self.rung;
+        if to == from {
+            return None;
+        }
+        self.rung = to;
+        self.slow = 0;
+        self.roomy = 0;
+        Some(QualityChange { from, to, reason })
+    }
+}
+
+/// # Errors
+/// An empty ladder, a fixed rung that is not on it, or a rung with no pixels or more than the modulator has.
+pub(super) fn check(ladder: &[Rung], quality: Quality, modulator: (usize, usize)) -> Result<()> {
+    if ladder.is_empty() {
+        return Err(Error::Plan(
+            "the ladder of qualities is empty; at least one rung is needed".into(),
+        ));
+    }
+    quality.check(ladder.len())?;
+    for (i, rung) in ladder.iter().enumerate() {
+        let (height, width) = (rung.height, rung.width);
+        if height == 0 || width == 0 || height > modulator.0 || width > modulator.1 {
+            return Err(Error::Plan(format!(
+                "rung {i} is {width}×{height}; each side must be at least 1 and at most the modulator's {}×{}",
+                modulator.1, modulator.0
+            )));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: Duration = Duration::from_millis(33);
+
+    /// Runs `frames` frames on a device whose rungs cost these milliseconds; gives the steps and the frame of each.
+    fn run(
+        ladder: &mut Ladder,
+        costs_ms: &[u64],
+        thermal: Thermal,
+        frames: usize,
+    ) -> Vec<(usize, QualityChange)> {
+        (0..frames)
+            .filter_map(|frame| {
+                // Every 50th frame takes long for another reason.
+                let extra = if frame % 50 == 49 { 40 } else { 0 };
+                let cost = Duration::from_millis(costs_ms[ladder.rung()] + extra);
+                let change = ladder.observe(cost, Some(PERIOD), thermal, Quality::Adaptive);
+                change.map(|change| (frame, change))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
+        let mut ladder = Ladder::new(4, 0);
+        let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
+        let to: Vec<_> = steps
+            .iter()
+            .map(|(_, c)| (c.from, c.to, c.reason))
+            .collect();
+        assert_eq!(
+            to,
+            [
+                (0, 1, QualityReason::TooSlow),
+                (1, 2, QualityReason::TooSlow)
+            ]
+        );
+        assert!(steps[1].0 < 20);
+    }
+
+    #[test]
+    fn it_steps_up_where_there_is_room_and_tries_in_vain_ever_more_seldom() {
+        let mut ladder = Ladder::new(3, 2);
+        let steps = run(&mut ladder, &[10, 10, 10], Thermal::Nominal, 500);
+        assert_eq!(ladder.rung(), 0);
+        assert!(steps.iter().all(|(_, c)| c.reason == QualityReason::Room));
+        // Rung 1 leaves room, rung 0 is too slow: the classic seesaw.
+        let mut ladder = Ladder::new(2, 0);
+        let steps = run(&mut ladder, &[40, 15], Thermal::Nominal, 20_000);
+        assert!(steps.len() < 40, "{}", steps.len());
+        let ups: Vec<usize> = (steps.iter())
+            .filter(|(_, c)| c.to == 0)
+            .map(|(frame, _)| *frame)
+            .collect();
+        assert!(ups[1] - ups[0] < 300 && ups[ups.len() - 1] - ups[ups.len() - 2] > 1000);
+    }
+
+    #[test]
+    fn it_heeds_heat() {
+        let mut ladder = Ladder::new(3, 0);
+        let costs = [25, 15, 5];
+        assert!(run(&mut ladder, &costs, Thermal::Nominal, 500).is_empty());
+        let steps = run(&mut ladder, &costs, Thermal::Serious, 500);
+        assert_eq!(ladder.rung(), 1);
+        assert_eq!(steps[0].1.reason, QualityReason::Thermal);
+        let steps = run(&mut ladder, &costs, Thermal::Critical, 500);
+        assert_eq!((steps.len(), steps[0].0, ladder.rung()), (1, 0, 2));
+        run(&mut ladder, &costs, Thermal::Nominal, 500);
+        assert_eq!(ladder.rung(), 0);
+    }
+
+    #[test]
+    fn the_caller_may_forbid_and_choose() {
+        let mut ladder = Ladder::new(3, 0);
+        let slow = Duration::from_secs(1);
+        for _ in 0..100 {
+            let fixed = ladder.observe(slow, Some(PERIOD), Thermal::Critical, Quality::Fixed(0));
+            assert_eq!(fixed, None);
+        }
+        let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
+        assert_eq!(
+            asked.map(|c| (c.to, c.reason)),
+            Some((2, QualityReason::Asked))
+        );
+        // Without a target rate there is nothing to hold.
+        for _ in 0..100 {
+            assert_eq!(
+                ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive),
+                None
+            );
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! What a session has done so far, and how fast.
+
+use super::event::DropReason;
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// Results over which rates and times are averaged.
+const RECENT: usize = 30;
+
+/// How many frames were dropped for each reason.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Drops {
+    /// [`DropReason::Superseded`].
+    pub superseded: u64,
+    /// [`DropReason::AboveTargetRate`].
+    pub above_target_rate: u64,
+    /// [`DropReason::Paused`].
+    pub paused: u64,
+    /// [`DropReason::Reset`].
+    pub reset: u64,
+    /// [`DropReason::Closed`].
+    pub closed: u64,
+}
+
+impl Drops {
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.superseded + self.above_target_rate + self.paused + self.reset + self.closed
+    }
+
+    pub(super) fn count(&mut self, reason: DropReason) {
+        *match reason {
+            DropReason::Superseded => &mut self.superseded,
+            DropReason::AboveTargetRate => &mut self.above_target_rate,
+            DropReason::Paused => &mut self.paused,
+            DropReason::Reset => &mut self.reset,
+            DropReason::Closed => &mut self.closed,
+        } += 1;
+    }
+}
+
+/// How many frames came and what became of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Counts {
+    pub(super) submitted: u64,
+    pub(super) processed: u64,
+    pub(super) failed: u64,
+    pub(super) refused: u64,
+    pub(super) dropped: Drops,
+}
+
+impl Counts {
+    /// Frames that were submitted and of which nothing is known yet.
+    pub(super) fn pending(&self) -> u64 {
+        self.submitted - self.processed - self.failed - self.refused - self.dropped.total()
+    }
+}
+
+/// How long each stage of a frame took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FrameTimes {
+    /// Colour: turned, converted, resized.
+    pub colour: Duration,
+    /// Depth: read, aligned, steadied, refined.
+    pub depth: Duration,
+    /// From the frame to the midpoint hologram.
+    pub method: Duration,
+    /// From the midpoint to the modulator.
+    pub propagate: Duration,
+    /// From the field to levels.
+    pub encode: Duration,
+}
+
+impl FrameTimes {
+    /// All stages together.
+    pub fn total(&self) -> Duration {
+        self.stages().into_iter().map(|(_, time)| time).sum()
+    }
+
+    /// Each stage and its name, in their order.
+    pub fn stages(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("colour", self.colour),
+            ("depth", self.depth),
+            ("method", self.method),
+            ("propagate", self.propagate),
+            ("encode", self.encode),
+        ]
+    }
+}
+
+/// What runs the frames.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct BackendReport {
+    /// Its name: an instruction set, or "tract".
+    pub name: String,
+    /// Why this one.
+    pub why: String,
+}
+
+/// A session's statistics at one moment. Every frame that was submitted is counted once more: `submitted` =
+/// `processed` + `failed` + `refused` + `dropped` + `pending`.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Statistics {
+    /// Frames that came.
+    pub submitted: u64,
+    /// Frames that became holograms.
+    pub processed: u64,
+    /// Frames that could not be processed.
+    pub failed: u64,
+    /// Frames that were not let in: late ones, or after the session was closed.
+    pub refused: u64,
+    /// Frames that were dropped.
+    pub dropped: Drops,
+    /// Frames that wait or are being processed.
+    pub pending: u64,
+    /// Holograms a second, over the last 30; 0 before the second.
+    pub rate_hz: f64,
+    /// Mean times of the stages, over the last 30 holograms.
+    pub times: FrameTimes,
+    /// What runs the frames.
+    pub backend: BackendReport,
+    /// The rung of the ladder, 0 the best.
+    pub rung: usize,
+    /// How often the listener panicked.
+    pub listener_panics: u64,
+}
+
+/// The times of recent frames.
+#[derive(Debug, Default)]
+pub(super) struct Recent {
+    frames: VecDeque<(Instant, FrameTimes)>,
+    pub(super) backend: BackendReport,
+    pub(super) rung: usize,
+    pub(super) listener_panics: u64,
+}
+
+impl Recent {
+    pub(super) fn new(backend: BackendReport, rung: usize) -> Self {
+        Recent {
+            backend,
+            rung,
+            ..Recent::default()
+        }
+    }
+
+    pub(super) fn push(&mut self, done: Instant, times: FrameTimes) {
+        if self.frames.len() == RECENT {
+            self.frames.pop_front();
+        }
+        self.frames.push_back((done, times));
+    }
+
+    pub(super) fn statistics(&self, counts: Counts) -> Statistics {
+        let count = self.frames.len() as u32;
+        let mean = |stage: fn(&FrameTimes) -> Duration| {
+            let sum: Duration = self.frames.iter().map(|(_, times)| stage(times)).sum();
+            sum / count.max(1)
+        };
+        let rate_hz = match (self.frames.front(), self.frames.back()) {
+            (Some(first), Some(last)) if count > 1 && last.0 > first.0 => {
+                f64::from(count - 1) / (last.0 - first.0).as_secs_f64()
+            }
+            _ => 0.0,
+        };
+        Statistics {
+            submitted: counts.submitted,
+            processed: counts.processed,
+            failed: counts.failed,
+            refused: counts.refused,
+            dropped: counts.dropped,
+            pending: counts.pending(),
+            rate_hz,
+            times: FrameTimes {
+                colour: mean(|t| t.colour),
+                depth: mean(|t| t.depth),
+                method: mean(|t| t.method),
+                propagate: mean(|t| t.propagate),
+                encode: mean(|t| t.encode),
+            },
+            backend: self.backend.clone(),
+            rung: self.rung,
+            listener_panics: self.listener_panics,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_and_times_are_of_recent_frames() {
+        let mut recent = Recent::default();
+        let start = Instant::now();
+        assert_eq!(recent.statistics(Counts::default()).rate_hz, 0.0);
+        for frame in 0..100 {
+            let times = FrameTimes {
+                method: Duration::from_millis(if frame < 70 { 1000 } else { 10 }),
+                ..FrameTimes::default()
+            };
+            recent.push(start + Duration::from_millis(20 * frame), times);
+        }
+        let statistics = recent.statistics(Counts::default());
+        assert!((statistics.rate_hz - 50.0).abs() < 1e-9);
+        assert_eq!(statistics.times.method, Duration::from_millis(10));
+        assert_eq!(statistics.times.total(), Duration::from_millis(10));
+    }
+}

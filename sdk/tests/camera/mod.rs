@@ -1,0 +1,211 @@
+//! A camera for tests: frames of a synthetic scene in every format, with strides and gaps as they come.
+#![allow(dead_code)]
+
+use phasefront::Method;
+use phasefront::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
+use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane, YuvEncoding, YuvMatrix};
+use phasefront::session::SessionOptions;
+use phasefront::{Display, Network, Result};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::sync::Arc;
+
+/// Every colour format.
+pub(crate) fn colour_formats() -> Vec<ColourFormat> {
+    let mut formats = vec![ColourFormat::Rgba, ColourFormat::Bgra, ColourFormat::Rgb];
+    for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
+        for video_range in [false, true] {
+            let encoding = YuvEncoding {
+                matrix,
+                video_range,
+            };
+            formats.extend([ColourFormat::Nv12(encoding), ColourFormat::Yuv420(encoding)]);
+        }
+    }
+    formats
+}
+
+/// Every depth format.
+pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
+    DepthFormat::MetresF32,
+    DepthFormat::MetresF16,
+    DepthFormat::DisparityF32,
+    DepthFormat::DisparityF16,
+    DepthFormat::MillimetresU16,
+    DepthFormat::AndroidDepth16,
+    DepthFormat::NormalizedU8,
+    DepthFormat::NormalizedU16,
+];
+
+/// Memory of one plane.
+pub(crate) struct Memory {
+    pub(crate) bytes: Vec<u8>,
+    pub(crate) row_stride: usize,
+    pub(crate) pixel_stride: usize,
+}
+
+impl Memory {
+    /// Bytes at random for (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and after rows, and
+    /// not one byte behind the last pixel.
+    pub(crate) fn random(
+        random: &mut ChaCha8Rng,
+        (height, width): (usize, usize),
+        pixel: usize,
+        gap: usize,
+    ) -> Self {
+        let pixel_stride = pixel + gap;
+        let row_stride = width * pixel_stride + gap;
+        let length = (height - 1) * row_stride + (width - 1) * pixel_stride + pixel;
+        Memory {
+            bytes: (0..length).map(|_| random.random()).collect(),
+            row_stride,
+            pixel_stride,
+        }
+    }
+
+    pub(crate) fn plane(&self) -> Plane<'_> {
+        Plane::new(&self.bytes, self.row_stride, self.pixel_stride)
+    }
+}
+
+/// An image of noise.
+pub(crate) struct Noise {
+    pub(crate) format: ColourFormat,
+    pub(crate) shape: (usize, usize),
+    pub(crate) planes: Vec<Memory>,
+}
+
+impl Noise {
+    pub(crate) fn new(
+        seed: u64,
+        format: ColourFormat,
+        (height, width): (usize, usize),
+        gap: usize,
+    ) -> Self {
+        let random = &mut ChaCha8Rng::seed_from_u64(seed);
+        let half = (height.div_ceil(2), width.div_ceil(2));
+        let planes: &[((usize, usize), usize)] = match format {
+            ColourFormat::Rgb => &[((height, width), 3)],
+            ColourFormat::Nv12(_) => &[((height, width), 1), (half, 2)],
+            ColourFormat::Yuv420(_) => &[((height, width), 1), (half, 1), (half, 1)],
+            _ => &[((height, width), 4)],
+        };
+        Noise {
+            format,
+            shape: (height, width),
+            planes: (planes.iter())
+                .map(|(shape, pixel)| Memory::random(random, *shape, *pixel, gap))
+                .collect(),
+        }
+    }
+
+    pub(crate) fn image(&self) -> Result<ColourImage<'_>> {
+        let planes: Vec<_> = self.planes.iter().map(Memory::plane).collect();
+        ColourImage::new(self.format, self.shape.1, self.shape.0, &planes)
+    }
+}
+
+/// A scene: a bright square at 1 m before a wall that runs from 2 m to 3 m.
+pub(crate) struct Scene {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) rgba: Vec<u8>,
+    pub(crate) metres: Vec<f32>,
+}
+
+impl Scene {
+    /// The square starts `at` pixels from the left.
+    pub(crate) fn new(height: usize, width: usize, at: usize) -> Self {
+        let square = |x: usize, y: usize| {
+            (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y)
+        };
+        let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        Scene {
+            width,
+            height,
+            rgba: pixels()
+                .flat_map(|(x, y)| match square(x, y) {
+                    true => [250, 200, 40, 255],
+                    false => [30, (x * 255 / width) as u8, 90, 255],
+                })
+                .collect(),
+            metres: pixels()
+                .map(|(x, y)| match square(x, y) {
+                    true => 1.0,
+                    false => 2.0 + x as f32 / width as f32,
+                })
+                .collect(),
+        }
+    }
+
+    pub(crate) fn colour(&self) -> ColourImage<'_> {
+        let plane = Plane::new(&self.rgba, 4 * self.width, 4);
+        ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane])
+            .expect("a whole image")
+    }
+
+    /// The depth's bytes in `format`.
+    pub(crate) fn depth_bytes(&self, format: DepthFormat) -> Vec<u8> {
+        let half = |v: f32| half::f16::from_f32(v).to_le_bytes().to_vec();
+        let whole = |v: f32| (v as u16).to_le_bytes().to_vec();
+        let bytes = |m: &f32| match format {
+            DepthFormat::MetresF32 => m.to_le_bytes().to_vec(),
+            DepthFormat::MetresF16 => half(*m),
+            DepthFormat::DisparityF32 => (1.0 / m).to_le_bytes().to_vec(),
+            DepthFormat::DisparityF16 => half(1.0 / m),
+            DepthFormat::NormalizedU8 => vec![((m - 1.0) / 2.0 * 255.0) as u8],
+            DepthFormat::NormalizedU16 => whole((m - 1.0) / 2.0 * 65535.0),
+            // The confidence bits of full confidence are 0, so both millimetres are alike.
+            _ => whole(m * 1000.0),
+        };
+        self.metres.iter().flat_map(bytes).collect()
+    }
+}
+
+/// A depth image over `bytes`, tightly packed.
+pub(crate) fn depth(
+    bytes: &[u8],
+    format: DepthFormat,
+    width: usize,
+    height: usize,
+) -> DepthImage<'_> {
+    let pixel = format.pixel_bytes();
+    DepthImage::new(
+        format,
+        width,
+        height,
+        Plane::new(bytes, width * pixel, pixel),
+    )
+    .expect("a whole image")
+}
+
+/// A frame of `scene` with depth in metres over `metres`, its bytes.
+pub(crate) fn frame<'a>(timestamp_ns: u64, scene: &'a Scene, metres: &'a [u8]) -> CameraFrame<'a> {
+    let depth = depth(metres, DepthFormat::MetresF32, scene.width, scene.height);
+    CameraFrame::new(timestamp_ns, scene.colour(), depth)
+}
+
+/// `depth` with a confidence map of another size or the same.
+pub(crate) fn with_confidence<'a>(
+    depth: DepthImage<'a>,
+    map: &'a [u8],
+    width: usize,
+    height: usize,
+) -> Result<DepthImage<'a>> {
+    depth.with_confidence(
+        ConfidenceFormat::U8,
+        width,
+        height,
+        Plane::new(map, width, 1),
+    )
+}
+
+/// A small display and the shipped network.
+pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
+    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
+    let method = Method::Network(Arc::new(network.expect("a hologram network")));
+    let display = Display::from_toml(&format!(
+        "width = {width}\nheight = {height}\noffset_mm = 2"
+    ));
+    SessionOptions::new(display.expect("a display"), method).expect("options")
+}

@@ -1,0 +1,87 @@
+//! Each colour format, fast against naive: random strides, odd sizes, every orientation, crops both ways.
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+
+use camera::{Noise, colour_formats};
+use phasefront::frame::{ColourPlan, Orientation, Rotation, reference};
+use rand::{RngExt, SeedableRng};
+
+fn orientations() -> impl Iterator<Item = Orientation> {
+    [
+        Rotation::None,
+        Rotation::Clockwise90,
+        Rotation::Half,
+        Rotation::Clockwise270,
+    ]
+    .into_iter()
+    .flat_map(|rotation| [false, true].map(|mirrored| Orientation { rotation, mirrored }))
+}
+
+#[test]
+fn every_format_converts_as_the_definition_says() {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    for format in colour_formats() {
+        for orientation in orientations() {
+            for round in 0..6 {
+                let shape = (random.random_range(1..24), random.random_range(1..24));
+                let out = match round {
+                    0 => orientation.upright_shape(shape.0, shape.1),
+                    _ => (random.random_range(1..24), random.random_range(1..24)),
+                };
+                let noise = Noise::new(round, format, shape, random.random_range(0..4));
+                let image = noise.image().unwrap();
+                let naive = reference::convert(&image, orientation, out.0, out.1);
+                for threads in [1, 3] {
+                    let pool = rayon::ThreadPoolBuilder::new()
+                        .num_threads(threads)
+                        .build()
+                        .unwrap();
+                    let fast = pool.install(|| {
+                        let plan = ColourPlan::new(&image, orientation, out.0, out.1).unwrap();
+                        let mut rgb = vec![9.0; 3 * out.0 * out.1];
+                        plan.convert(&image, &mut rgb, &mut plan.scratch()).unwrap();
+                        rgb
+                    });
+                    let worst = (naive.iter().zip(&fast))
+                        .map(|(a, b)| (a - b).abs())
+                        .fold(0.0, f32::max);
+                    assert!(
+                        worst < 1e-5,
+                        "{format:?} {orientation:?} {shape:?} to {out:?}: {worst}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_refuses_an_image_of_another_size_or_format() {
+    let formats = colour_formats();
+    let noise = Noise::new(0, formats[0], (8, 10), 0);
+    let image = noise.image().unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), 4, 5).unwrap();
+    let mut rgb = vec![0.0; 60];
+    for (format, shape) in [
+        (formats[0], (8, 9)),
+        (formats[1], (8, 10)),
+        (formats[3], (8, 10)),
+    ] {
+        let other = Noise::new(0, format, shape, 0);
+        let refused = plan.convert(&other.image().unwrap(), &mut rgb, &mut plan.scratch());
+        assert!(
+            refused
+                .unwrap_err()
+                .to_string()
+                .contains("this plan takes Rgba of 10×8")
+        );
+    }
+    // Other strides are no other plan.
+    let wide = Noise::new(0, formats[0], (8, 10), 5);
+    assert!(
+        plan.convert(&wide.image().unwrap(), &mut rgb, &mut plan.scratch())
+            .is_ok()
+    );
+    assert!(ColourPlan::new(&image, Orientation::default(), 0, 5).is_err());
+}

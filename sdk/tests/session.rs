@@ -1,0 +1,476 @@
+//! Sessions end to end with the shipped network: formats, modes, bad frames, what is reported.
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+
+use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
+use phasefront::depth::align::{Cameras, Intrinsics};
+use phasefront::depth::image::DepthFormat;
+use phasefront::frame::{
+    Alignment, CameraFrame, ColourFormat, ColourImage, Orientation, Plane, Rotation,
+};
+use phasefront::output::{Layout, Output, Placement};
+use phasefront::session::{
+    Brightness, DropReason, Event, Quality, RunningMode, SessionOptions, Submission, Thermal,
+};
+use phasefront::slm::Response;
+use phasefront::{Display, Error, Session};
+use std::sync::mpsc;
+
+const W: usize = 64;
+const H: usize = 48;
+
+fn image_session() -> Session {
+    Session::new(options(W, H), RunningMode::Image).unwrap()
+}
+
+#[test]
+fn an_image_becomes_a_hologram_that_shows_it() {
+    let session = image_session();
+    session.warm_up().unwrap();
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let hologram = session.process(&frame(5, &scene, &metres)).unwrap();
+    assert_eq!(
+        (hologram.timestamp_ns(), hologram.shape(), hologram.rung()),
+        (5, (H, W), 0)
+    );
+    assert_eq!(hologram.levels().len(), 3 * H * W);
+    assert_eq!(hologram.plane(2).unwrap(), &hologram.levels()[2 * H * W..]);
+    assert!(hologram.plane(3).is_err());
+    let (near, far) = hologram.range_m().unwrap();
+    assert!(
+        (near - 1.0).abs() < 0.01 && (far - 3.0).abs() < 0.05,
+        "{near} {far}"
+    );
+    assert_eq!(hologram.valid_depth(), 1.0);
+    // A tap on the square focuses near, one on the wall's right end far.
+    let display = hologram.display();
+    assert!((hologram.z_at(0.3, 0.4) - display.z_of_depth(0.0)).abs() < 1e-4);
+    assert!(hologram.z_at(0.99, 0.9) < display.z_of_depth(0.9));
+    assert_eq!(hologram.z_at(-3.0, f64::NAN), hologram.z_at(0.0, 0.0));
+    // The square is bright and yellow in the preview, the wall is not.
+    let mut rgba = vec![0; 4 * 24 * 32];
+    hologram
+        .preview(hologram.z_at(0.3, 0.4), 24, 32, &mut rgba)
+        .unwrap();
+    let pixel = |x: usize, y: usize| &rgba[4 * (y * 32 + x)..][..4];
+    let (square, wall) = (pixel(9, 9), pixel(25, 20));
+    assert!(
+        square[0] > 150 && square[2] < 130 && square[3] == 255,
+        "{square:?}"
+    );
+    assert!(wall[0] < 100, "{wall:?}");
+    assert!(hologram.preview(0.0, 24, 32, &mut rgba[1..]).is_err());
+    let statistics = session.statistics();
+    assert_eq!((statistics.submitted, statistics.processed), (1, 1));
+    assert!(!statistics.backend.name.is_empty() && !statistics.backend.why.is_empty());
+    assert!(hologram.times().total() > std::time::Duration::ZERO);
+}
+
+#[test]
+fn every_depth_format_gives_the_same_hologram() {
+    let session = image_session();
+    let scene = Scene::new(H, W, 10);
+    let taps = [(0.3, 0.4), (0.1, 0.9), (0.5, 0.9), (0.9, 0.1)];
+    let mut first: Option<Vec<f64>> = None;
+    for format in DEPTH_FORMATS {
+        let bytes = scene.depth_bytes(format);
+        let frame = CameraFrame::new(1, scene.colour(), depth(&bytes, format, W, H));
+        let hologram = session.process(&frame).unwrap();
+        assert_eq!(hologram.range_m().is_some(), format.is_metric());
+        let z: Vec<f64> = taps.map(|(x, y)| hologram.z_at(x, y)).to_vec();
+        let first = first.get_or_insert_with(|| z.clone());
+        for (a, b) in z.iter().zip(first) {
+            assert!((a - *b).abs() < 1.5e-4, "{format:?}: {z:?}");
+        }
+    }
+}
+
+#[test]
+fn frames_are_turned_upright_colour_and_depth_together() {
+    let session = image_session();
+    let scene = Scene::new(H, W, 4);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let upright = session.process(&frame(1, &scene, &metres)).unwrap();
+    let turned = |values: &[u8], n: usize| -> Vec<u8> {
+        // Upside down: the last pixel comes first.
+        values.chunks_exact(n).rev().flatten().copied().collect()
+    };
+    let (rgba, depth_bytes) = (turned(&scene.rgba, 4), turned(&metres, 4));
+    let colour =
+        ColourImage::new(ColourFormat::Rgba, W, H, &[Plane::new(&rgba, 4 * W, 4)]).unwrap();
+    let depth = depth(&depth_bytes, DepthFormat::MetresF32, W, H);
+    let mut half = CameraFrame::new(2, colour, depth);
+    half.orientation = Orientation {
+        rotation: Rotation::Half,
+        mirrored: false,
+    };
+    assert_eq!(session.process(&half).unwrap().levels(), upright.levels());
+}
+
+#[test]
+fn cameras_apart_are_aligned() {
+    let session = image_session();
+    let scene = Scene::new(H, W, 20);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let camera = Intrinsics {
+        fx: 60.0,
+        fy: 60.0,
+        cx: 31.5,
+        cy: 23.5,
+    };
+    let mut frame = frame(1, &scene, &metres);
+    let mut cameras = Cameras::concentric(camera, camera);
+    frame.alignment = Alignment::Cameras(cameras);
+    let same = session.process(&frame).unwrap();
+    assert!(same.z_at(0.4, 0.4) > 2.5e-3);
+    // The colour camera stands 0.2 m to the left: it sees the square 12 pixels farther right.
+    cameras.translation_m = [0.2, 0.0, 0.0];
+    frame.alignment = Alignment::Cameras(cameras);
+    let moved = session.process(&frame).unwrap();
+    assert!(moved.z_at(0.65, 0.4) > 2.0e-3, "{}", moved.z_at(0.65, 0.4));
+}
+
+#[test]
+fn a_display_of_ten_bits_gets_words() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let eight = image_session().process(&frame(1, &scene, &metres)).unwrap();
+    let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 2\nbits = 10").unwrap();
+    let options = SessionOptions::new(display.clone(), options(W, H).ladder[0].method.clone());
+    let mut options = options.unwrap();
+    let session = Session::new(options.clone(), RunningMode::Image).unwrap();
+    let ten = session.process(&frame(1, &scene, &metres)).unwrap();
+    assert!(eight.words().is_none());
+    let words = ten.words().unwrap();
+    for ((word, upper), level) in words.iter().zip(ten.levels()).zip(eight.levels()) {
+        assert_eq!(word >> 2, u16::from(*upper));
+        // The rounding to 8 bits of the same phase, around the circle.
+        let apart = (i32::from(*word) - 4 * i32::from(*level)).rem_euclid(1024);
+        assert!(apart <= 3 || apart >= 1021, "{word} {level}");
+    }
+    let response = Response::linear(8).unwrap();
+    let output = Output::new(
+        &display,
+        (H, W),
+        &response,
+        Placement::centred(Layout::Grey16),
+    );
+    let mut bytes = vec![0; 2 * W * H];
+    output
+        .unwrap()
+        .write(ten.output_levels(), 1, &mut bytes)
+        .unwrap();
+    assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
+    options.response = Response::lut([0; 256]);
+    assert!(Session::new(options, RunningMode::Image).is_err());
+}
+
+/// Frames that cannot be used: each is named, and the next good frame works.
+#[test]
+fn bad_frames_are_named_and_harm_nothing() {
+    let session = Session::new(options(W, H), RunningMode::Video).unwrap();
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let good = |timestamp| session.process(&frame(timestamp, &scene, &metres));
+    let refused = |made: phasefront::Result<CameraFrame<'_>>| {
+        made.and_then(|frame| session.process(&frame))
+            .unwrap_err()
+            .to_string()
+    };
+    good(10).unwrap();
+    let rgba = Plane::new(&scene.rgba, 4 * W, 4);
+    let colour = |w, h, plane| ColourImage::new(ColourFormat::Rgba, w, h, &[plane]);
+    let whole = depth(&metres, DepthFormat::MetresF32, W, H);
+    let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
+    let zero = vec![0; 4 * W * H];
+    let unsure = vec![10; W * H];
+    let flat = vec![0; W * H];
+    let mut timestamp = 20;
+    let mut check = |made: phasefront::Result<CameraFrame<'_>>, word: &str| {
+        let message = refused(made);
+        assert!(message.contains(word), "{word}: {message}");
+        assert!(!message.contains('\n'));
+        timestamp += 100;
+        good(timestamp).unwrap();
+    };
+    let with_colour = |c: phasefront::Result<_>| c.map(|c| CameraFrame::new(11, c, whole));
+    check(
+        with_colour(colour(W, H + 1, rgba)),
+        "12288 bytes are too few",
+    );
+    check(
+        with_colour(colour(W, H, Plane::new(&scene.rgba, 4 * W - 1, 4))),
+        "row stride of 255",
+    );
+    check(
+        with_colour(colour(W, H, Plane::new(&scene.rgba, 4 * W, 3))),
+        "pixel stride of 3",
+    );
+    check(with_colour(colour(0, H, rgba)), "empty");
+    check(with_colour(colour(7680, 4320, rgba)), "too large");
+    let with_depth =
+        |t, d: phasefront::Result<_>| d.map(|d| CameraFrame::new(t, scene.colour(), d));
+    check(
+        with_depth(530, Ok(depth(&nan, DepthFormat::MetresF32, W, H))),
+        "no usable reading",
+    );
+    check(
+        with_depth(630, Ok(depth(&zero, DepthFormat::MetresF32, W, H))),
+        "no usable reading",
+    );
+    check(
+        with_depth(730, with_confidence(whole, &unsure, W, H)),
+        "confidence 0.25 or more",
+    );
+    check(
+        with_depth(830, with_confidence(whole, &unsure, W / 2, H)),
+        "confidence is 32×48",
+    );
+    check(
+        with_depth(930, Ok(depth(&zero, DepthFormat::MetresF32, W, H / 2))),
+        "aspect ratios differ",
+    );
+    let mut cameras = frame(1030, &scene, &metres);
+    let camera = Intrinsics {
+        fx: f64::NAN,
+        fy: 1.0,
+        cx: 0.0,
+        cy: 0.0,
+    };
+    cameras.alignment = Alignment::Cameras(Cameras::concentric(camera, camera));
+    check(Ok(cameras), "intrinsics of colour");
+    let camera = Intrinsics {
+        fx: 60.0,
+        fy: 60.0,
+        ..camera
+    };
+    let mut cameras = CameraFrame::new(
+        141,
+        scene.colour(),
+        depth(&flat, DepthFormat::NormalizedU8, W, H),
+    );
+    cameras.alignment = Alignment::Cameras(Cameras::concentric(camera, camera));
+    check(Ok(cameras), "has no metres");
+    check(Ok(frame(10, &scene, &metres)), "timestamps must rise");
+    check(
+        Ok(frame(timestamp_of(&session), &scene, &metres)),
+        "timestamps must rise",
+    );
+    let statistics = session.statistics();
+    assert_eq!(statistics.pending, 0);
+    // Two late frames, and the one that asked for the last timestamp.
+    assert_eq!(statistics.refused, 3);
+    assert_eq!(
+        statistics.submitted,
+        statistics.processed + statistics.failed + statistics.refused
+    );
+    session.reset();
+    good(1).unwrap();
+}
+
+/// The last timestamp taken, from the refusal of an old one.
+fn timestamp_of(session: &Session) -> u64 {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    match session.process(&frame(0, &scene, &metres)) {
+        Err(Error::Timestamp { last_ns, .. }) => last_ns,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn modes_pause_and_close_are_kept_to() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let frame = |t| frame(t, &scene, &metres);
+    let image = image_session();
+    // Without a past, timestamps do not matter and equal frames are equal.
+    let (a, b) = (
+        image.process(&frame(9)).unwrap(),
+        image.process(&frame(3)).unwrap(),
+    );
+    assert_eq!(a.levels(), b.levels());
+    assert!(
+        image
+            .submit(&frame(1))
+            .unwrap_err()
+            .to_string()
+            .contains("not live")
+    );
+    image.pause();
+    assert!(
+        image
+            .process(&frame(1))
+            .unwrap_err()
+            .to_string()
+            .contains("paused")
+    );
+    image.resume();
+    image.process(&frame(1)).unwrap();
+    image.close();
+    assert!(
+        image
+            .process(&frame(1))
+            .unwrap_err()
+            .to_string()
+            .contains("closed")
+    );
+    assert_eq!(a.levels().len(), 3 * W * H);
+    let live = Session::new(options(W, H), RunningMode::Live(Box::new(|_| {}))).unwrap();
+    assert!(
+        live.process(&frame(1))
+            .unwrap_err()
+            .to_string()
+            .contains("live")
+    );
+    live.close();
+    assert!(
+        live.submit(&frame(1))
+            .unwrap_err()
+            .to_string()
+            .contains("closed")
+    );
+    live.close();
+}
+
+#[test]
+fn a_live_session_answers_or_drops_every_frame() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
+    let (sender, events) = mpsc::channel();
+    let listener = move |event| sender.send(event).unwrap();
+    let session = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    // One at a time, every frame is answered.
+    for timestamp in 1..=5 {
+        assert_eq!(
+            session.submit(&frame(timestamp, &scene, &metres)).unwrap(),
+            Submission::Queued
+        );
+        match events.recv().unwrap() {
+            Event::Hologram(hologram) => assert_eq!(hologram.timestamp_ns(), timestamp),
+            other => panic!("{other:?}"),
+        }
+    }
+    // A frame without depth fails, and the next works.
+    let blind = CameraFrame::new(6, scene.colour(), depth(&nan, DepthFormat::MetresF32, W, H));
+    session.submit(&blind).unwrap();
+    match events.recv().unwrap() {
+        Event::Failed {
+            timestamp_ns: 6,
+            error,
+        } => assert!(error.to_string().contains("no usable")),
+        other => panic!("{other:?}"),
+    }
+    // Late ones are refused, and the next works.
+    for late in [6, 2] {
+        let refused = session.submit(&frame(late, &scene, &metres));
+        assert_eq!(
+            refused,
+            Err(Error::Timestamp {
+                given_ns: late,
+                last_ns: 6
+            })
+        );
+    }
+    session.pause();
+    let paused = session.submit(&frame(7, &scene, &metres)).unwrap();
+    assert_eq!(paused, Submission::Dropped(DropReason::Paused));
+    session.resume();
+    // A burst: the newest is answered, the others are dropped for it.
+    let last = 100;
+    for timestamp in 8..=last {
+        session.submit(&frame(timestamp, &scene, &metres)).unwrap();
+    }
+    let (mut done, mut superseded, mut paused) = (0, 0, 0);
+    loop {
+        match events.recv().unwrap() {
+            Event::Hologram(hologram) => {
+                done += 1;
+                if hologram.timestamp_ns() == last {
+                    break;
+                }
+            }
+            Event::Dropped {
+                reason: DropReason::Superseded,
+                ..
+            } => superseded += 1,
+            Event::Dropped {
+                timestamp_ns: 7,
+                reason: DropReason::Paused,
+            } => paused += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!((done + superseded, paused), (93, 1));
+    session.reset();
+    session.submit(&frame(1, &scene, &metres)).unwrap();
+    session.close();
+    let statistics = session.statistics();
+    assert_eq!(statistics.submitted, 5 + 1 + 2 + 1 + 93 + 1);
+    assert_eq!(
+        (statistics.refused, statistics.failed, statistics.pending),
+        (2, 1, 0)
+    );
+    assert_eq!(statistics.dropped.superseded, superseded);
+    let told = events.try_iter().count() as u64;
+    assert_eq!(told, 1, "the last frame is answered or dropped, once");
+    assert_eq!(
+        statistics.submitted,
+        statistics.processed + statistics.failed + statistics.refused + statistics.dropped.total()
+    );
+}
+
+#[test]
+fn a_listener_may_panic_and_may_close() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let (sender, events) = mpsc::channel();
+    let session = std::sync::Arc::new(std::sync::OnceLock::<Session>::new());
+    let listener = {
+        let session = session.clone();
+        move |event: Event| {
+            let Event::Hologram(hologram) = event else {
+                return;
+            };
+            let session = session.get().unwrap();
+            sender.send(hologram.timestamp_ns()).unwrap();
+            match hologram.timestamp_ns() {
+                1 => panic!("at the first"),
+                _ => session.close(),
+            }
+        }
+    };
+    let live = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let live = session.get_or_init(|| live);
+    live.submit(&frame(1, &scene, &metres)).unwrap();
+    assert_eq!(events.recv().unwrap(), 1);
+    live.submit(&frame(2, &scene, &metres)).unwrap();
+    assert_eq!(events.recv().unwrap(), 2);
+    live.close();
+    assert_eq!(live.statistics().listener_panics, 1);
+    assert_eq!(live.statistics().processed, 2);
+}
+
+#[test]
+fn options_that_cannot_be_meant_are_named() {
+    let refuse = |change: &dyn Fn(&mut phasefront::session::SessionOptions), word: &str| {
+        let mut options = options(W, H);
+        change(&mut options);
+        let refused = Session::new(options, RunningMode::Image).map(|_| ());
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains(word), "{word}: {message}");
+    };
+    refuse(&|o| o.ladder.clear(), "ladder");
+    refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
+    refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
+    refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
+    refuse(&|o| o.brightness = Brightness::Fixed(0.0), "full light");
+    refuse(&|o| o.depth.least_confidence = 2.0, "confidence");
+    let session = image_session();
+    assert!(session.set_quality(Quality::Fixed(7)).is_err());
+    session.set_quality(Quality::Fixed(0)).unwrap();
+    session.set_thermal(Thermal::Critical);
+}

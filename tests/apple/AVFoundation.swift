@@ -1,0 +1,3 @@
+@_exported import CoreMedia
+
+open class AVDepthData: NSObject { public var depthDataMap: CVPixelBuffer { fatalError() } }

@@ -1,0 +1,22 @@
+@_exported import Foundation
+
+public struct OSLogPrivacy: Sendable { public static let `public` = OSLogPrivacy() }
+public struct OSLogMessage: ExpressibleByStringInterpolation, ExpressibleByStringLiteral {
+    public struct StringInterpolation: StringInterpolationProtocol {
+        public init(literalCapacity: Int, interpolationCount: Int) {}
+        public mutating func appendLiteral(_: String) {}
+        public mutating func appendInterpolation(_: @autoclosure @escaping () -> String, privacy: OSLogPrivacy) {}
+    }
+    public init(stringInterpolation: StringInterpolation) {}
+    public init(stringLiteral: String) {}
+}
+public struct Logger: Sendable {
+    public init(subsystem: String, category: String) {}
+    public func error(_: OSLogMessage) {}
+    public func warning(_: OSLogMessage) {}
+    public func info(_: OSLogMessage) {}
+    public func debug(_: OSLogMessage) {}
+}
+extension ProcessInfo {
+    public enum ThermalState: Int, Sendable { case nominal, fair, serious, critical }
+}

@@ -1,0 +1,39 @@
+# Sourced by the tests of the bindings: the library as it ships, and the way to say that a test cannot run.
+# shellcheck shell=bash
+
+cache="${XDG_CACHE_HOME:-$HOME/.cache}/phasefront"
+export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$cache/target}"
+mkdir -p "$cache"
+
+need() { command -v "$1" >/dev/null; }
+
+# Ends the test with 77: it cannot run here, and $1 says why.
+cannot() {
+    echo "$1"
+    exit 77
+}
+
+# Runs a command as root, or fails.
+as_root() {
+    if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
+}
+
+# Installs Debian packages, or fails.
+install() {
+    need apt-get || return 1
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1 && return
+    as_root apt-get update -qq >/dev/null 2>&1
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1
+}
+
+# Builds the whole workspace, for a part of it alone has other features and builds tract anew (10 minutes; never use -p).
+# Runs the conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`.
+build_library() {
+    need cargo || PATH="$HOME/.cargo/bin:$PATH"
+    need cargo || cannot 'cargo is missing; see https://rustup.rs'
+    export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"
+    cargo build --release --quiet --workspace || exit 1
+    cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
+    library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
+    generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"
+}
