@@ -3,6 +3,7 @@
 use super::flags::{DisplayFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::Args;
+use phasefront::{Method, Sweep};
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
 use phasefront_lab::{Error, Result};
@@ -12,7 +13,7 @@ use std::time::Duration;
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network
+    /// Layers of the network; 0 is the plane sweep
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
     /// Its numbers
@@ -40,13 +41,16 @@ impl Bench {
             self.layers.is_none_or(|layers| layers == built.layers)
                 && self.precision.is_none_or(|p| p.is_int8() == built.int8)
         };
-        let networks: Vec<_> = match &self.network {
-            Some(file) => vec![models::network(file, false)?],
+        let mut methods: Vec<_> = match &self.network {
+            Some(file) => vec![Method::trained(models::network(file, false)?)],
             None => (BUILT_IN.iter().filter(wanted))
-                .map(models::built_in)
+                .map(|built| Ok(Method::trained(models::built_in(built)?)))
                 .collect::<Result<_>>()?,
         };
-        if networks.is_empty() {
+        if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
+            methods.push(Method::Sweep(Sweep::for_display(&display)));
+        }
+        if methods.is_empty() {
             return Err(Error::Input(
                 "no network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
             ));
@@ -65,10 +69,10 @@ impl Bench {
             |threads| vec![threads],
         );
         let mut cases = Vec::new();
-        for network in &networks {
+        for method in &methods {
             for &size in &sizes {
                 cases.extend(threads.iter().map(|&threads| Case {
-                    network,
+                    method,
                     size,
                     threads,
                 }));
@@ -92,25 +96,26 @@ impl Bench {
 
 fn table(machine: &Machine, rows: &[Row]) -> String {
     let mut text = format!("{}, {} cores\n\n", machine.cpu, machine.cores);
-    text += "| layers | precision | kernels | size | threads | network ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(0.0);
         text += &format!(
-            "\n| {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {:.0} | {} | {} |",
+            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} |",
+            row.method,
             row.layers,
             row.precision,
             row.kernels,
             row.width,
             row.height,
             row.threads,
-            stage("network"),
+            stage(row.method),
             stage("propagate"),
             stage("encode"),
             row.total_ms,
             row.spread_ms[0],
             row.spread_ms[1],
-            row.gmac_per_s,
+            whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.peak_memory_mb),
         );

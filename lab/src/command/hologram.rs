@@ -27,9 +27,9 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Layers of a network that comes along (8, 15), or an ONNX file
-    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
-    network: String,
+    /// A network that comes along, or an ONNX file [default: 8; seeded-6 with --method seeded]
+    #[arg(long, value_name = "8|15|seeded-6|FILE")]
+    network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
@@ -63,6 +63,8 @@ enum Method {
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, any display
     Sweep,
+    /// The plane sweep corrected by a network that was trained on it
+    Seeded,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -154,20 +156,28 @@ impl Hologram {
             None => Method::Network,
         });
         let made = match (method, &self.ldi) {
-            (Method::Network, None) => {
-                let network = models::network(&self.network, self.precision.is_int8())?;
-                let method = phasefront::Method::Network(network);
-                self.by_pipeline("network", method, &display.display, encoding, response)?
+            (Method::Network | Method::Seeded, None) => {
+                let (stage, usual) = match method {
+                    Method::Seeded => ("seeded", models::SEEDED),
+                    _ => ("network", "8"),
+                };
+                let name = self.network.as_deref().unwrap_or(usual);
+                let network = models::network(name, self.precision.is_int8())?;
+                let method = match method {
+                    Method::Seeded => phasefront::Method::Seeded(network),
+                    _ => phasefront::Method::trained(network),
+                };
+                self.by_pipeline(stage, method, &display.display, encoding, response)?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
                 self.by_pipeline("sweep", method, &display.display, encoding, response)?
             }
-            (Method::Network | Method::Sweep, Some(dir)) => {
+            (Method::Network | Method::Sweep | Method::Seeded, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network and sweep take --rgb and --depth; for a layered depth image use --method layers or points",
+                    "--method network, sweep and seeded take --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
             (Method::Layers | Method::Points, source) => {

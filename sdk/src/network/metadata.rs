@@ -15,6 +15,8 @@ pub enum InputKind {
         /// How many layers.
         layers: usize,
     },
+    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see [`crate::seeded`].
+    Seeded,
     /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,
 }
@@ -25,6 +27,7 @@ impl InputKind {
         match self {
             InputKind::Rgbd => 4,
             InputKind::Ldi { layers } => 4 * layers,
+            InputKind::Seeded => 10,
             InputKind::Field => 6,
         }
     }
@@ -32,6 +35,7 @@ impl InputKind {
     fn from_name(name: &str) -> Option<InputKind> {
         match name.as_bytes() {
             b"rgbd" => Some(InputKind::Rgbd),
+            b"seeded" => Some(InputKind::Seeded),
             b"field" => Some(InputKind::Field),
             [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
                 layers: usize::from(n - b'0'),
@@ -46,6 +50,7 @@ impl std::fmt::Display for InputKind {
         match self {
             InputKind::Rgbd => f.write_str("rgbd"),
             InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
+            InputKind::Seeded => f.write_str("seeded"),
             InputKind::Field => f.write_str("field"),
         }
     }
@@ -68,9 +73,14 @@ pub struct TrainedDisplay {
 pub(super) fn read(
     metadata: &[StringStringEntryProto],
 ) -> Result<(InputKind, Head, TrainedDisplay)> {
-    let input = text(metadata, "input", "'rgbd', 'ldi5' or 'field'")?;
-    let input = InputKind::from_name(input)
-        .ok_or_else(|| wrong("input", input, "'rgbd', 'ldi2' to 'ldi9' or 'field'"))?;
+    let input = text(metadata, "input", "'rgbd', 'seeded', 'ldi5' or 'field'")?;
+    let input = InputKind::from_name(input).ok_or_else(|| {
+        wrong(
+            "input",
+            input,
+            "'rgbd', 'seeded', 'ldi2' to 'ldi9' or 'field'",
+        )
+    })?;
     let heads = "'amplitude-phase' or 'real-imaginary'";
     let head = text(metadata, "head", heads)?;
     let head = [Head::AmplitudePhase, Head::RealImaginary]
