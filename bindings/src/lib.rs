@@ -18,14 +18,14 @@ mod options;
 mod session;
 mod statistics;
 
-pub use display::Display;
+pub use display::{Display, display_from_toml};
 pub use error::PhasefrontError;
 pub use frame::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
     FrameInfo, Intrinsics, Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
 };
 pub use hologram::{HologramInfo, RawHologram, RawImage};
-pub use log::{LogLevel, LogListener};
+pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{Network, NetworkInfo};
 pub use options::{
     Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,

@@ -221,22 +221,34 @@ impl RawSession {
 
     /// Forgets all frames so far; the next, of any timestamp, is the first again.
     pub fn reset(&self) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.reset()))
+        guard(|| {
+            self.session()?.reset();
+            Ok(())
+        })
     }
 
     /// Takes no frames until [`Self::resume`].
     pub fn pause(&self) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.pause()))
+        guard(|| {
+            self.session()?.pause();
+            Ok(())
+        })
     }
 
     /// Takes frames again.
     pub fn resume(&self) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.resume()))
+        guard(|| {
+            self.session()?.resume();
+            Ok(())
+        })
     }
 
     /// Says how hot the device is.
     pub fn set_thermal(&self, thermal: Thermal) -> Result<(), PhasefrontError> {
-        guard(|| Ok(self.session()?.set_thermal(thermal.into())))
+        guard(|| {
+            self.session()?.set_thermal(thermal.into());
+            Ok(())
+        })
     }
 
     /// Allows or forbids steps on the ladder.

@@ -1,6 +1,8 @@
 //! How fast a frame is on this machine: every stage of the pipeline, medians of many frames, beside the
 //! machine's own peak measured in the same run.
 
+pub mod gpu;
+
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;

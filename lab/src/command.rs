@@ -2,6 +2,7 @@
 //! the laboratory. Flags that several commands share are in [`flags`].
 
 mod bench;
+mod calibrate;
 mod compare;
 mod dataset;
 mod evaluate;
@@ -45,6 +46,8 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
     Video(video::Video),
+    #[command(subcommand)]
+    Calibrate(calibrate::Calibrate),
 }
 
 impl Phasefront {
@@ -72,6 +75,7 @@ impl Phasefront {
                 let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
+            Command::Calibrate(command) => command.run(json),
         })
     }
 }

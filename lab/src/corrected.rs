@@ -9,7 +9,10 @@
 //! N·M propagations at most, and N²/2 only where every plane has a kernel of its own. The way back
 //! to the start and on to z = 0 is one propagation, from the front plane to z = 0.
 //!
-//! Where kernels come from is not said here: they are taken as they are.
+//! Kernels come from the calibrated coefficients of a display, [`Correction::of_aberrations`], or are taken as they
+//! are. What differs over the frame is [`spatial`]'s.
+
+pub mod spatial;
 
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
@@ -19,10 +22,14 @@ use num_complex::{Complex32, Complex64};
 use phasefront::Display;
 use phasefront::wave::asm::{self, Padding, Transfer};
 use phasefront::wave::fft::Fft2;
+use phasefront::wave::zernike::Aberrations;
 use rayon::prelude::*;
 
 /// The most propagations of one colour: those of 512 planes with a kernel each.
 pub const MAX_PROPAGATIONS: usize = 512 * 512 / 2;
+
+/// What neighbouring kernels may differ by, radians: between two of unit magnitude the mean has cos(BLEND/2).
+pub const BLEND: f64 = 0.28;
 
 /// Correction kernels at calibrated distances; between two they are interpolated linearly, beyond the
 /// ends the last one holds.
@@ -110,6 +117,68 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
+    /// The kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) cut into `planes`. Coefficients run
+    /// piecewise linearly over z, kernels between neighbours here; so where coefficients change, distances are put
+    /// between the calibrated ones until neighbours differ by at most [`BLEND`] rad, which costs 1 % of the light
+    /// at most.
+    ///
+    /// # Errors
+    /// A volume whose reach, or light that the correction moves so far that it, cannot be padded.
+    pub fn of_aberrations(
+        aberrations: &Aberrations,
+        (height, width): (usize, usize),
+        planes: usize,
+        display: &Display,
+    ) -> Result<Self> {
+        let pitch_m = display.pitch_m();
+        let (near, far) = (display.z_of_depth(0.0), display.z_of_depth(1.0));
+        let mut z_m = vec![far];
+        let one = aberrations.constant().is_some();
+        let inside = aberrations.calibrated().iter().map(|(z, _)| *z);
+        let ends = inside.filter(|z| far < *z && *z < near).chain([near]);
+        for end in ends.filter(|_| !one) {
+            let begin = z_m[z_m.len() - 1];
+            let (a, b) = (aberrations.at(begin), aberrations.at(end));
+            // The terms' largest values over the square of frequencies.
+            let most = [3.0, 1.0, 2.0, 4.0, 4.0];
+            let apart = (a.coefficients().iter().zip(b.coefficients()))
+                .map(|(a, b)| (0..5).map(|j| most[j] * (a[j] - b[j]).abs()).sum::<f64>())
+                .fold(0.0, f64::max);
+            let steps = (apart / BLEND).ceil().max(1.0) as usize;
+            z_m.extend((1..=steps).map(|i| begin + (end - begin) * i as f64 / steps as f64));
+        }
+        if z_m.len() > planes {
+            // Every plane has its own kernel then.
+            z_m = (0..planes)
+                .rev()
+                .map(|k| plane_z_m(k, planes, display))
+                .collect();
+        }
+        let reach_m = (aberrations.calibrated().iter())
+            .map(|(_, a)| a.reach_m(pitch_m))
+            .fold(0.0, f64::max);
+        let shape = padded_shape_with(height, width, display, reach_m)?;
+        let frequency = |k: usize, n: usize| {
+            let k = if 2 * k < n {
+                k as f64
+            } else {
+                k as f64 - n as f64
+            };
+            k / (n as f64 * pitch_m)
+        };
+        let kernels = (z_m.iter())
+            .map(|z| {
+                let aberration = aberrations.at(*z);
+                Array3::from_shape_fn((3, shape.0, shape.1), |(c, ky, kx)| {
+                    let (mu, nu) = (frequency(kx, shape.1), frequency(ky, shape.0));
+                    let phase = aberration.phase(c, mu, nu, pitch_m);
+                    Complex32::new(phase.cos() as f32, phase.sin() as f32)
+                })
+            })
+            .collect();
+        Self::new(z_m, kernels)
+    }
+
     /// (H', W').
     pub fn shape(&self) -> (usize, usize) {
         let (_, width, height) = self.kernels[0].dim();
@@ -135,10 +204,21 @@ impl Correction {
 /// # Errors
 /// A volume whose reach cannot be padded.
 pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(usize, usize)> {
+    padded_shape_with(height, width, display, 0.0)
+}
+
+/// [`padded_shape`] with room for light that a correction moves by up to `reach_m`.
+fn padded_shape_with(
+    height: usize,
+    width: usize,
+    display: &Display,
+    reach_m: f64,
+) -> Result<(usize, usize)> {
     let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
+    let more = (reach_m / display.pitch_m()).ceil() as usize;
     Ok(asm::padded_shape(
-        height,
-        width,
+        height.saturating_add(more),
+        width.saturating_add(more),
         display.pitch_m(),
         longest,
         display.volume_depth_m(),

@@ -5,14 +5,20 @@
 //! (L, H, W, 4), RGBA, front first, alpha 0 where there is no hit; `depth`, uint16 (L, H, W), d·65535;
 //! and `hologram`, complex64 (3, H, W), at the midpoint, carrier left out.
 //!
+//! For a display with an aberration the holograms are those of SM-LBM's correcting variant; a network trained on them
+//! corrects by itself.
+//!
 //! A pair is written beside its place and renamed into it, so that one that is there is whole. A data
 //! set is resumed by making it again: pairs that are there are kept. Shards write into one folder
 //! or into several that are joined by copying.
 
+use crate::calibrate::table::{self, AberrationFile, Entry};
+use crate::corrected::Correction;
+use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
-use crate::{scene, sm_lbm};
+use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::{NpzReader, NpzWriter};
 use num_complex::Complex32;
@@ -46,6 +52,9 @@ pub struct Manifest {
     pub display: Display,
     /// Which pairs are for what.
     pub splits: Splits,
+    /// The display's aberration, which the holograms correct; empty where they correct none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aberration: Vec<Entry>,
 }
 
 /// Half-open ranges of pair indices.
@@ -102,7 +111,16 @@ impl Manifest {
                 validation: [validation, test],
                 test: [test, scenes],
             },
+            aberration: Vec::new(),
         })
+    }
+
+    /// The same with holograms that correct `aberration`.
+    pub fn correcting(self, aberration: Option<&AberrationFile>) -> Self {
+        Manifest {
+            aberration: aberration.map_or_else(Vec::new, AberrationFile::entries),
+            ..self
+        }
     }
 
     /// Reads the manifest of the data set in `dir`.
@@ -133,6 +151,13 @@ impl Manifest {
     }
 }
 
+/// How holograms are made.
+enum GroundTruth {
+    Plain,
+    Corrected(Correction),
+    Spatial(SpatialAberrations),
+}
+
 /// Makes the pairs of `manifest` that are in `shard` (of all pairs, or i/n of them: those whose index is i
 /// modulo n) and not in `dir` yet. `made` hears of each that is there.
 ///
@@ -158,6 +183,18 @@ pub fn make(
         text.push(b'\n');
         files::write_atomically(&place, |file| file.write_all(&text))?;
     }
+    let (display, planes) = (&manifest.display, manifest.planes);
+    let ground_truth = match manifest.aberration.is_empty() {
+        true => GroundTruth::Plain,
+        false => match table::aberrations(&manifest.aberration)? {
+            AberrationFile::Spatial(all) => GroundTruth::Spatial(all),
+            AberrationFile::Uniform(all) => {
+                let shape = (manifest.size, manifest.size);
+                let correction = Correction::of_aberrations(&all, shape, planes, display)?;
+                GroundTruth::Corrected(correction)
+            }
+        },
+    };
     // In order, so that what a stopped run leaves is a beginning.
     let mine: Range<usize> = 0..manifest.scenes.saturating_sub(shard).div_ceil(shards);
     mine.par_bridge().try_for_each(|i| {
@@ -173,7 +210,16 @@ pub fn make(
                 manifest.ldi_layers,
             )?
             .quantized();
-            let hologram = sm_lbm::hologram(&ldi, &manifest.display, manifest.planes, &|_, _| {})?;
+            let quiet = |_: usize, _: usize| {};
+            let hologram = match &ground_truth {
+                GroundTruth::Plain => sm_lbm::hologram(&ldi, display, planes, &quiet)?,
+                GroundTruth::Corrected(correction) => {
+                    corrected::hologram(&ldi, display, planes, correction, &quiet)?
+                }
+                GroundTruth::Spatial(all) => {
+                    corrected::spatial::hologram(&ldi, display, planes, all, &quiet)?
+                }
+            };
             write_pair(&path, &ldi, &hologram)?;
         }
         made();

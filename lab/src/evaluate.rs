@@ -135,7 +135,7 @@ impl<'a> Method<'a> {
     ) -> Result<Self> {
         let name = name.into();
         let layers = match network.input() {
-            InputKind::Rgbd => 1,
+            InputKind::Rgbd | InputKind::RgbdXy => 1,
             InputKind::Seeded => return Self::seeded(name, network, size, display),
             InputKind::Ldi { layers } => layers,
             other => {
@@ -149,7 +149,12 @@ impl<'a> Method<'a> {
         let plan = network.plan(size, size)?;
         let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
-            let input = network_input(ldi, layers);
+            let mut input = network_input(ldi, layers);
+            if kind == InputKind::RgbdXy {
+                let place = |at: usize| (at as f32 + 0.5) / size as f32 - 0.5;
+                input.extend((0..size * size).map(|i| place(i % size)));
+                input.extend((0..size * size).map(|i| place(i / size)));
+            }
             let mut output = vec![0.0; plan.channels().1 * size * size];
             plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));

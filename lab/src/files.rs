@@ -3,17 +3,22 @@
 //!
 //! What is written is whole: it is written beside its place and renamed into it.
 
+use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
 use image::{DynamicImage, ImageReader};
 use ndarray::{Array2, Array3, ArrayView3};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use num_complex::Complex32;
-use phasefront::Display;
+use phasefront::encode::{Encoding, Scale};
 use phasefront::slm::Response;
+use phasefront::slm::per_pixel::PerPixel;
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Modulator};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::Arc;
 
 /// Name of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";
@@ -32,18 +37,27 @@ pub struct HologramInfo {
     /// The modulator's look-up table, if it is not linear: the level of each of 256 phase steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lut: Option<Vec<u8>>,
+    /// What else of a calibrated display it was made for, as the display's file names it: its view needs that file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub calibrated: Vec<String>,
 }
 
 impl HologramInfo {
-    /// The modulator's response.
+    /// The display as far as this says it.
     ///
     /// # Errors
-    /// A table that has not 256 entries.
-    pub fn response(&self) -> Result<Response> {
-        match &self.lut {
-            None => Ok(Response::linear(self.display.bits())?),
-            Some(lut) => Ok(Response::lut(lut_of(lut)?)),
+    /// A table that has not 256 entries, or a hologram for a display whose calibration is in files of its own.
+    pub fn display_file(&self) -> Result<DisplayFile> {
+        if !self.calibrated.is_empty() {
+            return Err(Error::Input(format!(
+                "made for a calibrated display ({}); give its file with --display",
+                self.calibrated.join(", ")
+            )));
         }
+        Ok(DisplayFile {
+            lut: self.lut.as_deref().map(lut_of).transpose()?,
+            ..DisplayFile::from(self.display.clone())
+        })
     }
 }
 
@@ -367,11 +381,92 @@ pub fn is_hologram(path: &Path) -> Result<bool> {
 pub struct DisplayFile {
     /// The physics.
     pub display: Display,
-    /// The modulator's table, where it is calibrated.
+    /// The modulator's table, where it is calibrated as a whole.
     pub lut: Option<[u8; 256]>,
+    /// The modulator's table, where it is calibrated pixel by pixel.
+    pub per_pixel: Option<Arc<PerPixel>>,
+    /// The laser's amplitude over the modulator.
+    pub laser: Option<Illumination>,
+    /// What corrects the display's aberrations.
+    pub aberration: Option<AberrationFile>,
 }
 
-/// Reads a display's TOML. A key `lut` names a text file of 256 levels, relative to it.
+impl From<Display> for DisplayFile {
+    fn from(display: Display) -> Self {
+        DisplayFile {
+            display,
+            lut: None,
+            per_pixel: None,
+            laser: None,
+            aberration: None,
+        }
+    }
+}
+
+impl DisplayFile {
+    /// The modulator's response.
+    ///
+    /// # Errors
+    /// None that a display that was read meets.
+    pub fn response(&self) -> Result<Response> {
+        Ok(match (&self.per_pixel, self.lut) {
+            (Some(table), _) => Response::PerPixel(table.clone()),
+            (None, Some(lut)) => Response::lut(lut),
+            (None, None) => Response::linear(self.display.bits())?,
+        })
+    }
+
+    /// The correction that is one for all depths and the whole frame, None where there is nothing to correct.
+    ///
+    /// # Errors
+    /// Aberrations that change over depth or over the frame, which only SM-LBM corrects.
+    pub fn constant_correction(&self) -> Result<Option<Aberration>> {
+        let constant = match &self.aberration {
+            None => return Ok(None),
+            Some(AberrationFile::Uniform(all)) => all.constant(),
+            Some(AberrationFile::Spatial(_)) => None,
+        };
+        match constant {
+            Some(correction) => Ok(Some(correction)),
+            None => Err(Error::Input(
+                "the display's aberration changes over depth or over the frame; --method layers corrects it, a network must be trained for it".into(),
+            )),
+        }
+    }
+
+    /// The way of (3, `height`, `width`) midpoint holograms to this display; the correction of aberrations is the caller's, as it
+    /// knows whether the hologram has it already.
+    ///
+    /// # Errors
+    /// As [`Modulator::new`].
+    pub fn modulator(
+        &self,
+        (height, width): (usize, usize),
+        encoding: Encoding,
+        scale: Scale,
+    ) -> Result<Modulator> {
+        let response = self.response()?;
+        let plan = Modulator::new(height, width, &self.display, encoding, scale, response)?;
+        Ok(match &self.laser {
+            Some(laser) => plan.with_illumination(laser.clone()),
+            None => plan,
+        })
+    }
+
+    /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
+    pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
+        let keys = [
+            ("per_pixel", phase_only && self.per_pixel.is_some()),
+            ("laser", phase_only && self.laser.is_some()),
+            ("aberration", self.aberration.is_some()),
+        ];
+        let there = keys.into_iter().filter(|(_, there)| *there);
+        there.map(|(key, _)| key.to_owned()).collect()
+    }
+}
+
+/// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of 256
+/// levels, and those of [`crate::calibrate::table`].
 ///
 /// # Errors
 /// A file that is missing or says what cannot be.
@@ -382,11 +477,16 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let text = read(path)?;
     let mut table: toml::Table = toml::from_str(&text)
         .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
-    let lut_path: Option<PathBuf> = match table.remove("lut") {
-        None => None,
-        Some(toml::Value::String(name)) => Some(path.with_file_name(name)),
-        Some(_) => return Err(Error::file(path, "lut must be the name of a file")),
+    let mut named = |key: &str| match table.remove(key) {
+        None => Ok(None),
+        Some(toml::Value::String(name)) => Ok(Some(path.with_file_name(name))),
+        Some(_) => Err(Error::file(
+            path,
+            format!("{key} must be the name of a file"),
+        )),
     };
+    let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
+    let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
     let display = Display::deserialize(table)
         .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
     let lut = match lut_path {
@@ -400,7 +500,33 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
             Some(lut_of(&levels).map_err(|e| Error::file(&path, e))?)
         }
     };
-    Ok(DisplayFile { display, lut })
+    let per_pixel = match per_pixel_path {
+        None => None,
+        Some(path) => {
+            let table = table::read_per_pixel(&path)?;
+            let (height, width) = table.shape();
+            if (height, width) != (display.height(), display.width()) {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "is for {width}×{height} pixels, the display has {}×{}; calibrate this display",
+                        display.width(),
+                        display.height()
+                    ),
+                ));
+            }
+            Some(Arc::new(table))
+        }
+    };
+    Ok(DisplayFile {
+        display,
+        lut,
+        per_pixel,
+        laser: laser_path.map(|p| table::read_laser(&p)).transpose()?,
+        aberration: aberration_path
+            .map(|p| table::read_aberrations(&p))
+            .transpose()?,
+    })
 }
 
 /// Whether the name of `path` ends in `.extension`.

@@ -1,6 +1,7 @@
 //! Ground truth, data sets, evaluation: what prepares a display or a network for the phone.
 
 pub mod bench;
+pub mod calibrate;
 pub mod corrected;
 pub mod dataset;
 pub mod depth_study;
@@ -8,6 +9,7 @@ pub mod error;
 pub mod evaluate;
 pub mod files;
 pub mod flicker;
+pub mod gpu;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
@@ -18,6 +20,7 @@ pub mod reconstruct;
 pub mod rgbd;
 pub mod scene;
 pub mod seeds;
+pub mod simulated_display;
 pub mod sm_lbm;
 pub mod study;
 pub mod video;

@@ -1,10 +1,12 @@
 //! Looking at hologram files: the amplitudes that an eye focused at z would see.
 
-use crate::error::Result;
-use crate::files::{Hologram, HologramInfo};
+use crate::calibrate::table::AberrationFile;
+use crate::error::{Error, Result};
+use crate::files::{DisplayFile, Hologram, HologramInfo};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::refocus::{Refocus, phase_only_field};
+use phasefront::wave::asm::Propagator;
 
 /// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
 pub const APERTURE_RADIUS: f64 = 1.0;
@@ -29,23 +31,62 @@ impl Hologram {
     /// The amplitudes at each of `z_m`, (3, H, W), against the middle of the volume, metres.
     ///
     /// # Errors
-    /// A z too far to be propagated to, or a look-up table that is none.
+    /// A z too far to be propagated to, a look-up table that is none, or a hologram for a calibrated display.
     pub fn views(&self, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
-        let (height, width) = self.shape();
+        self.views_on(&self.info().display_file()?, z_m)
+    }
+
+    /// [`Self::views`] on a display with its calibration: by its own phase curves, under its laser, through its aberration, which
+    /// must be one for all depths.
+    ///
+    /// # Errors
+    /// As [`Self::views`]; a table made for fewer pixels; an aberration that changes over depth or over the frame.
+    pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+        let shape = self.shape();
+        let (height, width) = shape;
         let info = self.info();
-        let (field, aperture) = match self {
+        let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::PhaseOnly(levels, _) => {
+                let response = file.response()?.centred(height, width)?;
                 let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
+                let values = field.as_slice_mut().expect("standard layout");
                 phase_only_field(
                     levels.as_slice().expect("standard layout"),
-                    &info.response()?,
+                    &response,
                     info.scale.unwrap_or(1.0),
-                    field.as_slice_mut().expect("standard layout"),
+                    values,
                 );
+                if let Some(laser) = &file.laser {
+                    let modulator = (file.display.height(), file.display.width());
+                    laser.shine(values, shape, modulator);
+                }
                 (field, Some(APERTURE_RADIUS))
             }
         };
+        if let Some(AberrationFile::Uniform(all)) = &file.aberration
+            && let Some(correction) = all.constant()
+        {
+            let display = &info.display;
+            let plans = Propagator::for_colours_corrected(
+                height,
+                width,
+                display.pitch_m(),
+                display.wavelengths_m(),
+                0.0,
+                &correction.reversed(),
+                display.pitch_m(),
+            )?;
+            let mut scratch = plans[0].scratch();
+            let values = field.as_slice_mut().expect("standard layout");
+            for (plan, plane) in plans.iter().zip(values.chunks_exact_mut(height * width)) {
+                plan.propagate(plane, &mut scratch);
+            }
+        } else if file.aberration.is_some() {
+            return Err(Error::Input(
+                "the display's aberration changes over depth or over the frame; such views cannot be made yet, leave the aberration out of the display's file".into(),
+            ));
+        }
         let plan = Refocus::new(height, width, &info.display, z_m, aperture)?;
         let views = plan.focal_stack(field.as_slice().expect("standard layout"), z_m)?;
         Ok(views

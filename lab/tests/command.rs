@@ -591,3 +591,112 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
         &["planes"],
     );
 }
+
+#[test]
+fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
+    let folder = Folder::new().with_frame();
+    folder.succeeds(&with(&[
+        "--scale",
+        "1",
+        "--offset-mm",
+        "3",
+        "-o",
+        "cpu.png",
+    ]));
+    // Drivers write to stderr where no desktop runs.
+    let on_gpu = |more: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args(more)
+            .current_dir(folder.0.path())
+            .env("XDG_CACHE_HOME", folder.path("cache"))
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap()
+    };
+    let gpu = ["--backend", "gpu", "--gpu"];
+    let missing = on_gpu(&with(
+        &[&gpu[..], &["no such card", "-o", "gpu.png"]].concat(),
+    ));
+    let errors = String::from_utf8(missing.stderr).unwrap();
+    assert_eq!(missing.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("error: no GPU") && errors.contains("--backend cpu"),
+        "{errors}"
+    );
+    assert!(!folder.path("gpu.png").exists());
+
+    let more = [
+        "llvmpipe",
+        "--scale",
+        "1",
+        "--offset-mm",
+        "3",
+        "-o",
+        "gpu.png",
+        "--json",
+    ];
+    let made = on_gpu(&with(&[&gpu[..], &more].concat()));
+    let errors = String::from_utf8(made.stderr).unwrap();
+    if errors.contains("no GPU") {
+        println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        return;
+    }
+    assert!(made.status.success(), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
+    assert!(
+        report["engine"].as_str().unwrap().contains("int8"),
+        "{report}"
+    );
+    let levels = |name| {
+        image::open(folder.path(name))
+            .unwrap()
+            .into_rgb8()
+            .into_raw()
+    };
+    let apart = |(a, b): (&u8, &u8)| (a.wrapping_sub(*b) as i8).unsigned_abs() > 1;
+    let (cpu, gpu) = (levels("cpu.png"), levels("gpu.png"));
+    let differing = cpu.iter().zip(&gpu).filter(|pair| apart(*pair)).count();
+    assert!(differing * 100 < cpu.len(), "{differing} of {}", cpu.len());
+
+    let bench = [
+        "bench",
+        "--backend",
+        "gpu",
+        "--gpu",
+        "llvmpipe",
+        "--seconds",
+        "0",
+        "--json",
+    ];
+    let more = [
+        "--size",
+        "48x32",
+        "--layers",
+        "8",
+        "--precision",
+        "int8",
+        "--fusion",
+        "pairs",
+    ];
+    let measured = on_gpu(&[&bench[..], &more].concat());
+    let errors = String::from_utf8(measured.stderr).unwrap();
+    assert!(measured.status.success(), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&measured.stdout).unwrap();
+    let row = &report["rows"][0];
+    assert_eq!(row["backend"], "gpu");
+    assert!(row["total_ms"].as_f64().unwrap() > 0.0, "{report}");
+    assert!(
+        row["kernels"].as_str().unwrap().contains("Pairs in 5"),
+        "{report}"
+    );
+
+    for (arguments, word) in [
+        (with(&["--gpu", "x", "-o", "o.png"]), "--backend gpu"),
+        (
+            with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]),
+            "--complex",
+        ),
+    ] {
+        folder.refuses(&arguments, 1, &[word]);
+    }
+}

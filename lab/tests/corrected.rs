@@ -8,6 +8,8 @@ use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
 use phasefront::wave::asm::{Padding, Propagator};
+use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront_lab::corrected::spatial::SpatialAberrations;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::{scene, sm_lbm};
@@ -271,4 +273,55 @@ fn too_many_propagations_are_refused_before_they_begin() {
         message.contains("propagations") && message.contains("131072"),
         "{message}"
     );
+}
+
+/// Coefficients that change over depth, and kernels put between: against a kernel of each plane's own.
+#[test]
+fn coefficients_that_change_over_depth_are_followed() {
+    let ldi = random_ldi((48, 56), 3);
+    let display = Display::default();
+    let at = |a: [f64; 5]| Aberration::new([a; 3]).unwrap();
+    let all = Aberrations::new(vec![
+        (-2e-3, at([0.5, -1.0, 0.3, 0.0, 0.4])),
+        (1e-3, at([-0.3, 0.8, 0.0, 0.5, -0.2])),
+    ])
+    .unwrap();
+    let planes = 96;
+    let ours = Correction::of_aberrations(&all, (48, 56), planes, &display).unwrap();
+    let z_m: Vec<_> = (0..planes)
+        .rev()
+        .map(|k| sm_lbm::plane_z_m(k, planes, &display))
+        .collect();
+    let lambda = display.wavelengths_m();
+    let exact = Correction::sampled(z_m, ours.shape(), &display, |z, l, mu, nu| {
+        let colour = lambda.iter().position(|x| *x == l).unwrap();
+        Complex64::from_polar(1.0, all.at(z).phase(colour, mu, nu, display.pitch_m()))
+    })
+    .unwrap();
+    let (ours, exact) = (
+        hologram(&ldi, planes, &ours),
+        hologram(&ldi, planes, &exact),
+    );
+    for colour in 0..3 {
+        let error = relative_error(&plane_of(&ours, colour), &plane_of(&exact, colour));
+        assert!(error < 0.02, "{colour}: {error}");
+    }
+}
+
+#[test]
+fn one_correction_over_the_frame_is_the_fourier_filter() {
+    let ldi = random_ldi((40, 52), 2);
+    let display = Display::default();
+    let a = Aberration::new([[0.8, -0.5, 0.4, 0.3, -0.6]; 3]).unwrap();
+    let all = Aberrations::new(vec![(0.0, a)]).unwrap();
+    let correction = Correction::of_aberrations(&all, (40, 52), 7, &display).unwrap();
+    let filtered = hologram(&ldi, 7, &correction);
+    let points = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
+    let points = points.map(|place| (place, all.clone())).to_vec();
+    let spatial = SpatialAberrations::new(points).unwrap();
+    let ours = corrected::spatial::hologram(&ldi, &display, 7, &spatial, &|_, _| {}).unwrap();
+    for colour in 0..3 {
+        let error = relative_error(&plane_of(&ours, colour), &plane_of(&filtered, colour));
+        assert!(error < 0.02, "{colour}: {error}");
+    }
 }

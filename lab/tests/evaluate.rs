@@ -211,6 +211,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
             &mut modulator.scratch(),
         );
         let info = HologramInfo {
+            calibrated: Vec::new(),
             display: display.clone(),
             encoder: Some(shown.name.clone()),
             scale: Some(modulation.scale),

@@ -10,6 +10,7 @@ pub mod deep;
 pub mod double_phase;
 
 use crate::error::{Error, Result};
+use crate::illumination::Illumination;
 use crate::network::Network;
 use crate::slm::Response;
 use crate::wave::fft::Scratch;
@@ -65,6 +66,8 @@ pub struct Encoder {
     height: usize,
     width: usize,
     prefilter: Prefilter,
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
 }
 
 enum Prefilter {
@@ -106,7 +109,19 @@ impl Encoder {
             height,
             width,
             prefilter,
+            illumination: None,
         })
+    }
+
+    /// The same for holograms in the middle of a modulator of (H, W), `modulator`, that is lit as `illumination` says: the
+    /// field is divided by the light after its filter.
+    pub fn with_illumination(
+        mut self,
+        illumination: Illumination,
+        modulator: (usize, usize),
+    ) -> Self {
+        self.illumination = Some((illumination, modulator));
+        self
     }
 
     /// Working memory for one call at a time.
@@ -177,6 +192,9 @@ impl Encoder {
                 }
                 _ => {}
             }
+        }
+        if let Some((illumination, modulator)) = &self.illumination {
+            illumination.divide(field, (self.height, self.width), *modulator);
         }
         match scale {
             Scale::Max => double_phase::max_amplitude(field),

@@ -13,6 +13,8 @@ mod resample;
 pub use camera::{Alignment, CameraFrame};
 pub(crate) use colour::check_size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
+#[cfg(feature = "gpu")]
+pub(crate) use convert::yuv_constants;
 pub use convert::{ColourPlan, ColourScratch};
 pub use plane::{Orientation, Plane, Rotation};
 pub(crate) use resample::Axis;
@@ -128,11 +130,18 @@ impl RgbdFrame {
     }
 }
 
-/// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½.
+/// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
+/// [`crate::network::InputKind::RgbdXy`], the place in the frame.
 impl Source for RgbdFrame {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let (height, width) = self.shape();
+        let place = |at: usize, n: usize| (at as f32 + 0.5) / n as f32 - 0.5;
         let (values, plane) = match plane {
+            4 => {
+                let columns = into.iter_mut().enumerate();
+                return columns.for_each(|(x, to)| *to = place(from + x, width));
+            }
+            5 => return into.fill(place(row, height)),
             3 => (self.depth.as_slice(), 0),
             colour => (self.rgb.as_slice(), colour),
         };
@@ -180,6 +189,10 @@ mod tests {
             assert_eq!(row, [14.0 / 24.0 - 0.5, 15.0 / 24.0 - 0.5]);
             frame.read(3, 1, 0, &mut row);
             assert_eq!(row, [0.0, 0.125]);
+            frame.read(4, 1, 2, &mut row);
+            assert_eq!(row, [0.125, 0.375]);
+            frame.read(5, 1, 2, &mut row);
+            assert_eq!(row, [0.25, 0.25]);
         }
     }
 }

@@ -12,6 +12,9 @@ pub mod display;
 pub mod encode;
 pub mod error;
 pub mod frame;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod illumination;
 pub mod method;
 pub mod modulator;
 pub mod network;
@@ -28,6 +31,7 @@ pub mod wave;
 pub use display::Display;
 pub use error::{Error, Result};
 pub use frame::RgbdFrame;
+pub use illumination::Illumination;
 pub use method::Method;
 pub use modulator::Modulator;
 pub use network::{Network, NetworkPlan, NetworkScratch};

@@ -63,11 +63,15 @@ impl MethodPlan {
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         let way = match method {
             Method::Network(network) => {
-                check_network(&network, InputKind::Rgbd, display)?;
+                if network.input() != InputKind::RgbdXy {
+                    check_input(&network, InputKind::Rgbd)?;
+                }
+                check_display(&network, display)?;
                 Way::Network(Box::new(network.plan(height, width)?))
             }
             Method::Seeded(network) => {
-                check_network(&network, InputKind::Seeded, display)?;
+                check_input(&network, InputKind::Seeded)?;
+                check_display(&network, display)?;
                 let plan = SeededPlan::new(height, width, &network, display)?;
                 Way::Seeded(Box::new(plan))
             }
@@ -143,15 +147,15 @@ impl MethodPlan {
     }
 }
 
-/// Checks that `network` takes `input` and was trained for `display`.
-fn check_network(network: &Network, input: InputKind, display: &Display) -> Result<()> {
+/// Checks that `network` takes `input`.
+fn check_input(network: &Network, input: InputKind) -> Result<()> {
     if network.input() != input {
         return Err(Error::Network(format!(
             "its input is '{}'; this method needs a network for '{input}'",
             network.input()
         )));
     }
-    check_display(network, display)
+    Ok(())
 }
 
 /// Checks that `network` was trained for a display like `display`: on another it gives wrong depths.

@@ -1,21 +1,26 @@
-//! From the midpoint hologram to the modulator's levels: offset, phase encoding, look-up table.
+//! From the midpoint hologram to the modulator's levels: offset, correction of what the display does to the
+//! wave, phase encoding, look-up table.
 //!
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::display::Display;
 use crate::encode::{Encoder, EncoderScratch, Encoding, Scale, deep};
 use crate::error::{Error, Result};
+use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
 use crate::wave::fft::Scratch;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
 /// A plan for one shape, display and encoding. Immutable; shared between threads.
 pub struct Modulator {
-    size: usize,
-    /// None where the modulator stands at the midpoint.
+    height: usize,
+    width: usize,
+    display: Display,
+    /// None where the modulator stands at the midpoint and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
     encoder: Encoder,
     keeps_phase: bool,
@@ -43,8 +48,8 @@ impl Modulator {
     /// `response`.
     ///
     /// # Errors
-    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, or a fixed scale that
-    /// is not positive.
+    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, a fixed scale that is
+    /// not positive, or a response made for a smaller modulator.
     pub fn new(
         height: usize,
         width: usize,
@@ -63,6 +68,7 @@ impl Modulator {
         if let Encoding::Deep(network) = &encoding {
             deep::check(network, display)?;
         }
+        let response = response.centred(height, width)?;
         let offset = match display.offset_m() {
             0.0 => None,
             offset_m => Some(Propagator::for_colours(
@@ -75,7 +81,9 @@ impl Modulator {
             )?),
         };
         Ok(Modulator {
-            size: height * width,
+            height,
+            width,
+            display: display.clone(),
             offset,
             keeps_phase: matches!(encoding, Encoding::Deep(_)),
             encoder: Encoder::new(height, width, encoding)?,
@@ -84,10 +92,42 @@ impl Modulator {
         })
     }
 
+    /// The same for a display whose lasers light it as `illumination` says: what a pixel shall send is divided by what
+    /// it gets, where the light falls and nothing filters it any more. A hologram smaller than the modulator stands in its
+    /// middle.
+    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
+        let modulator = (self.display.height(), self.display.width());
+        self.encoder = self.encoder.with_illumination(illumination, modulator);
+        self
+    }
+
+    /// The same for a display with an aberration that is one for all depths: its correction Φ is part of the offset's
+    /// transfer function, so that it costs nothing beside it.
+    ///
+    /// # Errors
+    /// A correction that moves light farther than can be padded.
+    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
+        self.offset = Some(Propagator::for_colours_corrected(
+            self.height,
+            self.width,
+            self.display.pitch_m(),
+            self.display.wavelengths_m(),
+            self.display.offset_m(),
+            correction,
+            self.display.pitch_m(),
+        )?);
+        Ok(self)
+    }
+
     /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
     /// take from it what it knows.
     pub fn keeps_phase(&self) -> bool {
         self.keeps_phase
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
     }
 
     /// Working memory for one call at a time.
@@ -99,21 +139,24 @@ impl Modulator {
     }
 
     /// Takes a midpoint hologram, (3, H, W), to the modulator: ASM(H, offset)·exp(−i2π·offset/λ), Eq. 6,
-    /// whose second factor takes back the carrier that propagation here leaves out from the start.
-    /// Allocates nothing.
+    /// whose second factor takes back the carrier that propagation here leaves out from the start; with the
+    /// correction of an aberration, where there is one. Allocates nothing.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
-            for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.size)) {
+            for (plan, plane) in plans
+                .iter()
+                .zip(field.chunks_exact_mut(self.height * self.width))
+            {
                 plan.propagate(plane, scratch);
             }
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W). `field` is left as the
-    /// encoder's filter made it. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): `field` is left as the
+    /// encoder's filter made it, and divided by the light that falls there. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -146,9 +189,7 @@ impl Modulator {
             encode: start.elapsed(),
         }
     }
-}
 
-impl Modulator {
     /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
     ///
     /// # Panics

@@ -24,6 +24,8 @@ pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::{Error, Result};
 use chain::Chain;
+#[cfg(feature = "gpu")]
+pub(crate) use fused::int8_layers;
 use fused::{FusedChain, FusedScratch};
 use num_complex::Complex32;
 pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
@@ -34,7 +36,7 @@ use tract_onnx::prelude::Framework;
 /// Most pixels of a frame on stock tract, which holds several layers at once: some 500 bytes a pixel.
 const MAX_STOCK_PIXELS: usize = 1 << 24;
 /// Most pixels of a frame at all.
-const MAX_PIXELS: usize = 1 << 28;
+pub(crate) const MAX_PIXELS: usize = 1 << 28;
 
 /// Planes that a network reads, a run of a row's pixels at a time: they need not lie in memory as the network takes
 /// them.
@@ -264,7 +266,7 @@ impl Network {
     }
 }
 
-fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
+pub(crate) fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
     match height.checked_mul(width) {
         Some(0) => Err(Error::Plan(format!(
             "network: a frame of {width}×{height} pixels is empty"

@@ -3,11 +3,16 @@
 //!
 //! Around the hologram the modulator shows amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light
 //! does not pass the aperture. One level everywhere would be a bright frame.
+//!
+//! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
+//! and a shifted hologram does not stand where the table takes it to be.
 
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::slm::Response;
+use crate::slm::per_pixel::PerPixel;
 use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
 
 /// How the levels of the colours lie in images. Levels of fewer bits than their place in the image stand in its upper
 /// bits.
@@ -122,15 +127,26 @@ pub struct Output {
     from: (i64, i64),
     /// Bits of a level in bytes, and of one in words.
     bits: (u32, u32),
-    /// Levels of darkness in bytes: where x + y of the hologram is even and where it is odd.
-    dark: [u8; 2],
+    dark: Dark,
 }
+
+/// What is shown around the hologram: double phase of amplitude 0.
+#[derive(Debug, Clone)]
+enum Dark {
+    /// The levels where x + y of the hologram is even and where it is odd.
+    Everywhere([u8; 2]),
+    /// Those of each pixel of the modulator.
+    PerPixel(Arc<PerPixel>),
+}
+
+/// The phases of darkness where x + y is even and where it is odd.
+const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
 
 impl Output {
     /// Plans images of `display`'s resolution for (`height`, `width`) holograms whose levels `response` made.
     ///
     /// # Errors
-    /// A hologram larger than the modulator.
+    /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
     pub fn new(
         display: &Display,
         (height, width): (usize, usize),
@@ -157,9 +173,12 @@ impl Output {
             ),
             bits: match response {
                 Response::Linear { bits } => (*bits, display.bits()),
-                Response::Lut { .. } => (8, display.bits()),
+                Response::Lut { .. } | Response::PerPixel(_) => (8, display.bits()),
             },
-            dark: [FRAC_PI_2, 3.0 * FRAC_PI_2].map(|phase| response.level(phase)),
+            dark: match response.clone().centred(modulator.0, modulator.1)? {
+                Response::PerPixel(table) => Dark::PerPixel(table),
+                same => Dark::Everywhere(DARK.map(|phase| same.level(phase, 0))),
+            },
         })
     }
 
@@ -187,13 +206,21 @@ impl Output {
             Levels::Bytes(levels) => {
                 assert_eq!(levels.len(), size);
                 let level = |at: usize| u16::from(levels[at]);
-                self.write_levels(level, byte_bits, self.dark.map(u16::from), image, bytes)
+                let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.dark {
+                    Dark::Everywhere(levels) => levels[odd].into(),
+                    Dark::PerPixel(table) => {
+                        let (height, width) = self.modulator;
+                        let at = (colour * height + y) * width + x;
+                        table.level(DARK[odd], at).into()
+                    }
+                };
+                self.write_levels(level, byte_bits, dark, image, bytes)
             }
             Levels::Words(levels) => {
                 assert_eq!(levels.len(), size);
                 // Of π/2 and 3π/2.
                 let quarter = (1u16 << word_bits) / 4;
-                let dark = [quarter, 3 * quarter];
+                let dark = |odd: usize, _: usize, _: (usize, usize)| quarter * [1, 3][odd];
                 self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
             }
         }
@@ -203,7 +230,7 @@ impl Output {
         &self,
         level: impl Fn(usize) -> u16,
         bits: u32,
-        dark: [u16; 2],
+        dark: impl Fn(usize, usize, (usize, usize)) -> u16,
         image: usize,
         bytes: &mut [u8],
     ) -> Result<()> {
@@ -225,13 +252,18 @@ impl Output {
         let pixel_bytes = layout.pixel_bytes();
         let flip = |at: usize, n: usize, flipped: bool| if flipped { n - 1 - at } else { at };
         for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
-            let y = self.from.0 + flip(y, out_height, self.placement.flip_y) as i64;
+            let modulator_y = flip(y, out_height, self.placement.flip_y);
+            let y = self.from.0 + modulator_y as i64;
             for (x, pixel) in row.chunks_exact_mut(pixel_bytes).enumerate() {
-                let x = self.from.1 + flip(x, out_width, self.placement.flip_x) as i64;
+                let modulator_x = flip(x, out_width, self.placement.flip_x);
+                let x = self.from.1 + modulator_x as i64;
                 let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
                 let level = |colour: usize| match inside {
                     true => placed(level((colour * height + y as usize) * width + x as usize)),
-                    false => placed(dark[(x + y).rem_euclid(2) as usize]),
+                    false => {
+                        let odd = (x + y).rem_euclid(2) as usize;
+                        placed(dark(odd, colour, (modulator_y, modulator_x)))
+                    }
                 };
                 layout.write_pixel(image, level, pixel);
             }

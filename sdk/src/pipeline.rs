@@ -5,9 +5,11 @@ use crate::display::Display;
 use crate::encode::{Encoding, Scale};
 use crate::error::Result;
 use crate::frame::RgbdFrame;
+use crate::illumination::Illumination;
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use std::time::{Duration, Instant};
 
@@ -72,6 +74,21 @@ impl Pipeline {
             method,
             modulator: Modulator::new(height, width, &display, encoding, scale, response)?,
         })
+    }
+
+    /// [`Modulator::with_illumination`].
+    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
+        self.modulator = self.modulator.with_illumination(illumination);
+        self
+    }
+
+    /// [`Modulator::with_correction`].
+    ///
+    /// # Errors
+    /// As that.
+    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
+        self.modulator = self.modulator.with_correction(correction)?;
+        Ok(self)
     }
 
     /// (H, W).

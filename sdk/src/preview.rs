@@ -8,9 +8,11 @@
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::Axis;
+use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
 use crate::wave::fft::Scratch;
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
@@ -21,6 +23,8 @@ pub struct Preview {
     factor: usize,
     /// None where the hologram stands at z.
     propagators: Option<[Propagator; 3]>,
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
     screen: (usize, usize),
     x: Axis,
     y: Axis,
@@ -72,10 +76,39 @@ impl Preview {
             small,
             factor,
             propagators,
+            illumination: None,
             screen,
             x: Axis::new(small.1, 0.0, small.1 as f64, screen.1),
             y: Axis::new(small.0, 0.0, small.0 as f64, screen.0),
         })
+    }
+
+    /// The same of a display whose lasers light it as `illumination` says.
+    pub fn with_illumination(mut self, illumination: Illumination, display: &Display) -> Self {
+        self.illumination = Some((illumination, (display.height(), display.width())));
+        self
+    }
+
+    /// The same through the aberration that `correction` corrects; `display` and `z_m` are those of [`Self::new`].
+    ///
+    /// # Errors
+    /// A z too far away.
+    pub fn with_correction(
+        mut self,
+        correction: &Aberration,
+        display: &Display,
+        z_m: f64,
+    ) -> Result<Self> {
+        self.propagators = Some(Propagator::for_colours_corrected(
+            self.small.0,
+            self.small.1,
+            display.pitch_m() * self.factor as f64,
+            display.wavelengths_m(),
+            z_m - display.offset_m(),
+            &correction.reversed(),
+            display.pitch_m(),
+        )?);
+        Ok(self)
     }
 
     /// Modulator pixels, along each side, whose light is averaged.
@@ -102,7 +135,7 @@ impl Preview {
     /// amplitude `scale`, into `rgba`: rows of red, green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
     ///
     /// # Panics
-    /// If `levels` or `rgba` has another length than planned.
+    /// If `levels` or `rgba` has another length than planned, or `response` is made for another shape.
     pub fn look(
         &self,
         levels: &[u8],
@@ -118,8 +151,17 @@ impl Preview {
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
         let factor = self.factor;
         let light = scale / (factor * factor) as f32;
-        let shown: [Complex32; 256] =
-            std::array::from_fn(|l| Complex32::from_polar(light, response.phase(l as u8)));
+        let table = match response {
+            Response::PerPixel(table) => Some(table),
+            _ => None,
+        };
+        // Where all pixels answer alike each level is one phase.
+        let shown: [Complex32; 256] = match table {
+            None => {
+                std::array::from_fn(|l| Complex32::from_polar(light, response.phase(l as u8, 0)))
+            }
+            Some(_) => [Complex32::ZERO; 256],
+        };
         let planes = levels.chunks_exact(height * width);
         let amplitudes = scratch
             .amplitude
@@ -127,11 +169,36 @@ impl Preview {
         for (colour, (levels, amplitude)) in planes.zip(amplitudes).enumerate() {
             (scratch.field.par_chunks_exact_mut(small_width))
                 .zip(levels.par_chunks_exact(width * factor))
-                .for_each(|(sums, rows)| {
+                .enumerate()
+                .for_each(|(small_y, (sums, rows))| {
                     sums.fill(Complex32::ZERO);
-                    for row in rows.chunks_exact(width) {
-                        for (sum, pixels) in sums.iter_mut().zip(row.chunks_exact(factor)) {
-                            *sum += pixels.iter().map(|l| shown[*l as usize]).sum::<Complex32>();
+                    for (y, row) in rows.chunks_exact(width).enumerate() {
+                        let first = (colour * height + small_y * factor + y) * width;
+                        for (x, (sum, pixels)) in
+                            sums.iter_mut().zip(row.chunks_exact(factor)).enumerate()
+                        {
+                            *sum += match table {
+                                None => {
+                                    pixels.iter().map(|l| shown[*l as usize]).sum::<Complex32>()
+                                }
+                                Some(table) => (pixels.iter().enumerate())
+                                    .map(|(i, l)| {
+                                        let phase = table.phase(*l, first + x * factor + i);
+                                        Complex32::from_polar(light, phase)
+                                    })
+                                    .sum::<Complex32>(),
+                            };
+                        }
+                    }
+                    if let Some((illumination, modulator)) = &self.illumination {
+                        let middle = |at: usize, hologram: usize, modulator: usize| {
+                            at * factor + factor / 2 + modulator.saturating_sub(hologram) / 2
+                        };
+                        let all = (modulator.0.max(height), modulator.1.max(width));
+                        let y = middle(small_y, height, modulator.0);
+                        for (x, sum) in sums.iter_mut().enumerate() {
+                            let x = middle(x, width, modulator.1);
+                            *sum /= illumination.gain(colour, y, x, all);
                         }
                     }
                 });
@@ -159,5 +226,105 @@ impl Preview {
                     *pixel = [byte(0, x), byte(1, x), byte(2, x), 255];
                 }
             });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::encode::{Encoding, Scale};
+    use crate::modulator::Modulator;
+    use crate::refocus::{Refocus, phase_only_field};
+
+    const SHAPE: (usize, usize) = (96, 128);
+
+    /// The levels of soft blobs of each colour that lie at z = 1 mm.
+    fn hologram(display: &Display, response: &Response) -> (Vec<u8>, f32) {
+        let (height, width) = SHAPE;
+        let mut field: Vec<Complex32> = (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                let square =
+                    (x as f32 - 40.0 - 20.0 * c as f32).powi(2) + (y as f32 - 48.0).powi(2);
+                Complex32::new(0.1 + 0.8 * (-square / 400.0).exp(), 0.0)
+            })
+            .collect();
+        // From where they lie to the midpoint, and to the modulator.
+        let home = display
+            .clone()
+            .with_offset_m(display.offset_m() - 1e-3)
+            .unwrap();
+        let plan = |display: &Display| {
+            let encoding = Encoding::DoublePhase;
+            Modulator::new(
+                height,
+                width,
+                display,
+                encoding,
+                Scale::Max,
+                response.clone(),
+            )
+            .unwrap()
+        };
+        let home = plan(&home);
+        let mut scratch = home.scratch();
+        home.propagate(&mut field, &mut scratch);
+        let mut levels = vec![0; 3 * height * width];
+        let modulation = home.modulate(&mut field, &mut levels, &mut scratch);
+        (levels, modulation.scale)
+    }
+
+    #[test]
+    fn the_small_view_is_the_full_one_made_small() {
+        let response = Response::linear(8).unwrap();
+        let (height, width) = SHAPE;
+        for offset_m in [0.0, 3e-3] {
+            let display = Display::default().with_offset_m(offset_m).unwrap();
+            let (levels, scale) = hologram(&display, &response);
+            let mut shown = vec![Complex32::ZERO; levels.len()];
+            phase_only_field(&levels, &response, scale, &mut shown);
+            for z_m in [1e-3, -2e-3, offset_m] {
+                let full = Refocus::new(height, width, &display, &[z_m], Some(1.0)).unwrap();
+                let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
+                for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
+                    let plan = Preview::new(SHAPE, &display, z_m, screen).unwrap();
+                    assert_eq!(plan.factor(), factor);
+                    let mut rgba = vec![0; 4 * screen.0 * screen.1];
+                    plan.look(&levels, &response, scale, &mut rgba, &mut plan.scratch());
+                    let mut squares = 0.0;
+                    for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
+                        assert_eq!(pixel[3], 255);
+                        let (y, x) = (i / screen.1 * factor, i % screen.1 * factor);
+                        for (c, byte) in pixel[..3].iter().enumerate() {
+                            let row = |dy| &full[(c * height + y + dy) * width + x..][..factor];
+                            let sum: f32 = (0..factor).flat_map(row).map(|a| a.min(1.0)).sum();
+                            let mean = sum / (factor * factor) as f32;
+                            squares += (mean - f32::from(*byte) / 255.0).powi(2);
+                        }
+                    }
+                    let error = (squares / (3 * screen.0 * screen.1) as f32).sqrt();
+                    assert!(
+                        error < 0.03,
+                        "offset {offset_m} z {z_m} {screen:?}: {error}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_views_are_refused() {
+        let display = Display::default();
+        assert!(Preview::new((1, 50), &display, 0.0, (10, 10)).is_err());
+        assert!(Preview::new(SHAPE, &display, 0.0, (0, 10)).is_err());
+        assert!(Preview::new(SHAPE, &display, f64::NAN, (10, 10)).is_err());
+        // A screen larger than the hologram has a view too.
+        assert_eq!(
+            Preview::new((5, 7), &display, 1e-3, (300, 200))
+                .unwrap()
+                .factor(),
+            2
+        );
     }
 }

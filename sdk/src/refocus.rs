@@ -183,15 +183,22 @@ impl Refocus {
     }
 }
 
-/// The field right behind a modulator that shows `levels`: `scale`·exp(iφ) for each. Through the
+/// The field right behind a modulator that shows `levels`, (3, H, W): `scale`·exp(iφ) for each. Through the
 /// Fourier aperture it becomes the field that was encoded at that scale.
 ///
 /// # Panics
-/// If the lengths differ.
+/// If the lengths differ, or `response` is made for another shape.
 pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &mut [Complex32]) {
     assert_eq!(levels.len(), field.len());
+    if let Response::PerPixel(table) = response {
+        let pairs = field.par_iter_mut().zip(levels).enumerate();
+        pairs.for_each(|(at, (value, level))| {
+            *value = Complex32::from_polar(scale, table.phase(*level, at));
+        });
+        return;
+    }
     let shown: [Complex32; 256] =
-        std::array::from_fn(|l| Complex32::from_polar(scale, response.phase(l as u8)));
+        std::array::from_fn(|l| Complex32::from_polar(scale, response.phase(l as u8, 0)));
     for (value, level) in field.iter_mut().zip(levels) {
         *value = shown[*level as usize];
     }

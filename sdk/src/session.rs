@@ -29,8 +29,10 @@ use crate::display::Display;
 use crate::encode::Encoding;
 use crate::error::{Error, Result};
 use crate::frame::CameraFrame;
+use crate::illumination::Illumination;
 use crate::method::Method;
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
 use queue::{Gate, Queue};
@@ -57,6 +59,10 @@ pub struct SessionOptions {
     pub encoding: Encoding,
     /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
     pub response: Response,
+    /// The laser's light over the modulator, where it is calibrated.
+    pub illumination: Option<Illumination>,
+    /// What corrects the display's aberration, where it is calibrated and one for all depths.
+    pub correction: Option<Aberration>,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
     /// What becomes of depth.
@@ -84,6 +90,8 @@ impl SessionOptions {
             encoding: Encoding::ANTI_ALIAS,
             // Of levels with more bits the upper ones are what is looked at.
             response: Response::linear(display.bits().min(8))?,
+            illumination: None,
+            correction: None,
             brightness: Brightness::default(),
             depth: DepthOptions::default(),
             threads: None,

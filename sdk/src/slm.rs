@@ -1,8 +1,12 @@
-//! Phase to modulator levels and back: the linear response, or a 256-entry look-up table that
-//! a calibration measured.
+//! Phase to modulator levels and back: the linear response, a 256-entry look-up table for the whole
+//! modulator, or a table for each pixel, [`per_pixel`]; the tables are what a calibration measured.
+
+pub mod per_pixel;
 
 use crate::error::{Error, Result};
+use per_pixel::PerPixel;
 use std::f32::consts::TAU;
+use std::sync::Arc;
 
 /// What a modulator answers to a phase. Immutable; shared between threads.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +24,8 @@ pub enum Response {
         /// phase of the nearest one that does.
         phase: Box<[f32; 256]>,
     },
+    /// Each pixel of each colour has its own curve.
+    PerPixel(Arc<PerPixel>),
 }
 
 impl Response {
@@ -63,30 +69,60 @@ impl Response {
         }
     }
 
-    /// The level that shows `phase`, in \[0, 2π).
-    pub fn level(&self, phase: f32) -> u8 {
+    /// The response of the (`height`, `width`) pixels in the middle of the modulator, where a smaller hologram stands.
+    ///
+    /// # Errors
+    /// A table for fewer pixels.
+    pub fn centred(self, height: usize, width: usize) -> Result<Self> {
         match self {
-            Response::Linear { bits } => step(phase, 1 << bits) as u8,
-            Response::Lut { level, .. } => level[step(phase, 256)],
+            Response::PerPixel(table) if table.shape() != (height, width) => {
+                Ok(Response::PerPixel(table.centred(height, width)?.into()))
+            }
+            same => Ok(same),
         }
     }
 
-    /// The phase that `level` shows, in \[0, 2π).
-    pub fn phase(&self, level: u8) -> f32 {
+    /// The shape that the response is made for, (H, W); None where it suits any.
+    pub fn shape(&self) -> Option<(usize, usize)> {
+        match self {
+            Response::PerPixel(table) => Some(table.shape()),
+            _ => None,
+        }
+    }
+
+    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (3, H, W).
+    ///
+    /// # Panics
+    /// If `at` is outside the shape that the response is made for.
+    pub fn level(&self, phase: f32, at: usize) -> u8 {
+        match self {
+            Response::Linear { bits } => step(phase, 1 << bits) as u8,
+            Response::Lut { level, .. } => level[step(phase, 256)],
+            Response::PerPixel(table) => table.level(phase, at),
+        }
+    }
+
+    /// The phase that `level` shows, in \[0, 2π), at value `at` of a stack (3, H, W).
+    ///
+    /// # Panics
+    /// As [`Self::level`].
+    pub fn phase(&self, level: u8, at: usize) -> f32 {
         match self {
             Response::Linear { bits } => {
                 let levels = 1u32 << bits;
                 (u32::from(level) % levels) as f32 / levels as f32 * TAU
             }
             Response::Lut { phase, .. } => phase[level as usize],
+            Response::PerPixel(table) => table.phase(level, at),
         }
     }
 
-    /// [`Self::level`] of each phase. Allocates nothing.
+    /// [`Self::level`] of each phase of a row or part of one, which begins at value `first` of a stack
+    /// (3, H, W). Allocates nothing.
     ///
     /// # Panics
-    /// If the lengths differ.
-    pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
+    /// If the lengths differ, or the response is made for a shape whose row ends before.
+    pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         match self {
             Response::Linear { bits } => {
@@ -99,6 +135,7 @@ impl Response {
                     *level = table[step(*phase, 256)];
                 }
             }
+            Response::PerPixel(table) => table.levels(phases, first, levels),
         }
     }
 }
@@ -128,13 +165,13 @@ mod tests {
     #[test]
     fn linear_levels_follow_the_rule_and_wrap() {
         let r = Response::linear(8).unwrap();
-        assert_eq!(r.level(0.0), 0);
-        assert_eq!(r.level(TAU / 2.0), 128);
-        assert_eq!(r.level(TAU * 255.4 / 256.0), 255);
-        assert_eq!(r.level(TAU * 255.6 / 256.0), 0);
+        assert_eq!(r.level(0.0, 0), 0);
+        assert_eq!(r.level(TAU / 2.0, 0), 128);
+        assert_eq!(r.level(TAU * 255.4 / 256.0, 0), 255);
+        assert_eq!(r.level(TAU * 255.6 / 256.0, 0), 0);
         let r = Response::linear(2).unwrap();
-        assert_eq!(r.level(TAU * 0.24), 1);
-        assert_eq!(r.level(TAU * 0.9), 0);
+        assert_eq!(r.level(TAU * 0.24, 0), 1);
+        assert_eq!(r.level(TAU * 0.9, 0), 0);
         assert!(Response::linear(0).is_err() && Response::linear(9).is_err());
     }
 
@@ -145,7 +182,7 @@ mod tests {
         for r in [Response::linear(8).unwrap(), inverted, shallow] {
             for i in 0..256 {
                 let phase = i as f32 / 256.0 * TAU;
-                let shown = r.phase(r.level(phase));
+                let shown = r.phase(r.level(phase, 0), 0);
                 let error = (shown - phase).abs();
                 assert!(error.min(TAU - error) < TAU / 256.0, "{i}: {shown}");
             }
@@ -175,8 +212,13 @@ mod tests {
             Response::linear(5).unwrap(),
             Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8)),
         ] {
-            r.levels(&phases, &mut levels);
-            assert!(phases.iter().zip(&levels).all(|(p, l)| r.level(*p) == *l));
+            r.levels(&phases, 0, &mut levels);
+            assert!(
+                phases
+                    .iter()
+                    .zip(&levels)
+                    .all(|(p, l)| r.level(*p, 0) == *l)
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
-//! The optics on complex planes: propagation by the angular spectrum method and the aperture in
-//! the Fourier plane.
+//! The optics on complex planes: propagation by the angular spectrum method, the aperture in the
+//! Fourier plane, and the correction of aberrations there.
 //!
 //! A plane is a row-major slice of [`num_complex::Complex32`], (H, W). Distances are signed,
 //! positive toward the viewer. The carrier exp(i2πs/λ) is left out of every field (see
@@ -9,3 +9,4 @@ pub mod aperture;
 pub mod asm;
 pub mod fft;
 pub mod reference;
+pub mod zernike;

@@ -12,9 +12,11 @@ use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation
 use phasefront::method::MethodPlan;
 use phasefront::preview::Preview;
 use phasefront::slm::Response;
+use phasefront::slm::per_pixel::{self, PerPixel};
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::{Display, Method, Modulator, Network, RgbdFrame, Sweep};
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Method, Modulator, Network, RgbdFrame, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -135,6 +137,26 @@ fn hot_calls_allocate_nothing() {
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
+            let (rows, columns) = per_pixel::nodes(h, w, 8);
+            let levels_of = |i: usize| (i % 9) as f32 * 32.0;
+            let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
+            let turns = vec![6.0; 3 * rows * columns];
+            let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
+            let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
+            let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
+            let response = Response::PerPixel(table.into());
+            let encoding = Encoding::DoublePhase;
+            let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
+                .unwrap()
+                .with_illumination(laser)
+                .with_correction(&correction)
+                .unwrap();
+            let mut scratch = plan.scratch();
+            let frame = || {
+                plan.propagate(&mut field, &mut scratch);
+                plan.modulate(&mut field, &mut levels, &mut scratch);
+            };
+            assert_eq!(count(frame), 0, "a calibrated display");
             for method in [
                 Method::Sweep(Sweep::for_display(&display)),
                 Method::trained(seeded.clone()),

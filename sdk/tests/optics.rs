@@ -12,7 +12,8 @@ use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{self, Padding, Propagator};
-use phasefront::{Display, Modulator, Network, wave};
+use phasefront::wave::zernike::Aberration;
+use phasefront::{Display, Illumination, Modulator, Network, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -247,7 +248,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         );
         let response = Response::linear(8).unwrap();
         let mut levels = vec![0; phase.len()];
-        response.levels(&phase, &mut levels);
+        response.levels(&phase, 0, &mut levels);
         let mut shown = vec![Complex32::ZERO; phase.len()];
         phase_only_field(&levels, &response, scale, &mut shown);
         let aperture = Aperture::new(h, w, 0.7).unwrap();
@@ -334,4 +335,90 @@ fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
     assert!(why(&elsewhere, &network).contains("offset of 6.000 mm"));
     let hologram = Arc::new(Network::from_onnx(&Model::new(3, 8).bytes()).unwrap());
     assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
+}
+
+/// The correction is one more phase in the offset's transfer function: against Eq. 2 with it, in f64.
+#[test]
+fn a_correction_is_part_of_the_offset() {
+    let a = Aberration::new([
+        [0.5, -1.2, 0.7, 0.4, -0.9],
+        [0.6, -1.5, 0.8, 0.5, -1.1],
+        [0.7, -1.7, 0.9, 0.6, -1.3],
+    ])
+    .unwrap();
+    for (offset_m, shape) in [(0.0, (61, 47)), (4e-3, (40, 72))] {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let (h, w) = shape;
+        let response = Response::linear(8).unwrap();
+        let encoding = Encoding::DoublePhase;
+        let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
+            .unwrap()
+            .with_correction(&a)
+            .unwrap();
+        let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+        let given = field.clone();
+        plan.propagate(&mut field, &mut plan.scratch());
+        for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
+            let size = h * w;
+            // Room for all that moves, so that nothing comes back around.
+            let (ph, pw) = (4 * h, 4 * w);
+            let mut plane = Array2::zeros((ph, pw));
+            let source = widen(&given[c * size..][..size], shape);
+            plane.slice_mut(ndarray::s![..h, ..w]).assign(&source);
+            let mut spectrum = reference::fft2(&plane, false);
+            for ((ky, kx), value) in spectrum.indexed_iter_mut() {
+                let bin = |k: usize, n: usize| {
+                    (if 2 * k < n {
+                        k as f64
+                    } else {
+                        k as f64 - n as f64
+                    }) / (n as f64 * PITCH)
+                };
+                let (mu, nu) = (bin(kx, pw), bin(ky, ph));
+                let root = (lambda.powi(-2) - mu * mu - nu * nu).sqrt();
+                let phase = 2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
+                *value *= Complex64::from_polar(1.0, phase);
+            }
+            let expected = reference::fft2(&spectrum, true);
+            let expected = expected.slice(ndarray::s![..h, ..w]).to_owned();
+            let error = relative_error(&widen(&field[c * size..][..size], shape), &expected);
+            // Tails of the kernel at the corner frequencies reach beyond what rays do.
+            assert!(error < 0.02, "{offset_m} {shape:?} {c}: {error}");
+        }
+    }
+}
+
+/// A hologram smaller than the modulator is lit by the middle of the beam, after the filter.
+#[test]
+fn what_a_pixel_sends_is_divided_by_what_it_gets() {
+    let display = Display::from_toml("width = 60\nheight = 50").unwrap();
+    let (h, w) = (40, 33);
+    let beam = Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
+        1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
+    });
+    let laser = Illumination::new(beam.view()).unwrap();
+    let response = || Response::linear(8).unwrap();
+    let scale = Scale::Fixed(2.5);
+    let plan = Modulator::new(h, w, &display, Encoding::ANTI_ALIAS, scale, response())
+        .unwrap()
+        .with_illumination(laser.clone());
+    let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
+    let mut filtered = field.clone();
+    let mut levels = vec![0; 3 * h * w];
+    plan.modulate(&mut field, &mut levels, &mut plan.scratch());
+    let filter = phasefront::encode::anti_alias::AntiAlias::new(0.7, 3).unwrap();
+    for plane in filtered.chunks_exact_mut(h * w) {
+        filter.filter(plane, w, &mut filter.scratch(w));
+    }
+    laser.divide(&mut filtered, (h, w), (50, 60));
+    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let mut expected = vec![0; 3 * h * w];
+    encoder.encode_levels(
+        &mut filtered,
+        scale,
+        &response(),
+        &mut expected,
+        &mut encoder.scratch(),
+    );
+    assert_eq!(levels, expected);
 }

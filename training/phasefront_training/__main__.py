@@ -50,7 +50,7 @@ def parser():
     resume_flag(p)
     p.add_argument("--layers", type=int, default=15, help="convolution layers (default 15)")
     p.add_argument("--filters", type=int, default=24, help="filters a layer (default 24)")
-    p.add_argument("--input", default="rgbd", help="rgbd, seeded, or ldiN, N layers of a layered depth image (default rgbd)")
+    p.add_argument("--input", default="rgbd", help="rgbd, rgbdxy (with the place in the frame), seeded, or ldiN, N layers of a layered depth image (default rgbd)")
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
 
@@ -170,7 +170,7 @@ def begun(args, wanted, train):
     found = network.architecture
     if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
-    return grow.grow(network, args.layers, quantize.examples(train))
+    return grow.grow(network, args.layers, quantize.examples(train, network.architecture.coordinates))
 
 
 def run_stage2(args):
@@ -240,7 +240,7 @@ def go(task, args, workers, resume, folder=None):
 def run_quantize(args):
     network, display = checkpoint.load_network(args.network)
     train, validation = load(args, network.architecture)
-    ranges = quantize.calibrate(network, quantize.examples(train))
+    ranges = quantize.calibrate(network, quantize.examples(train, network.architecture.coordinates))
     exact, rounded = quantize.figures(network, ranges, validation)
     quantize.report("after training", exact, rounded)
     quantized = quantize.Quantized(network, ranges)

@@ -118,6 +118,7 @@ class Scenes:
         self.ldi_layers = ldi_layers
         self.damaged = []
         self.origin = {key: manifest.table[key] for key in ("seed", "planes")}
+        self.corrected = bool(manifest.table.get("aberration"))
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
         if len(present) < len(numbers):
@@ -190,17 +191,25 @@ def _gather(parts, k, device):
     return whole
 
 
-def network_input(colour, depth, seed=None):
+def network_input(colour, depth, seed=None, coordinates=False):
     """The network's input (..., 4·L, H, W): colour and depth of each layer in turn, each minus 0.5.
 
     A seed (..., 6, H, W) comes behind: half of (real part minus 0.5), half of the imaginary part, so that all fit
-    one range.
+    one range. With `coordinates` of a whole frame (4·L, H, W) two more channels come behind, its `place`.
     """
     colour = colour.unflatten(-3, (-1, 3))
     layers = torch.cat([colour, depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
+    if coordinates:
+        return torch.cat([layers, place(*depth.shape[-2:]).to(layers)], -3)
     if seed is None:
         return layers
     return torch.cat([layers, 0.5 * (seed[..., :3, :, :] - 0.5), 0.5 * seed[..., 3:, :, :]], -3)
+
+
+def place(height, width):
+    """x and y (2, H, W) of the pixels of a frame, from -0.5 at the first pixel's outer edge to 0.5 at the last one's."""
+    x, y = ((torch.arange(n) + 0.5) / n - 0.5 for n in (width, height))
+    return torch.stack([x.expand(height, width), y[:, None].expand(height, width)])
 
 
 def seed_of_input(x):
@@ -223,9 +232,13 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before."""
+    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before.
 
-    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0):
+    With `coordinates` inputs say where in the frame they lie. Samples of holograms that correct an aberration are
+    neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates.
+    """
+
+    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, coordinates=False):
         if degraded and scenes.ldi_layers > 1:
             raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
         height, width = scenes.shape
@@ -236,6 +249,8 @@ class Sampler:
         if 4 * margin > self.crop[0] and self.crop != scenes.shape:
             raise ValueError(f"a margin of {margin} px leaves too little of crops of {crop} px")
         self.margin, self.seed, self.rank = margin, seed, rank
+        self.place = place(height, width) if coordinates else None
+        self.flips = not (scenes.corrected or coordinates)
 
     def draw(self, step):
         rng = np.random.default_rng([self.seed, self.rank, step])
@@ -266,8 +281,10 @@ class Sampler:
             seen = network_input(colour, scenes.variant_depth[i, v][window][None].float(), scenes.variant_seed[i, v][window].float())
         else:
             seen = network_input(colour, degrade_depth(colour, depth[0], rng)[None] if degraded else depth)
+        if self.place is not None:
+            seen = torch.cat([seen, self.place[window].to(seen)])
         members = [seen, target, depth[:1], valid]
-        flip_y, flip_x, transpose = rng.random(3) < 0.5
+        flip_y, flip_x, transpose = rng.random(3) < (0.5 if self.flips else 0)
         axes = [axis for axis, flip in ((-2, flip_y), (-1, flip_x)) if flip]
         if axes:
             members = [member.flip(axes) for member in members]

@@ -41,7 +41,8 @@ def torch_predictor(network, autocast=False):
     seeded = network.architecture.input == "seeded"
 
     def predict(colour, depth, seed=None):
-        x = network_input(colour, depth, seed if seeded else None)[None].to(device).contiguous(memory_format=torch.channels_last)
+        x = network_input(colour, depth, seed if seeded else None, network.architecture.coordinates)[None]
+        x = x.to(device).contiguous(memory_format=torch.channels_last)
         with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=autocast):
             output = network(x)
         return head_field(network.architecture, output, x)[0]
@@ -64,7 +65,7 @@ def onnx_predictor(path, threads=None):
 
     def predict(colour, depth, seed=None):
         seed = seed.cpu() if meaning.input == "seeded" else None
-        x = network_input(colour.cpu(), depth.cpu(), seed)[None]
+        x = network_input(colour.cpu(), depth.cpu(), seed, meaning.coordinates)[None]
         output = torch.from_numpy(session.run(None, {name: x.numpy()})[0])
         return head_field(meaning, output, x)[0]
 

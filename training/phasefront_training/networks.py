@@ -10,10 +10,11 @@ Two heads turn the last layer's six channels into a field :
 * ``real-imaginary``: real = base[0:3] + o[0:3], imaginary = base[3:6] + o[3:6], where the base is the front
   layer's image (imaginary part 0) or, for the pre-filter, the field that came in.
 
-Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``ldiN`` (4·N channels: rgb0, depth0, rgb1, ...,
-each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of rgbd, then the
-plane sweep's field as data.network_input lays it; the field is the base) and ``field`` (6 channels: the real parts of
-the three colours, then the imaginary ones; this is the pre-filter of the deep double phase method).
+Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``rgbdxy`` (the same, then x and y over the frame from
+-0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (4·N channels: rgb0,
+depth0, rgb1, ..., each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of
+rgbd, then the plane sweep's field as data.network_input lays it; the field is the base) and ``field`` (6 channels: the
+real parts of the three colours, then the imaginary ones; this is the pre-filter of the deep double phase method).
 """
 
 import math
@@ -50,17 +51,22 @@ class Architecture:
 
     @property
     def ldi_layers(self):
-        """How many layers of a layered depth image the input takes; rgbd and seeded take one."""
-        if self.input in ("rgbd", "seeded"):
+        """How many layers of a layered depth image the input takes; rgbd, rgbdxy and seeded take one."""
+        if self.input in ("rgbd", "rgbdxy", "seeded"):
             return 1
         count = self.input.removeprefix("ldi")
         if self.input.startswith("ldi") and count.isdigit() and int(count) > 0:
             return int(count)
-        raise ValueError(f"the input is rgbd, seeded, ldiN (N = 1, 2, ...) or field, not '{self.input}'")
+        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...) or field, not '{self.input}'")
+
+    @property
+    def coordinates(self):
+        """Whether the input ends with the place in the frame."""
+        return self.input == "rgbdxy"
 
     @property
     def input_channels(self):
-        return {"field": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
+        return {"field": 6, "rgbdxy": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
 
     def channels(self, i):
         """(input, output) channels of layer i."""

@@ -136,11 +136,11 @@ def calibrate(chain, examples):
     return ranges
 
 
-def examples(scenes):
+def examples(scenes, coordinates=False):
     """Network inputs of the first scenes, for calibration."""
     for i in range(min(len(scenes), CALIBRATION_SCENES)):
         colour, depth, seed, _ = scene_as_seen(scenes, i, degraded=False)
-        yield network_input(colour, depth, seed)
+        yield network_input(colour, depth, seed, coordinates)
 
 
 class QuantizationAware(Stage1):

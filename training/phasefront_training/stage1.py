@@ -41,7 +41,8 @@ class Stage1(Task):
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.facts = scenes.facts
-        self.sampler = Sampler(scenes, batch, crop, margin(network.architecture.layers), degraded, seed, workers.rank)
+        cut, coordinates = margin(network.architecture.layers), network.architecture.coordinates
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
 
     def module(self):
         return self.network

@@ -48,7 +48,8 @@ class _OnHolograms(Task):
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
         self.facts = scenes.facts
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank)
+        coordinates = model.hologram.architecture.coordinates
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
 
     def sample(self, step):
         return self.sampler.draw(step)
@@ -111,7 +112,8 @@ def encoding_figures(model, scenes, degraded=False, full=True):
     with torch.no_grad():
         for i in range(len(scenes)):
             colour, depth, seed, truth = scene_as_seen(scenes, i, degraded)
-            x = network_input(colour, depth, seed if model.hologram.architecture.input == "seeded" else None)[None].to(device)
+            a = model.hologram.architecture
+            x = network_input(colour, depth, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
             midpoint = model.hologram.field(x)
             there = propagate(midpoint, model.offset_m, model.display)
             methods = {

@@ -1,13 +1,17 @@
 //! `phasefront bench`: how fast a frame is on this machine, stage by stage.
 
-use super::flags::{DisplayFlags, parse_size, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
-use clap::Args;
-use phasefront::{Method, Sweep};
+use clap::{Args, ValueEnum};
+use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
+use phasefront::network::Precision;
+use phasefront::{Display, Method, Network, Sweep};
+use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
-use phasefront_lab::{Error, Result};
+use phasefront_lab::{Error, Result, gpu};
 use serde_json::json;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
@@ -29,7 +33,21 @@ pub(crate) struct Bench {
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
     #[command(flatten)]
+    backend: BackendFlags,
+    /// How the network is computed on the GPU, both ways if not given
+    #[arg(long, value_enum)]
+    fusion: Option<FusionName>,
+    #[command(flatten)]
     display: DisplayFlags,
+}
+
+/// How many layers a dispatch of the GPU computes.
+#[derive(Clone, Copy, ValueEnum)]
+enum FusionName {
+    /// One
+    Layers,
+    /// Two and the skip around them
+    Pairs,
 }
 
 impl Bench {
@@ -60,6 +78,15 @@ impl Bench {
             .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| {
                 vec![size]
             });
+        if let Some(options) = self.backend.device()? {
+            let networks: Vec<_> = (methods.into_iter())
+                .filter_map(|method| match method {
+                    Method::Network(network) => Some(network),
+                    _ => None,
+                })
+                .collect();
+            return self.on_gpu(&networks, &sizes, &display, &options, json);
+        }
         let machine = Machine::this();
         let threads = threads.map_or_else(
             || match machine.cores {
@@ -92,6 +119,79 @@ impl Bench {
         );
         Ok(())
     }
+}
+
+impl Bench {
+    /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
+    fn on_gpu(
+        &self,
+        networks: &[Arc<Network>],
+        sizes: &[(usize, usize)],
+        display: &Display,
+        options: &DeviceOptions,
+        json: bool,
+    ) -> Result<()> {
+        let device = Arc::new(Device::open(options)?);
+        let fusions = match self.fusion {
+            Some(FusionName::Layers) => vec![Fusion::Layers],
+            Some(FusionName::Pairs) => vec![Fusion::Pairs],
+            None => vec![Fusion::Layers, Fusion::Pairs],
+        };
+        let mut rows = Vec::new();
+        for network in networks {
+            let floats = match network.precision() {
+                Precision::F32 if device.has_half() => vec![Float::F16, Float::F32],
+                _ => vec![Float::F32],
+            };
+            for &size in sizes {
+                for &float in &floats {
+                    for &fusion in &fusions {
+                        let chain = ChainOptions { float, fusion };
+                        let budget = Duration::from_secs_f64(self.seconds);
+                        rows.push(bench::gpu::measure(
+                            network, size, &device, display, chain, budget,
+                        )?);
+                    }
+                }
+            }
+        }
+        gpu::keep_programs(&device);
+        super::print(
+            json,
+            &json!({"machine": device.name(), "rows": rows}),
+            gpu_table(&device, &rows),
+        );
+        Ok(())
+    }
+}
+
+fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
+    let mut text = format!("{}\n\n", device.name());
+    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    for row in rows {
+        let stage = |name| row.stage_ms.get(name).copied().unwrap_or(f64::NAN);
+        text += &format!(
+            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} |",
+            row.layers,
+            row.precision,
+            row.kernels,
+            row.width,
+            row.height,
+            stage("input"),
+            stage("network"),
+            stage("propagate"),
+            stage("encode"),
+            row.total_ms,
+            row.spread_ms[0],
+            row.spread_ms[1],
+            row.flying_ms,
+            whole(row.gmac_per_s),
+            whole(row.peak_percent),
+            whole(row.bandwidth_percent),
+        );
+    }
+    text
 }
 
 fn table(machine: &Machine, rows: &[Row]) -> String {

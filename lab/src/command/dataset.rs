@@ -9,7 +9,8 @@ use std::path::PathBuf;
 
 /// Make a data set: random scenes as layered depth images and their holograms
 ///
-/// Made again into the same folder it goes on where it was stopped.
+/// Made again into the same folder it goes on where it was stopped. Where the display's file names an aberration, the holograms
+/// correct it.
 #[derive(Args)]
 pub(crate) struct Dataset {
     /// Pairs to make
@@ -49,7 +50,8 @@ fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
 
 impl Dataset {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        let file = self.display.read()?;
+        let display = file.display;
         if display.offset_m() != 0.0 {
             return Err(Error::Input(
                 "a data set holds midpoint holograms; the display's offset must be 0".into(),
@@ -62,7 +64,8 @@ impl Dataset {
             self.ldi_layers,
             self.seed,
             display,
-        )?;
+        )?
+        .correcting(file.aberration.as_ref());
         let shard = self.shard.unwrap_or((0, 1));
         let mine = self.scenes.saturating_sub(shard.0).div_ceil(shard.1);
         let bar = progress_bar(mine as u64, "pairs");

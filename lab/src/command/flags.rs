@@ -4,10 +4,11 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use phasefront::depth::DepthUnit;
 use phasefront::encode::Encoding;
+use phasefront::gpu::DeviceOptions;
 use phasefront::{Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::rgbd::{self, DepthOptions};
-use phasefront_lab::{Error, Result, models};
+use phasefront_lab::{Error, Result, gpu, models};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,10 +27,7 @@ impl DisplayFlags {
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(path) => files::read_display(path)?,
-            None => DisplayFile {
-                display: phasefront::Display::default(),
-                lut: None,
-            },
+            None => phasefront::Display::default().into(),
         };
         if let Some(mm) = self.offset_mm {
             file.display = file.display.with_offset_m(mm / 1e3)?;
@@ -177,6 +175,36 @@ impl DepthFlags {
             unit,
             near_m: self.near,
             far_m: self.far,
+        }
+    }
+}
+
+/// Where frames are made.
+#[derive(Args)]
+pub(crate) struct BackendFlags {
+    /// Where frames are made
+    #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
+    backend: BackendName,
+    /// A part of the GPU's name [default: the fastest; drivers in software are taken by name only]
+    #[arg(long, value_name = "NAME")]
+    gpu: Option<String>,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum BackendName {
+    /// The processor
+    Cpu,
+    /// The graphics processor, by Vulkan, Metal or DirectX 12
+    Gpu,
+}
+
+impl BackendFlags {
+    /// Which GPU, if one is wanted.
+    pub(crate) fn device(&self) -> Result<Option<DeviceOptions>> {
+        match (self.backend, &self.gpu) {
+            (BackendName::Gpu, name) => Ok(Some(gpu::options(name.as_deref()))),
+            (BackendName::Cpu, None) => Ok(None),
+            (BackendName::Cpu, Some(_)) => Err(Error::Input("--gpu needs --backend gpu".into())),
         }
     }
 }

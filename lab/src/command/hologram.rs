@@ -1,19 +1,21 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
-use phasefront::modulator::Modulator;
-use phasefront::slm::Response;
+use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::{Pipeline, RgbdFrame, Sweep};
-use phasefront_lab::files::{self, HologramInfo};
+use phasefront_lab::calibrate::table::AberrationFile;
+use phasefront_lab::corrected::{self, Correction};
+use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, models, sm_lbm};
+use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use serde_json::json;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -47,6 +49,8 @@ pub(crate) struct Hologram {
     /// The amplitude that full light stands for [default: the largest of the image]
     #[arg(long, value_name = "A")]
     scale: Option<f32>,
+    #[command(flatten)]
+    backend: BackendFlags,
     #[command(flatten)]
     display: DisplayFlags,
     /// Write the complex field at the modulator there too, with a .json beside it
@@ -147,14 +151,17 @@ impl Hologram {
         }
         let encoding = self.encoder.read()?;
         let display = self.display.read()?;
-        let response = match display.lut {
-            Some(lut) => Response::lut(lut),
-            None => Response::linear(display.display.bits())?,
-        };
         let method = self.method.unwrap_or(match self.ldi {
             Some(_) => Method::Layers,
             None => Method::Network,
         });
+        let device = self.backend.device()?;
+        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+            return Err(Error::Input(
+                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                    .into(),
+            ));
+        }
         let made = match (method, &self.ldi) {
             (Method::Network | Method::Seeded, None) => {
                 let (stage, usual) = match method {
@@ -167,12 +174,15 @@ impl Hologram {
                     Method::Seeded => phasefront::Method::Seeded(network),
                     _ => phasefront::Method::trained(network),
                 };
-                self.by_pipeline(stage, method, &display.display, encoding, response)?
+                match &device {
+                    Some(options) => self.on_gpu(method, &display, encoding, options)?,
+                    None => self.by_pipeline(stage, method, &display, encoding)?,
+                }
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display.display, encoding, response)?
+                self.by_pipeline("sweep", method, &display, encoding)?
             }
             (Method::Network | Method::Sweep | Method::Seeded, Some(dir)) => {
                 return Err(Error::file(
@@ -185,11 +195,12 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display.display, encoding, response)?
+                self.by_physics(method, &ldi, &display, encoding)?
             }
         };
         let info = HologramInfo {
-            display: display.display,
+            calibrated: display.calibrated(true),
+            display: display.display.clone(),
             encoder: Some(self.encoder.name().into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
@@ -199,6 +210,7 @@ impl Hologram {
                 encoder: None,
                 scale: None,
                 lut: None,
+                calibrated: display.calibrated(false),
                 ..info.clone()
             };
             files::write_complex(path, field.view(), &info)?;
@@ -213,21 +225,26 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
-        display: &phasefront::Display,
+        display: &DisplayFile,
         encoding: Encoding,
-        response: Response,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let pipeline = Pipeline::new(
+        let mut pipeline = Pipeline::new(
             height,
             width,
             method,
-            display,
+            &display.display,
             encoding,
             self.scale(),
-            response,
+            display.response()?,
         )?;
+        if let Some(laser) = &display.laser {
+            pipeline = pipeline.with_illumination(laser.clone());
+        }
+        if let Some(correction) = display.constant_correction()? {
+            pipeline = pipeline.with_correction(&correction)?;
+        }
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -250,17 +267,74 @@ impl Hologram {
         })
     }
 
+    /// By a network on a GPU that was tried out before.
+    fn on_gpu(
+        &self,
+        method: phasefront::Method,
+        file: &DisplayFile,
+        encoding: Encoding,
+        options: &DeviceOptions,
+    ) -> Result<Made> {
+        if file.laser.is_some() || file.aberration.is_some() {
+            return Err(Error::Input(
+                "the display's laser map and aberration are heeded by --backend cpu alone".into(),
+            ));
+        }
+        let frame = &self.frame.read()?;
+        let (height, width) = frame.shape();
+        let scale = self.scale();
+        let response = file.response()?;
+        let job = Job::new(
+            height,
+            width,
+            method,
+            &file.display,
+            encoding,
+            scale,
+            response,
+        );
+        let device = Arc::new(Device::open(options)?);
+        phasefront::gpu::probe(&device, &job)?;
+        let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
+        let mut levels = Array3::zeros((3, height, width));
+        let bytes = levels.as_slice_mut().expect("standard layout");
+        let report = pipeline.process(&Frame::of(frame), bytes)?;
+        gpu::keep_programs(&device);
+        let times = report.times.unwrap_or_default();
+        Ok(Made {
+            field: None,
+            levels,
+            scale: report.scale,
+            stages: vec![
+                ("input", times.input),
+                ("network", times.network),
+                ("propagate", times.propagate),
+                ("encode", times.encode),
+            ],
+            engine: Some(pipeline.describe()),
+        })
+    }
+
     /// The methods that need no network, on a layered depth image.
     fn by_physics(
         &self,
         method: Method,
         ldi: &Ldi,
-        display: &phasefront::Display,
+        file: &DisplayFile,
         encoding: Encoding,
-        response: Response,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let modulator = Modulator::new(height, width, display, encoding, self.scale(), response)?;
+        let display = &file.display;
+        let mut modulator = file.modulator((height, width), encoding, self.scale())?;
+        // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
+        let (constant, varying) = match (method, file.constant_correction()) {
+            (_, Ok(constant)) => (constant, None),
+            (Method::Layers, Err(_)) => (None, file.aberration.as_ref()),
+            (_, Err(e)) => return Err(e),
+        };
+        if let Some(correction) = constant {
+            modulator = modulator.with_correction(&correction)?;
+        }
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
@@ -278,7 +352,17 @@ impl Hologram {
             }
             _ => {
                 bar.set_message("planes");
-                let field = sm_lbm::hologram(ldi, display, planes, &progress)?;
+                let shape = ldi.shape();
+                let field = match varying {
+                    None => sm_lbm::hologram(ldi, display, planes, &progress)?,
+                    Some(AberrationFile::Uniform(all)) => {
+                        let correction = Correction::of_aberrations(all, shape, planes, display)?;
+                        corrected::hologram(ldi, display, planes, &correction, &progress)?
+                    }
+                    Some(AberrationFile::Spatial(all)) => {
+                        corrected::spatial::hologram(ldi, display, planes, all, &progress)?
+                    }
+                };
                 ("layers", field)
             }
         };

@@ -25,6 +25,9 @@ pub(crate) struct Refocus {
     /// That many views from the near end of the volume to the far one
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
     stack: Option<u32>,
+    /// TOML file of a calibrated display, whose tables the hologram was made for
+    #[arg(long, value_name = "FILE")]
+    display: Option<PathBuf>,
     /// Write the stack as one moving GIF
     #[arg(long, requires = "stack")]
     gif: bool,
@@ -46,9 +49,11 @@ impl Refocus {
             }
         };
         let z_m: Vec<f64> = z_mm.iter().map(|z| z / 1e3).collect();
-        let views = hologram
-            .views(&z_m)
-            .map_err(|e| Error::file(&self.hologram, e))?;
+        let views = match &self.display {
+            None => hologram.views(&z_m),
+            Some(path) => hologram.views_on(&files::read_display(path)?, &z_m),
+        }
+        .map_err(|e| Error::file(&self.hologram, e))?;
         let mut written = Vec::new();
         if self.gif {
             write_gif(&self.output, &views)?;

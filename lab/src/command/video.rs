@@ -9,7 +9,6 @@ use phasefront::depth::range::DepthRange;
 use phasefront::session::{
     Brightness, Event, Hologram, Quality, RunningMode, SessionOptions, Statistics,
 };
-use phasefront::slm::Response;
 use phasefront::sweep::Sweep;
 use phasefront::{Display, Method, Session};
 use phasefront_lab::files::{self, HologramInfo};
@@ -268,7 +267,17 @@ impl Video {
     ) -> Result<(SessionOptions, HologramInfo)> {
         let file = self.display.read()?;
         let (width, height) = self.size.unwrap_or((width, height));
-        let display: Display = file.display.with_size(height, width)?;
+        if let Some(laser) = &file.laser
+            && (height, width) != (file.display.height(), file.display.width())
+        {
+            let (rows, columns) = laser.nodes();
+            return Err(Error::Input(format!(
+                "the display's laser map ({columns}×{rows} nodes) is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
+                file.display.width(),
+                file.display.height()
+            )));
+        }
+        let display: Display = file.display.clone().with_size(height, width)?;
         let method = match self.method {
             MethodName::Network => {
                 Method::trained(models::network(&self.network, self.precision.is_int8())?)
@@ -279,9 +288,11 @@ impl Video {
             MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
-        if let Some(lut) = file.lut {
-            options.response = Response::lut(lut);
+        if display.bits() <= 8 {
+            options.response = file.response()?;
         }
+        options.illumination = file.laser.clone();
+        options.correction = file.constant_correction()?;
         options.encoding = self.encoder.read()?;
         options.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
@@ -314,6 +325,7 @@ impl Video {
             encoder: Some(self.encoder.name().into()),
             scale: None,
             lut: file.lut.map(Vec::from),
+            calibrated: file.calibrated(true),
         };
         Ok((options, info))
     }

@@ -33,6 +33,12 @@ impl AntiAlias {
         })
     }
 
+    /// The centre tap and those to one side.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn taps(&self) -> &[f32] {
+        &self.taps
+    }
+
     /// Working memory for rows of `width` values, one call at a time: some rows for each thread.
     pub fn scratch(&self, width: usize) -> AntiAliasScratch {
         let half = self.taps.len() - 1;

@@ -38,6 +38,20 @@ impl BandLimit {
         self.fft.scratch()
     }
 
+    /// The largest |ky| that stays in column `kx` of the spectrum.
+    fn bound(&self, kx: usize) -> f64 {
+        let (height, width) = self.fft.padded_shape();
+        let tan_x = (PI * kx.min(width - kx) as f64 / width as f64).tan();
+        // tan grows with the frequency, so the rows that stay are those up to one angle.
+        (self.k / tan_x).atan() * height as f64 / PI
+    }
+
+    /// Whether the frequency of the spectrum's column `kx` and row `ky`, up to half of each, stays.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn keeps(&self, kx: usize, ky: usize) -> bool {
+        ky as f64 <= self.bound(kx)
+    }
+
     /// Filters `plane`, (H, W), as a periodic one.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
         let (height, width) = self.fft.padded_shape();
@@ -45,9 +59,7 @@ impl BandLimit {
         self.fft.convolve(
             plane,
             |kx, column| {
-                let tan_x = (PI * kx.min(width - kx) as f64 / width as f64).tan();
-                // tan grows with the frequency, so the rows that stay are those up to one angle.
-                let bound = (self.k / tan_x).atan() * height as f64 / PI;
+                let bound = self.bound(kx);
                 for (ky, value) in column.iter_mut().enumerate() {
                     let ky = ky.min(height - ky) as f64;
                     *value *= if ky <= bound { scale } else { 0.0 };

@@ -68,10 +68,11 @@ pub fn encode_levels(
         .enumerate()
         .for_each(|(row, (values, levels))| {
             let mut phases = [0.0; RUN];
-            for (values, levels) in values.chunks(RUN).zip(levels.chunks_mut(RUN)) {
+            let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
+            for (run, (values, levels)) in runs.enumerate() {
                 let phases = &mut phases[..values.len()];
                 encode_run(values, row % height, scale, phases);
-                response.levels(phases, levels);
+                response.levels(phases, row * width + run * RUN, levels);
             }
         });
 }
@@ -134,6 +135,7 @@ fn atan2(y: f32, x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::slm::per_pixel::{self, PerPixel};
 
     #[test]
     fn the_two_phases_sum_to_the_value() {
@@ -154,6 +156,18 @@ mod tests {
         let sum = Complex32::from_polar(1.0, even) + Complex32::from_polar(1.0, odd);
         assert!(sum.norm() < 1e-6);
         assert_eq!(wrap(-1e-12), 0.0);
+    }
+
+    /// A table whose curves differ from node to node.
+    fn per_pixel((h, w): (usize, usize)) -> Response {
+        let (rows, columns) = per_pixel::nodes(h, w, 20);
+        let steepness = |node: usize| 20.0 + (node % 11) as f32;
+        let levels: Vec<f32> = (0..3 * rows * columns * 9)
+            .map(|i| (i % 9) as f32 * steepness(i / 9))
+            .collect();
+        let turns = vec![6.0; 3 * rows * columns];
+        let table = PerPixel::new(h, w, 20, 8, &levels, &turns);
+        Response::PerPixel(table.expect("a table").into())
     }
 
     #[test]
@@ -189,14 +203,13 @@ mod tests {
             for response in [
                 Response::Linear { bits: 8 },
                 Response::lut(std::array::from_fn(|i| 255 - i as u8)),
+                per_pixel((h, w)),
             ] {
                 let mut fused = vec![0; field.len()];
                 encode_levels(&field, w, h * w, scale, &response, &mut fused);
                 assert!(
-                    phase
-                        .iter()
-                        .zip(&fused)
-                        .all(|(p, l)| response.level(*p) == *l)
+                    (phase.iter().zip(&fused).enumerate())
+                        .all(|(at, (p, l))| response.level(*p, at) == *l)
                 );
             }
         }

@@ -1,7 +1,9 @@
 //! Camera images to amplitudes at the display's resolution: turned upright, cropped, resized and converted in one
 //! pass over the image. [`super::reference`] is its oracle.
 
-use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
+use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix, check_size};
+#[cfg(feature = "gpu")]
+use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
 use crate::error::{Error, Result};
@@ -52,15 +54,29 @@ impl ColourPlan {
         height: usize,
         width: usize,
     ) -> Result<Self> {
+        Self::for_format(image.format(), image.shape(), orientation, height, width)
+    }
+
+    /// [`ColourPlan::new`] for images of that `format` and (H, W).
+    ///
+    /// # Errors
+    /// An empty or too large image, or an empty output.
+    pub fn for_format(
+        format: ColourFormat,
+        sensor: (usize, usize),
+        orientation: Orientation,
+        height: usize,
+        width: usize,
+    ) -> Result<Self> {
+        check_size("colour", sensor.1, sensor.0)?;
         if height == 0 || width == 0 {
             return Err(Error::Plan(format!(
                 "a frame of {width}×{height} is empty; each side must be at least 1"
             )));
         }
-        let sensor = image.shape();
         let upright = orientation.upright_shape(sensor.0, sensor.1);
         let crop = Crop::cover(upright, (height, width));
-        let chroma = image.format().layout().get(1).map(|(_, _, share)| {
+        let chroma = format.layout().get(1).map(|(_, _, share)| {
             let half = |n: usize| n.div_ceil(*share);
             // Of an odd side the last chroma sample reaches beyond the picture, at its far end or, flipped, at its near.
             let from = |from: f64, side: usize, flipped: bool| {
@@ -79,7 +95,7 @@ impl ColourPlan {
             }
         });
         Ok(ColourPlan {
-            format: image.format(),
+            format,
             sensor,
             orientation,
             out: (height, width),
@@ -99,6 +115,30 @@ impl ColourPlan {
     /// (H, W) of the amplitudes.
     pub fn shape(&self) -> (usize, usize) {
         self.out
+    }
+
+    /// How the first channel is resampled along x and along y, and how the other two are.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn axes(&self) -> [&Axis; 4] {
+        let chroma = self.chroma.as_ref().unwrap_or(&self.luma);
+        [&self.luma.x, &self.luma.y, &chroma.x, &chroma.y]
+    }
+
+    /// Of each channel of `image`: its plane, and where the upright picture's bytes of it lie there.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn views(&self, image: &ColourImage<'_>) -> [(usize, View); 3] {
+        let planes = match self.format {
+            ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => [0; 3],
+            ColourFormat::Nv12(_) => [0, 1, 1],
+            ColourFormat::Yuv420(_) => [0, 1, 2],
+        };
+        let channels = self.channels(image);
+        std::array::from_fn(|c| {
+            let channel = &channels[c];
+            let view = self.orientation.view(&channel.plane, channel.sensor);
+            let origin = view.origin + channel.byte;
+            (planes[c], View { origin, ..view })
+        })
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.

@@ -108,6 +108,12 @@ impl Axis {
             .map(move |(k, w)| (start + k, *w))
     }
 
+    /// Of each output sample, its first input sample; of each, as many weights as are returned third.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn tables(&self) -> (&[u32], &[f32], usize) {
+        (&self.start, &self.weights, self.taps)
+    }
+
     /// Input samples that are needed: from the first to behind the last.
     pub(crate) fn needed(&self) -> std::ops::Range<usize> {
         let first = self.start.iter().min().copied().unwrap_or(0);

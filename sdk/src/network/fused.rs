@@ -185,6 +185,22 @@ fn f32(chain: &Chain, isa: Isa) -> Result<F32Chain, String> {
 }
 
 fn int8(chain: &Chain, isa: Isa) -> Result<Int8Chain, String> {
+    let all = int8_layers(chain)?;
+    let twice = chain.concat_rounded_input;
+    Int8Chain::new(&all.layers, all.input, all.concatenated, twice, isa)
+}
+
+/// A quantised chain in the steps that kernels multiply by.
+pub(crate) struct Int8Layers {
+    pub(crate) layers: Vec<Int8Layer>,
+    /// How the network's input is rounded for the first layer.
+    pub(crate) input: Quantiser,
+    /// How it is for the last one.
+    pub(crate) concatenated: Quantiser,
+}
+
+/// The layers of a quantised chain as [`Int8Chain`] takes them.
+pub(crate) fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
     let input = |i: usize| -> Result<Quantisation, String> {
         chain.layers[i]
             .quantisation
@@ -251,13 +267,11 @@ fn int8(chain: &Chain, isa: Isa) -> Result<Int8Chain, String> {
         scale: q.scale,
         zero_point: q.zero_point,
     };
-    Int8Chain::new(
-        &layers,
-        quantiser(input(0)?),
-        quantiser(input(last)?),
-        chain.concat_rounded_input,
-        isa,
-    )
+    Ok(Int8Layers {
+        input: quantiser(input(0)?),
+        concatenated: quantiser(input(last)?),
+        layers,
+    })
 }
 
 /// tanh of runs of values, in place.

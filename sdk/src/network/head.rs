@@ -103,7 +103,7 @@ impl Head {
                         re[..count].iter_mut().for_each(|re| *re = 2.0 * *re + 0.5);
                         im[..count].iter_mut().for_each(|im| *im *= 2.0);
                     }
-                    InputKind::Rgbd | InputKind::Ldi { .. } => {
+                    InputKind::Rgbd | InputKind::RgbdXy | InputKind::Ldi { .. } => {
                         base(c, at, &mut re[..count]);
                         // Colours come in minus a half.
                         re[..count].iter_mut().for_each(|re| *re += 0.5);

@@ -10,6 +10,9 @@ use tract_onnx::pb::StringStringEntryProto;
 pub enum InputKind {
     /// "rgbd": red, green, blue and normalized depth, each minus 0.5.
     Rgbd,
+    /// "rgbdxy": as [`InputKind::Rgbd`], then the place in the frame, x and y, from −½ at the first pixel's outer edge to
+    /// ½ at the last one's: for aberrations that differ over it.
+    RgbdXy,
     /// "ldi2" to "ldi9": that many layers front first, each as [`InputKind::Rgbd`].
     Ldi {
         /// How many layers.
@@ -26,6 +29,7 @@ impl InputKind {
     pub fn channels(self) -> usize {
         match self {
             InputKind::Rgbd => 4,
+            InputKind::RgbdXy => 6,
             InputKind::Ldi { layers } => 4 * layers,
             InputKind::Seeded => 10,
             InputKind::Field => 6,
@@ -35,6 +39,7 @@ impl InputKind {
     fn from_name(name: &str) -> Option<InputKind> {
         match name.as_bytes() {
             b"rgbd" => Some(InputKind::Rgbd),
+            b"rgbdxy" => Some(InputKind::RgbdXy),
             b"seeded" => Some(InputKind::Seeded),
             b"field" => Some(InputKind::Field),
             [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
@@ -49,12 +54,16 @@ impl std::fmt::Display for InputKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             InputKind::Rgbd => f.write_str("rgbd"),
+            InputKind::RgbdXy => f.write_str("rgbdxy"),
             InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
             InputKind::Seeded => f.write_str("seeded"),
             InputKind::Field => f.write_str("field"),
         }
     }
 }
+
+/// What `phasefront.input` may be.
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9' or 'field'";
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,14 +82,8 @@ pub struct TrainedDisplay {
 pub(super) fn read(
     metadata: &[StringStringEntryProto],
 ) -> Result<(InputKind, Head, TrainedDisplay)> {
-    let input = text(metadata, "input", "'rgbd', 'seeded', 'ldi5' or 'field'")?;
-    let input = InputKind::from_name(input).ok_or_else(|| {
-        wrong(
-            "input",
-            input,
-            "'rgbd', 'seeded', 'ldi2' to 'ldi9' or 'field'",
-        )
-    })?;
+    let input = text(metadata, "input", INPUTS)?;
+    let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;
     let heads = "'amplitude-phase' or 'real-imaginary'";
     let head = text(metadata, "head", heads)?;
     let head = [Head::AmplitudePhase, Head::RealImaginary]

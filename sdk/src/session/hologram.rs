@@ -1,12 +1,15 @@
 //! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
 
+use super::SessionOptions;
 use super::live::lock;
 use super::statistics::FrameTimes;
 use crate::display::Display;
 use crate::error::{Error, Result};
+use crate::illumination::Illumination;
 use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch};
 use crate::slm::Response;
+use crate::wave::zernike::Aberration;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -58,6 +61,8 @@ impl<T> Drop for Pooled<T> {
 pub(super) struct Viewer {
     pub(super) display: Display,
     pub(super) response: Response,
+    illumination: Option<Illumination>,
+    correction: Option<Aberration>,
     plan: Mutex<Option<ViewPlan>>,
 }
 
@@ -65,14 +70,18 @@ struct ViewPlan {
     shape: (usize, usize),
     z_m: f64,
     preview: Preview,
+    /// That of the hologram's pixels.
+    response: Response,
     scratch: PreviewScratch,
 }
 
 impl Viewer {
-    pub(super) fn new(display: Display, response: Response) -> Self {
+    pub(super) fn new(options: &SessionOptions) -> Self {
         Viewer {
-            display,
-            response,
+            display: options.display.clone(),
+            response: options.response.clone(),
+            illumination: options.illumination.clone(),
+            correction: options.correction,
             plan: Mutex::new(None),
         }
     }
@@ -205,25 +214,31 @@ impl Hologram {
             plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
         };
         if plan.as_mut().filter(fits).is_none() {
-            let preview = Preview::new(self.shape, &self.viewer.display, z_m, (height, width))?;
+            let response = self.viewer.response.clone();
+            let display = &self.viewer.display;
+            let mut preview = Preview::new(self.shape, display, z_m, (height, width))?;
+            if let Some(illumination) = &self.viewer.illumination {
+                preview = preview.with_illumination(illumination.clone(), display);
+            }
+            if let Some(correction) = &self.viewer.correction {
+                preview = preview.with_correction(correction, display, z_m)?;
+            }
             *plan = Some(ViewPlan {
                 shape: self.shape,
                 z_m,
                 scratch: preview.scratch(),
                 preview,
+                response: response.centred(self.shape.0, self.shape.1)?,
             });
         }
         if let Some(ViewPlan {
-            preview, scratch, ..
+            preview,
+            response,
+            scratch,
+            ..
         }) = &mut *plan
         {
-            preview.look(
-                self.levels(),
-                &self.viewer.response,
-                self.scale,
-                rgba,
-                scratch,
-            );
+            preview.look(self.levels(), response, self.scale, rgba, scratch);
         }
         Ok(())
     }

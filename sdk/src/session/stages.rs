@@ -69,10 +69,7 @@ impl Stages {
             ladder: Ladder::new(options.ladder.len(), start),
             plan: None,
             brightness: BrightnessTracker::new(options.brightness),
-            viewer: Arc::new(Viewer::new(
-                options.display.clone(),
-                options.response.clone(),
-            )),
+            viewer: Arc::new(Viewer::new(&options)),
             levels: Pool::default(),
             words: Pool::default(),
             depths: Pool::default(),
@@ -89,7 +86,7 @@ impl Stages {
         let (height, width) = (rung.height, rung.width);
         let depth = DepthStream::new(self.options.depth, (height, width))?;
         self.pool.install(|| {
-            let pipeline = Pipeline::new(
+            let mut pipeline = Pipeline::new(
                 height,
                 width,
                 rung.method.clone(),
@@ -98,6 +95,12 @@ impl Stages {
                 Scale::Max,
                 self.options.response.clone(),
             )?;
+            if let Some(illumination) = &self.options.illumination {
+                pipeline = pipeline.with_illumination(illumination.clone());
+            }
+            if let Some(correction) = &self.options.correction {
+                pipeline = pipeline.with_correction(correction)?;
+            }
             Ok(RungPlan {
                 scratch: pipeline.scratch(),
                 pipeline,

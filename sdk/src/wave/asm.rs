@@ -11,6 +11,7 @@
 //! phase zero here, and both agree at z = 0.
 
 use super::fft::{Fft2, Scratch, smooth_size};
+use super::zernike::Aberration;
 use crate::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -91,13 +92,23 @@ pub fn padded_shape(
     })
 }
 
-/// The transfer function of one distance on a padded plane, one quadrant of it: it is even in
-/// both frequencies.
+/// The transfer function of one distance on a padded plane: one quadrant of it where it is even in both
+/// frequencies, as free space is.
 pub struct Transfer {
-    /// (W'/2 + 1, H'/2 + 1), scaled by 1/(H'·W') for the unnormalized transforms.
-    quadrant: Vec<Complex32>,
+    /// (W'/2 + 1, H'/2 + 1), or (W', H') where it is not even; scaled by 1/(H'·W') for the unnormalized
+    /// transforms.
+    factors: Vec<Complex32>,
+    even: bool,
     padded_height: usize,
     padded_width: usize,
+}
+
+/// The exponent of free space at the frequency (`mu`, `nu`), cycles a metre, without the carrier, radians;
+/// None where the wave is evanescent.
+fn free_space(mu: f64, nu: f64, wavelength_m: f64, distance_m: f64) -> Option<f64> {
+    let f2 = mu * mu + nu * nu;
+    let cosine2 = 1.0 - wavelength_m * wavelength_m * f2;
+    (cosine2 >= 0.0).then(|| -2.0 * PI * distance_m * wavelength_m * f2 / (1.0 + cosine2.sqrt()))
 }
 
 impl Transfer {
@@ -112,34 +123,81 @@ impl Transfer {
     ) -> Self {
         let (rows, columns) = (padded_height / 2 + 1, padded_width / 2 + 1);
         let scale = 1.0 / (padded_height * padded_width) as f64;
-        let mut quadrant = Vec::with_capacity(rows * columns);
+        let mut factors = Vec::with_capacity(rows * columns);
         for kx in 0..columns {
             let mu = kx as f64 / (padded_width as f64 * pitch_m);
             for ky in 0..rows {
                 let nu = ky as f64 / (padded_height as f64 * pitch_m);
-                let f2 = mu * mu + nu * nu;
-                let cosine2 = 1.0 - wavelength_m * wavelength_m * f2;
-                quadrant.push(if cosine2 < 0.0 || !keep(mu, nu) {
-                    Complex32::new(0.0, 0.0)
-                } else {
-                    let phase = -2.0 * PI * distance_m * wavelength_m * f2 / (1.0 + cosine2.sqrt());
-                    let (sin, cos) = phase.sin_cos();
-                    Complex32::new((cos * scale) as f32, (sin * scale) as f32)
+                factors.push(match free_space(mu, nu, wavelength_m, distance_m) {
+                    Some(phase) if keep(mu, nu) => polar(scale, phase),
+                    _ => Complex32::ZERO,
                 });
             }
         }
         Transfer {
-            quadrant,
+            factors,
+            even: true,
             padded_height,
             padded_width,
         }
     }
 
+    /// H(µ, ν)·exp(i·`phase`(µ, ν)) of `distance_m` on a padded plane (H', W'), µ and ν signed: free space and
+    /// a correction in the pupil. Four times the memory of [`Self::new`].
+    pub fn corrected(
+        (padded_height, padded_width): (usize, usize),
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        phase: impl Fn(f64, f64) -> f64,
+    ) -> Self {
+        let scale = 1.0 / (padded_height * padded_width) as f64;
+        let frequency = |k: usize, n: usize| {
+            let k = if 2 * k < n {
+                k as f64
+            } else {
+                k as f64 - n as f64
+            };
+            k / (n as f64 * pitch_m)
+        };
+        let mut factors = Vec::with_capacity(padded_height * padded_width);
+        for kx in 0..padded_width {
+            let mu = frequency(kx, padded_width);
+            for ky in 0..padded_height {
+                let nu = frequency(ky, padded_height);
+                factors.push(match free_space(mu, nu, wavelength_m, distance_m) {
+                    Some(free) => polar(scale, free + phase(mu, nu)),
+                    None => Complex32::ZERO,
+                });
+            }
+        }
+        Transfer {
+            factors,
+            even: false,
+            padded_height,
+            padded_width,
+        }
+    }
+
+    /// One quadrant, (W'/2 + 1, H'/2 + 1), of a transfer function without a correction.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn quadrant(&self) -> &[Complex32] {
+        debug_assert!(self.even);
+        &self.factors
+    }
+
     /// Multiplies column `x` of a spectrum by the transfer function.
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
+        if !self.even {
+            let factors = &self.factors[x * self.padded_height..][..self.padded_height];
+            for (value, factor) in column.iter_mut().zip(factors) {
+                *value *= factor;
+            }
+            return;
+        }
         let rows = self.padded_height / 2 + 1;
         let x = x.min(self.padded_width - x);
-        let transfer = &self.quadrant[x * rows..][..rows];
+        let transfer = &self.factors[x * rows..][..rows];
         let (near, far) = column.split_at_mut(rows);
         for (value, factor) in near.iter_mut().zip(transfer) {
             *value *= factor;
@@ -148,6 +206,12 @@ impl Transfer {
             *value *= factor;
         }
     }
+}
+
+/// `scale`·exp(i·`phase`), the angle in f64.
+fn polar(scale: f64, phase: f64) -> Complex32 {
+    let (sin, cos) = phase.sin_cos();
+    Complex32::new((cos * scale) as f32, (sin * scale) as f32)
 }
 
 /// What [`Transfer::new`] is to keep under `padding`: everything, or the frequencies under the
@@ -250,6 +314,41 @@ impl Propagator {
         }))
     }
 
+    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is that of a
+    /// modulator of `modulator_pitch_m`, on its way.
+    ///
+    /// # Errors
+    /// As [`padded_shape`], the light that the correction moves counted in.
+    pub fn for_colours_corrected(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelengths_m: [f64; 3],
+        distance_m: f64,
+        aberration: &Aberration,
+        modulator_pitch_m: f64,
+    ) -> Result<[Self; 3]> {
+        let longest = wavelengths_m.into_iter().fold(0.0, f64::max);
+        let more = (aberration.reach_m(modulator_pitch_m) / pitch_m).ceil() as usize;
+        let (h, w) = (height.saturating_add(more), width.saturating_add(more));
+        let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
+        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        Ok([0, 1, 2].map(|colour| {
+            let transfer = Transfer::corrected(
+                padded,
+                pitch_m,
+                wavelengths_m[colour],
+                distance_m,
+                |mu, nu| aberration.phase(colour, mu, nu, modulator_pitch_m),
+            );
+            Propagator {
+                shape: (height, width),
+                fft: fft.clone(),
+                transfer: Arc::new(transfer),
+            }
+        }))
+    }
+
     /// (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.shape
@@ -258,6 +357,12 @@ impl Propagator {
     /// (H', W').
     pub fn padded_shape(&self) -> (usize, usize) {
         self.fft.padded_shape()
+    }
+
+    /// The transfer function.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn transfer(&self) -> &Transfer {
+        &self.transfer
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.

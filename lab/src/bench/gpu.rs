@@ -1,0 +1,166 @@
+//! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
+//! measured in the same run.
+
+use super::median;
+use crate::error::Result;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
+use phasefront::gpu::{
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, Job,
+    Pipeline, StageTimes, probe,
+};
+use phasefront::slm::Response;
+use phasefront::{Display, Method, Network};
+use serde::Serialize;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// What was measured of one network and frame size on a GPU. Times are milliseconds, medians over frames.
+#[derive(Debug, Clone, Serialize)]
+pub struct GpuRow {
+    /// Convolution layers.
+    pub layers: usize,
+    /// The numbers that the network was computed in: `f32`, `f16` or `int8`.
+    pub precision: String,
+    /// Always `gpu`.
+    pub backend: &'static str,
+    /// The device, how many layers a dispatch computes, and how many dispatches the network takes.
+    pub kernels: String,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Each stage's median, where the device has time stamps.
+    pub stage_ms: BTreeMap<&'static str, f64>,
+    /// The median of whole frames, one at a time, from the CPU's memory and back to it.
+    pub total_ms: f64,
+    /// The fastest and the slowest frame.
+    pub spread_ms: [f64; 2],
+    /// Time a frame with several in flight whose levels stay on the GPU.
+    pub flying_ms: f64,
+    /// Frames that were measured one at a time.
+    pub frames: usize,
+    /// The network's multiply-adds in its median time, 10⁹ a second.
+    pub gmac_per_s: Option<f64>,
+    /// That, of what the device does here from registers alone in these numbers.
+    pub peak_percent: Option<f64>,
+    /// What the network's dispatches read and write, each value once, of what a copy does here.
+    pub bandwidth_percent: Option<f64>,
+}
+
+/// Measures `network` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not counted.
+///
+/// # Errors
+/// A case that cannot be planned there, or a device that does not answer as the CPU does.
+pub fn measure(
+    network: &Arc<Network>,
+    (width, height): (usize, usize),
+    device: &Arc<Device>,
+    display: &Display,
+    chain: ChainOptions,
+    budget: Duration,
+) -> Result<GpuRow> {
+    let mut job = Job::new(
+        height,
+        width,
+        Method::Network(network.clone()),
+        display,
+        Encoding::ANTI_ALIAS,
+        Scale::Fixed(1.0),
+        Response::linear(display.bits())?,
+    );
+    job.chain = chain;
+    probe(device, &job)?;
+    // As phones give frames: luma, chroma at half the resolution, depth of 16 bits.
+    let format = ColourFormat::Nv12(YuvEncoding::default());
+    job.colour = Colour::Camera {
+        format,
+        height,
+        width,
+        orientation: Orientation::default(),
+    };
+    job.depth = Depth::U16;
+    let mut pipeline = Pipeline::new(device, &job)?;
+    let byte = |i: usize| (i * 7 % 256) as u8;
+    let luma: Vec<u8> = (0..height * width).map(byte).collect();
+    let chroma: Vec<u8> = (0..2 * height.div_ceil(2) * width.div_ceil(2))
+        .map(byte)
+        .collect();
+    let depth: Vec<u16> = (0..height * width).map(|i| (i / 8 * 257) as u16).collect();
+    let planes = [
+        Plane::new(&luma, width, 1),
+        Plane::new(&chroma, 2 * width.div_ceil(2), 2),
+    ];
+    let frame = Frame {
+        colour: ColourData::Camera(ColourImage::new(format, width, height, &planes)?),
+        depth: DepthData::U16(&depth),
+    };
+    let mut levels = vec![0; 3 * height * width];
+    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
+    let mut totals = Vec::new();
+    let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    pipeline.process(&frame, &mut levels)?;
+    let start = Instant::now();
+    while totals.len() < 5 || start.elapsed() < budget {
+        let begin = Instant::now();
+        let report = pipeline.process(&frame, &mut levels)?;
+        totals.push(ms(begin.elapsed()));
+        if let Some(times) = report.times {
+            let StageTimes {
+                input,
+                network,
+                propagate,
+                encode,
+            } = times;
+            for (stage, time) in [
+                ("input", input),
+                ("network", network),
+                ("propagate", propagate),
+                ("encode", encode),
+            ] {
+                stages.entry(stage).or_default().push(ms(time));
+            }
+        }
+    }
+    let start = Instant::now();
+    let mut flying = VecDeque::new();
+    let mut flown = 0;
+    while flown < 5 || start.elapsed() < budget {
+        if flying.len() == FLIGHTS {
+            pipeline.finish(flying.pop_front().expect("not empty"))?;
+            flown += 1;
+        }
+        flying.push_back(pipeline.submit(&frame, Deliver::Shown)?);
+    }
+    for ticket in flying {
+        pipeline.finish(ticket)?;
+        flown += 1;
+    }
+    let flying_ms = ms(start.elapsed()) / f64::from(flown);
+    let stage_ms: BTreeMap<_, _> = (stages.into_iter())
+        .map(|(stage, mut times)| (stage, median(&mut times)))
+        .collect();
+    let total_ms = median(&mut totals);
+    let peak = pipeline.peak()?;
+    let network_s = stage_ms.get("network").map(|ms| ms / 1e3);
+    let mac_per_s =
+        network_s.map(|s| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
+    Ok(GpuRow {
+        layers: network.layers(),
+        precision: pipeline.numbers().to_owned(),
+        backend: "gpu",
+        kernels: pipeline.describe(),
+        width,
+        height,
+        stage_ms,
+        total_ms,
+        spread_ms: [totals[0], totals[totals.len() - 1]],
+        flying_ms,
+        frames: totals.len(),
+        gmac_per_s: mac_per_s.map(|rate| rate / 1e9),
+        peak_percent: mac_per_s.map(|rate| 100.0 * rate / peak.mac_per_s),
+        bandwidth_percent: network_s
+            .map(|s| 100.0 * pipeline.network_bytes() as f64 / s / peak.bytes_per_s),
+    })
+}

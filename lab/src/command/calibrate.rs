@@ -1,0 +1,622 @@
+//! `phasefront calibrate`: from photographs of a display to the files that its `--display` file refers to.
+
+use super::flags::{DisplayFlags, parse_size, progress_bar};
+use clap::{Args, Subcommand, ValueEnum};
+use ndarray::{Axis, stack};
+use phasefront::Display;
+use phasefront_lab::calibrate::lut::{self, Refusal};
+use phasefront_lab::calibrate::pattern::{PATTERNS, Pattern};
+use phasefront_lab::calibrate::photograph::Photograph;
+use phasefront_lab::calibrate::rehearse::{self, Rehearsal};
+use phasefront_lab::calibrate::spot::{self, Search, TRIALS};
+use phasefront_lab::calibrate::table::{self, AberrationFile, Entry};
+use phasefront_lab::calibrate::{COLOURS, laser, marks, report};
+use phasefront_lab::{Error, Result, files};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Calibrate a real display, or rehearse it on a simulated one
+#[derive(Subcommand)]
+pub(crate) enum Calibrate {
+    Lut(Lut),
+    Laser(Laser),
+    Aberration(Aberration),
+    Rehearse(Rehearse),
+}
+
+impl Calibrate {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        match self {
+            Calibrate::Lut(command) => command.run(json),
+            Calibrate::Laser(command) => command.run(json),
+            Calibrate::Aberration(command) => command.run(json),
+            Calibrate::Rehearse(command) => command.run(json),
+        }
+    }
+}
+
+/// Find each pixel's phase curve: write the 256 patterns, or read their photographs
+///
+/// First `--patterns DIR`; show each on the modulator, focus on it, photograph it in each colour, linear, none saturated, the
+/// camera fixed, as red/capture_000.png (or .tif) … blue/capture_255.png. Then `--captures DIR -o table.pfp`.
+#[derive(Args)]
+#[command(group = clap::ArgGroup::new("step").required(true))]
+pub(crate) struct Lut {
+    /// Write pattern_000.png to pattern_255.png there
+    #[arg(long, value_name = "DIR", group = "step", conflicts_with = "output")]
+    patterns: Option<PathBuf>,
+    /// Folder with the folders red, green and blue of photographs
+    #[arg(long, value_name = "DIR", group = "step", requires = "output")]
+    captures: Option<PathBuf>,
+    /// The table for a phone: `per_pixel` of a display file
+    #[arg(short, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Write the full tables there too: full_red.npy …, uint8 (H, W, 256)
+    #[arg(long, value_name = "DIR", requires = "captures")]
+    full: Option<PathBuf>,
+    /// Write drawings of curves, residuals and maps there
+    #[arg(long, value_name = "DIR", requires = "captures")]
+    report: Option<PathBuf>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Write over what is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Lut {
+    fn run(self, json: bool) -> Result<()> {
+        let display = self.display.read()?.display;
+        let pattern = Pattern::new(display.height(), display.width())?;
+        match (&self.patterns, &self.captures, &self.output) {
+            (Some(folder), ..) => self.write_patterns(json, &pattern, folder),
+            (None, Some(captures), Some(output)) => self.measure(json, &pattern, captures, output),
+            _ => Err(Error::Input("give --patterns, or --captures and -o".into())),
+        }
+    }
+
+    fn write_patterns(&self, json: bool, pattern: &Pattern, folder: &Path) -> Result<()> {
+        let path = |k: usize| folder.join(format!("pattern_{k:03}.png"));
+        for k in 0..PATTERNS {
+            keep(&path(k), self.force)?;
+        }
+        make(folder)?;
+        let bar = progress_bar(PATTERNS as u64, "patterns");
+        for k in 0..PATTERNS {
+            grey(pattern.frame(k as u8), &path(k))?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        super::print(
+            json,
+            &json!({"patterns": PATTERNS, "folder": folder}),
+            format!(
+                "{PATTERNS} patterns in {}; photograph each in red, green and blue light",
+                folder.display()
+            ),
+        );
+        Ok(())
+    }
+
+    fn measure(&self, json: bool, pattern: &Pattern, captures: &Path, output: &Path) -> Result<()> {
+        keep(output, self.force)?;
+        let full = |colour: usize| {
+            let name = format!("full_{}.npy", COLOURS[colour]);
+            self.full.as_ref().map(|folder| folder.join(name))
+        };
+        for colour in 0..3 {
+            full(colour).map_or(Ok(()), |path| keep(&path, self.force))?;
+        }
+        let drawings = ["curves.svg", "residuals.svg", "maps.svg"];
+        for (folder, name) in self
+            .report
+            .iter()
+            .flat_map(|f| drawings.map(|name| (f, name)))
+        {
+            keep(&folder.join(name), self.force)?;
+        }
+        let spool = match output.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let (mut curves, mut problems) = (Vec::new(), Vec::new());
+        for (colour, name) in COLOURS.iter().enumerate() {
+            let folder = captures.join(name);
+            let source = |k: usize| lut::read_capture(&folder, colour, k);
+            let bar = progress_bar(0, name);
+            let progress = |done: usize, of: usize| {
+                bar.set_length(of as u64);
+                bar.set_position(done as u64);
+            };
+            let measured = lut::measure(pattern, colour, &source, spool, &progress);
+            bar.finish_and_clear();
+            match measured {
+                Ok(measured) => curves.push(measured),
+                Err(Refusal::Problems(some)) => problems.extend(some),
+                Err(Refusal::Other(e)) => return Err(e),
+            }
+        }
+        for problem in &problems {
+            log::warn!("{}", captures.join(problem.to_string()).display());
+        }
+        let curves: [lut::Curves; 3] = curves.try_into().map_err(|_| {
+            Error::file(
+                captures,
+                format!(
+                    "{} of {} captures cannot be used, each named above",
+                    problems.len(),
+                    3 * PATTERNS
+                ),
+            )
+        })?;
+        let per_pixel = lut::compact(&curves)?;
+        let report = report::report(&curves, &per_pixel);
+        for colour in &report.colours {
+            for [x, y] in &colour.silent_at {
+                log::warn!(
+                    "{}: pixel ({x}, {y}) does not answer: dust, or dead; its curve is its neighbours'",
+                    colour.colour
+                );
+            }
+        }
+        if let Some(folder) = &self.report {
+            make(folder)?;
+            report::draw(&curves, folder)?;
+        }
+        for curves in &curves {
+            if let Some(path) = full(curves.colour) {
+                path.parent().map_or(Ok(()), make)?;
+                files::write_atomically(&path, |file| lut::write_full(curves, &per_pixel, file))?;
+            }
+        }
+        table::write_per_pixel(output, &per_pixel)?;
+        super::print(
+            json,
+            &json!({"output": output, "report": report}),
+            format!("{}\n{}", report.text(), output.display()),
+        );
+        Ok(())
+    }
+}
+
+/// Find the laser's amplitude over the modulator, from photographs of a diffuser in its place
+///
+/// CAPTURES has folders red, green and blue, in each diffuser.png (or .tif) and capture_000.png, a photograph of pattern 0 by
+/// the camera where it stands, which tells where the modulator is.
+#[derive(Args)]
+pub(crate) struct Laser {
+    /// Folder with the folders red, green and blue
+    #[arg(value_name = "CAPTURES")]
+    captures: PathBuf,
+    /// Fit a mixture of that many Gaussian beams
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=4))]
+    gaussians: Option<u8>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// The map: `laser` of a display file
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+    /// Write over what is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Laser {
+    fn run(self, json: bool) -> Result<()> {
+        keep(&self.output, self.force)?;
+        if !files::has_extension(&self.output, "png") {
+            return Err(Error::file(&self.output, "the name must end in .png"));
+        }
+        let display = self.display.read()?.display;
+        let shape = (display.height(), display.width());
+        let pattern = Pattern::new(shape.0, shape.1)?;
+        let (mut maps, mut left) = (Vec::new(), Vec::new());
+        for (colour, name) in COLOURS.iter().enumerate() {
+            let folder = self.captures.join(name);
+            let read = |stem: &str| -> Result<(PathBuf, Photograph)> {
+                let path = photo_path(&folder, stem)?;
+                let photo = Photograph::read(&path, colour)?;
+                Ok((path, photo))
+            };
+            let ((marked_path, marked), (path, photo)) = (read("capture_000")?, read("diffuser")?);
+            if (marked.height, marked.width) != (photo.height, photo.width) {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "is {}×{}, {} is {}×{}; one camera must take both from one place",
+                        photo.width,
+                        photo.height,
+                        marked_path.display(),
+                        marked.width,
+                        marked.height
+                    ),
+                ));
+            }
+            let registration = marks::Registration::find(&marked, &pattern)
+                .map_err(|e| Error::file(&marked_path, e))?;
+            let map =
+                laser::map(&photo, &registration, shape).map_err(|e| Error::file(&path, e))?;
+            let map = match self.gaussians {
+                None => map,
+                Some(count) => {
+                    let (fitted, _, rest) = laser::mixture(&map, count.into())?;
+                    left.push(rest);
+                    fitted
+                }
+            };
+            maps.push(map);
+        }
+        let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
+        let all = stack(Axis(0), &views).map_err(|e| Error::file(&self.output, e))?;
+        table::write_laser(&self.output, all.view())?;
+        let least: Vec<f32> = (maps.iter())
+            .map(|map| {
+                let most = map.iter().copied().fold(0.0, f32::max);
+                map.iter().copied().fold(f32::INFINITY, f32::min) / most
+            })
+            .collect();
+        super::print(
+            json,
+            &json!({"output": self.output, "least_amplitude": least, "fit_residual": left}),
+            format!(
+                "{}: least amplitude {:.2}, {:.2}, {:.2} of the most in red, green, blue",
+                self.output.display(),
+                least[0],
+                least[1],
+                least[2]
+            ),
+        );
+        Ok(())
+    }
+}
+
+/// Find the coefficients of an aberration from photographs of a focused spot, round by round
+///
+/// Focus the camera at --z-mm and run: DIR/round_0 gets trial_00.png to trial_10.png. Show and photograph each as
+/// capture_00.png … in the same folder, run again for the next round, and so on; the last run writes the coefficients of that colour
+/// and z into FILE. Coefficients found by hand can be written there directly.
+#[derive(Args)]
+pub(crate) struct Aberration {
+    /// Folder of the search
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
+    /// z of the spot, mm from the middle of the volume
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    z_mm: f64,
+    /// Whose light it is
+    #[arg(long, value_enum)]
+    colour: ColourName,
+    /// Where in the frame the spot is, from its left and top, 0 to 1, for aberrations that differ over it [default: the middle, for
+    /// all]
+    #[arg(long, value_name = "X,Y", value_parser = parse_place)]
+    at: Option<[f64; 2]>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// The coefficients: `aberration` of a display file
+    #[arg(short, value_name = "FILE.toml")]
+    output: PathBuf,
+    /// Write over coefficients that are there
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum ColourName {
+    Red,
+    Green,
+    Blue,
+}
+
+fn parse_place(text: &str) -> std::result::Result<[f64; 2], String> {
+    let parsed = text
+        .split_once(',')
+        .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]));
+    match parsed {
+        Some(place) if place.iter().all(|v: &f64| (0.0..=1.0).contains(v)) => Ok(place),
+        _ => Err("a place is written X,Y, as 0.5,0.25, each from 0 to 1".into()),
+    }
+}
+
+/// `search.json` of a search's folder.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SearchFile {
+    z_mm: f64,
+    colour: ColourName,
+    at: Option<[f64; 2]>,
+    search: Search,
+}
+
+impl Aberration {
+    fn run(self, json: bool) -> Result<()> {
+        let state = self.folder.join("search.json");
+        let file = self.display.read()?;
+        let entries = match self.output.exists() {
+            true => table::read_entries(&self.output)?,
+            false => Vec::new(),
+        };
+        let now = match state.exists() {
+            false => {
+                let start = self
+                    .entry(&entries)
+                    .map_or([0.0; 5], |mut e| *e.colour_mut(self.index()));
+                if start != [0.0; 5] && !self.force {
+                    return Err(Error::file(
+                        &self.output,
+                        "has coefficients of this colour at this z already; --force searches on from them",
+                    ));
+                }
+                if self.folder.join("round_0").exists() {
+                    return Err(Error::file(
+                        &self.folder,
+                        "holds a search that is done; a search needs a folder of its own",
+                    ));
+                }
+                make(&self.folder)?;
+                SearchFile {
+                    z_mm: self.z_mm,
+                    colour: self.colour,
+                    at: self.at,
+                    search: Search::from(start),
+                }
+            }
+            true => {
+                let text = std::fs::read_to_string(&state)
+                    .map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
+                let now: SearchFile =
+                    serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
+                if (now.z_mm, now.colour, now.at) != (self.z_mm, self.colour, self.at) {
+                    return Err(Error::file(
+                        &state,
+                        "is of another z, colour or place; a search needs a folder of its own",
+                    ));
+                }
+                let sharpness = self.sharpness(&now, &file.display)?;
+                SearchFile {
+                    search: now.search.learn(&sharpness),
+                    ..now
+                }
+            }
+        };
+        if now.search.is_done() {
+            return self.finish(json, &now, entries, &state);
+        }
+        let round = self.round(&now);
+        make(&round)?;
+        let (place, z_m) = (self.at.unwrap_or(spot::MIDDLE), self.z_mm / 1e3);
+        let response = file.response()?;
+        for (i, trial) in now.search.trials().iter().enumerate() {
+            let levels = spot::levels(&file.display, &response, self.index(), z_m, place, trial)?;
+            grey(levels, &round.join(format!("trial_{i:02}.png")))?;
+        }
+        write_state(&state, &now)?;
+        super::print(
+            json,
+            &json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": round, "best": now.search.best}),
+            format!(
+                "round {} of {}: photograph trial_00.png to trial_{:02}.png of {} as capture_00.png …, then run this again",
+                now.search.round + 1,
+                spot::ROUNDS,
+                TRIALS - 1,
+                round.display()
+            ),
+        );
+        Ok(())
+    }
+
+    fn index(&self) -> usize {
+        self.colour as usize
+    }
+
+    fn round(&self, now: &SearchFile) -> PathBuf {
+        self.folder.join(format!("round_{}", now.search.round))
+    }
+
+    /// The entry of this z and place.
+    fn entry(&self, entries: &[Entry]) -> Option<Entry> {
+        let [x, y] = self.at.map_or([None; 2], |at| at.map(Some));
+        (entries.iter())
+            .find(|e| e.z_mm == self.z_mm && e.x == x && e.y == y)
+            .cloned()
+    }
+
+    /// How sharp each trial's photograph is.
+    fn sharpness(&self, now: &SearchFile, display: &Display) -> Result<[f64; TRIALS]> {
+        let round = self.round(now);
+        let mut sharpness = [0.0; TRIALS];
+        let mut size = None;
+        for (i, value) in sharpness.iter_mut().enumerate() {
+            let path = photo_path(&round, &format!("capture_{i:02}"))?;
+            let photo = Photograph::read(&path, self.index())?;
+            let first = *size.get_or_insert((photo.height, photo.width));
+            if first != (photo.height, photo.width) {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "is not {}×{} as the others; photograph the round again",
+                        first.1, first.0
+                    ),
+                ));
+            }
+            let zoom = photo.width as f64 / display.width() as f64;
+            *value =
+                spot::sharpness(&photo, spot::window(zoom)).map_err(|e| Error::file(&path, e))?;
+        }
+        Ok(sharpness)
+    }
+
+    fn finish(
+        &self,
+        json: bool,
+        now: &SearchFile,
+        entries: Vec<Entry>,
+        state: &Path,
+    ) -> Result<()> {
+        let mut entries = entries;
+        let mut entry = self.entry(&entries).unwrap_or(Entry {
+            z_mm: self.z_mm,
+            x: self.at.map(|at| at[0]),
+            y: self.at.map(|at| at[1]),
+            red: [0.0; 5],
+            green: [0.0; 5],
+            blue: [0.0; 5],
+        });
+        entries.retain(|e| (e.z_mm, e.x, e.y) != (entry.z_mm, entry.x, entry.y));
+        *entry.colour_mut(self.index()) = now.search.best;
+        entries.push(entry);
+        entries.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
+        if let AberrationFile::Spatial(_) = table::aberrations(&entries)? {
+            log::info!(
+                "aberrations that differ over the frame are corrected by --method layers alone"
+            );
+        }
+        table::write_aberrations(&self.output, &entries)?;
+        std::fs::remove_file(state)
+            .map_err(|e| Error::file(state, format!("cannot be removed: {e}")))?;
+        super::print(
+            json,
+            &json!({"output": self.output, "coefficients_rad": now.search.best}),
+            format!(
+                "{}: coefficients {:.3?} rad",
+                self.output.display(),
+                now.search.best
+            ),
+        );
+        Ok(())
+    }
+}
+
+fn write_state(path: &Path, now: &SearchFile) -> Result<()> {
+    let text = serde_json::to_string_pretty(now).map_err(|e| Error::file(path, e))?;
+    files::write_atomically(path, |file| writeln!(file, "{text}"))
+}
+
+/// Go through a calibration on a simulated display with a simulated camera
+///
+/// Writes the files of the calibration with a display.toml that refers to them, outcome.json, photographs and drawings.
+#[derive(Args)]
+pub(crate) struct Rehearse {
+    /// Pixels of the modulator
+    #[arg(long, value_name = "WxH", default_value = "320x180", value_parser = parse_size)]
+    size: (usize, usize),
+    /// Pixels of the camera for one of the modulator
+    #[arg(long, value_name = "Z", default_value_t = 2.5)]
+    zoom: f64,
+    /// Seed of the display's flaws and the camera's noise
+    #[arg(long, value_name = "S", default_value_t = 0)]
+    seed: u64,
+    /// z of the focused spot, mm
+    #[arg(
+        long,
+        value_name = "Z",
+        default_value_t = 12.0,
+        allow_negative_numbers = true
+    )]
+    spot_z_mm: f64,
+    /// Keep all photographs, to run `calibrate lut` and `calibrate laser` on
+    #[arg(long)]
+    captures: bool,
+    /// Folder of what comes out
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+    /// Write over what is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Rehearse {
+    fn run(self, json: bool) -> Result<()> {
+        let (width, height) = self.size;
+        let rehearsal = Rehearsal {
+            display: Display::from_toml(&format!("width = {width}\nheight = {height}"))?,
+            zoom: self.zoom,
+            seed: self.seed,
+            spot_z_m: self.spot_z_mm / 1e3,
+            keep_captures: self.captures,
+        };
+        keep(&self.output.join("outcome.json"), self.force)?;
+        make(&self.output)?;
+        let bar = progress_bar(0, "photographs and rows");
+        let outcome = rehearse::run(&rehearsal, &self.output, &|done, of| {
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+        })?;
+        bar.finish_and_clear();
+        let line = |what: &str, of: &rehearse::BeforeAfter, digits: usize| {
+            let list = |values: &[f64; 3]| {
+                let all: Vec<_> = values.iter().map(|v| format!("{v:.digits$}")).collect();
+                all.join(" / ")
+            };
+            format!(
+                "{what:<34}{:>24}   {:>24}",
+                list(&of.before),
+                list(&of.after)
+            )
+        };
+        let text = [
+            format!(
+                "{:<34}{:>24}   {:>24}",
+                "red / green / blue", "before", "after"
+            ),
+            line("phase error, rad RMS", &outcome.phase_error_rad, 3),
+            line("black against white, dB", &outcome.black_db, 1),
+            line("unevenness of flat grey", &outcome.unevenness, 3),
+            line("Strehl ratio of the spot", &outcome.strehl, 3),
+            String::new(),
+            outcome.lut.text(),
+            format!(
+                "{} photographs; {}",
+                outcome.photographs,
+                self.output.display()
+            ),
+        ];
+        let value = serde_json::to_value(&outcome).map_err(|e| Error::file(&self.output, e))?;
+        super::print(json, &value, text.join("\n"));
+        Ok(())
+    }
+}
+
+/// Refuses a file that is there, unless it may be written over.
+fn keep(path: &Path, force: bool) -> Result<()> {
+    match path.exists() && !force {
+        true => Err(Error::file(
+            path,
+            "is there already; --force writes over it",
+        )),
+        false => Ok(()),
+    }
+}
+
+fn make(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, format!("cannot be made: {e}")))
+}
+
+/// The photograph `stem` of `folder`, a PNG or TIFF.
+fn photo_path(folder: &Path, stem: &str) -> Result<PathBuf> {
+    ["png", "tif", "tiff", "PNG", "TIF", "TIFF"]
+        .iter()
+        .map(|extension| folder.join(format!("{stem}.{extension}")))
+        .find(|path| path.is_file())
+        .ok_or_else(|| {
+            Error::file(
+                folder.join(format!("{stem}.png")),
+                "is missing (.tif would do as well); photograph it and run again",
+            )
+        })
+}
+
+/// Levels, (H, W), as a grey PNG of 8 bits.
+fn grey(levels: ndarray::Array2<u8>, path: &Path) -> Result<()> {
+    let (height, width) = levels.dim();
+    let values = levels.iter().map(|v| u16::from(*v)).collect();
+    let photo = Photograph {
+        height,
+        width,
+        values,
+        full: 255,
+    };
+    photo.write(path)
+}

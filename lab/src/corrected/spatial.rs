@@ -1,0 +1,451 @@
+//! Aberrations that differ over the frame: calibrated at a grid of points (the paper has 15 in mind) and interpolated, and
+//! corrected by a convolution in space, as no filter in the Fourier domain can (Methods).
+//!
+//! # The convolution
+//! Each pixel's light spreads by the point spread function of its place. Point spread functions are those of nodes
+//! every [`NODE`] pixels, linear between them in x and y: the field times each node's hat, convolved with the node's
+//! function, sums to that exactly. [`convolve_reference`] is the sum over all pairs of pixels.
+//!
+//! # Cost
+//! What differs over the frame does not commute with propagation, so every plane's content makes its own way: through
+//! the silhouettes before it, back to its plane, through the convolution, on to z = 0; N²/2 propagations for N planes.
+
+use super::{MAX_PROPAGATIONS, padded_shape_with};
+use crate::error::{Error, Result};
+use crate::ldi::Ldi;
+use crate::sm_lbm::{Planes, cross, plane_z_m};
+use ndarray::{Array2, Array3, ArrayView1, Axis};
+use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::wave::asm::Transfer;
+use phasefront::wave::fft::{Fft2, smooth_size};
+use phasefront::wave::zernike::{Aberration, Aberrations};
+use rayon::prelude::*;
+
+/// Pixels from node to node.
+pub const NODE: usize = 16;
+/// Pixels that a point spread function has beyond where its rays go.
+const RIM: usize = 12;
+
+/// Corrections at the points of a grid over the frame; between them linear in x and y, beyond them the nearest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpatialAberrations {
+    /// Ascending, parts of the frame's width.
+    x: Vec<f64>,
+    /// Ascending, parts of its height.
+    y: Vec<f64>,
+    /// Row by row.
+    at: Vec<Aberrations>,
+}
+
+impl SpatialAberrations {
+    /// From corrections at points (x, y), each from 0 to 1 over the frame, in any order.
+    ///
+    /// # Errors
+    /// Points outside the frame, or that are not all crossings of some columns and rows.
+    pub fn new(points: Vec<([f64; 2], Aberrations)>) -> Result<Self> {
+        let axis = |i: usize| {
+            let mut all: Vec<f64> = points.iter().map(|(place, _)| place[i]).collect();
+            all.sort_by(f64::total_cmp);
+            all.dedup();
+            all
+        };
+        let (x, y) = (axis(0), axis(1));
+        if x.iter().chain(&y).any(|v| !(0.0..=1.0).contains(v)) {
+            return Err(Error::Input(
+                "a calibrated point outside the frame; x and y must lie in 0 to 1".into(),
+            ));
+        }
+        let find = |x: f64, y: f64| points.iter().find(|(place, _)| *place == [x, y]);
+        let at: Option<Vec<_>> = (y.iter())
+            .flat_map(|y| x.iter().map(move |x| find(*x, *y).map(|(_, a)| a.clone())))
+            .collect();
+        match at {
+            Some(at) if !at.is_empty() && at.len() == points.len() => {
+                Ok(SpatialAberrations { x, y, at })
+            }
+            _ => Err(Error::Input(format!(
+                "{} calibrated points in {} columns and {} rows; every column must have a point in every row, once",
+                points.len(),
+                x.len(),
+                y.len()
+            ))),
+        }
+    }
+
+    /// The calibrated points, row by row, and their corrections.
+    pub fn points(&self) -> impl Iterator<Item = ([f64; 2], &Aberrations)> {
+        let columns = self.x.len();
+        let place = move |i: usize| [self.x[i % columns], self.y[i / columns]];
+        self.at.iter().enumerate().map(move |(i, a)| (place(i), a))
+    }
+
+    /// The correction at (`x`, `y`), parts of the frame, and `z_m`.
+    pub fn at(&self, x: f64, y: f64, z_m: f64) -> Aberration {
+        let split = |axis: &[f64], v: f64| {
+            let next = axis
+                .partition_point(|a| *a <= v)
+                .clamp(1, axis.len().max(2) - 1);
+            match axis.get(next) {
+                None => (0, 0, 0.0),
+                Some(end) => {
+                    let begin = axis[next - 1];
+                    (
+                        next - 1,
+                        next,
+                        ((v - begin) / (end - begin)).clamp(0.0, 1.0),
+                    )
+                }
+            }
+        };
+        let (i0, i1, ty) = split(&self.y, y);
+        let (j0, j1, tx) = split(&self.x, x);
+        let row = |i: usize| {
+            let at = |j: usize| self.at[i * self.x.len() + j].at(z_m);
+            at(j0).mix(&at(j1), tx)
+        };
+        row(i0).mix(&row(i1), ty)
+    }
+
+    /// How far sideways light is moved at most, metres.
+    pub fn reach_m(&self, pitch_m: f64) -> f64 {
+        (self.at.iter().flat_map(Aberrations::calibrated))
+            .map(|(_, a)| a.reach_m(pitch_m))
+            .fold(0.0, f64::max)
+    }
+}
+
+/// What a convolution is of: a colour's field at a z in a frame of (H, W) pixels, at the top left of a larger plane.
+#[derive(Clone, Copy)]
+pub struct Place<'a> {
+    /// The corrections.
+    pub aberrations: &'a SpatialAberrations,
+    /// The display.
+    pub display: &'a Display,
+    /// 0 red to 2 blue.
+    pub colour: usize,
+    /// z of the field, metres.
+    pub z_m: f64,
+    /// (H, W) of the frame that the calibrated points lie in.
+    pub frame: (usize, usize),
+}
+
+impl Place<'_> {
+    /// The correction of node (i, j).
+    fn node(&self, i: usize, j: usize) -> Aberration {
+        let part = |node: usize, n: usize| ((node * NODE) as f64 + 0.5) / n as f64;
+        let (x, y) = (part(j, self.frame.1), part(i, self.frame.0));
+        self.aberrations.at(x, y, self.z_m)
+    }
+
+    /// Pixels beside its own that a point's light reaches.
+    fn reach(&self) -> usize {
+        let pitch = self.display.pitch_m();
+        (self.aberrations.reach_m(pitch) / pitch).ceil() as usize + RIM
+    }
+
+    /// The side of the plane of a node's convolution.
+    fn side(&self) -> usize {
+        smooth_size(2 * NODE + 2 * self.reach())
+    }
+
+    /// Φ of node (i, j) at frequency bins (kx, ky) of a plane of `n`×`n`.
+    fn kernel(&self, aberration: &Aberration, n: usize, kx: usize, ky: usize) -> Complex32 {
+        let pitch = self.display.pitch_m();
+        let frequency = |k: usize| {
+            let k = if 2 * k < n {
+                k as f64
+            } else {
+                k as f64 - n as f64
+            };
+            k / (n as f64 * pitch)
+        };
+        let phase = aberration.phase(self.colour, frequency(kx), frequency(ky), pitch);
+        Complex32::new(phase.cos() as f32, phase.sin() as f32)
+    }
+}
+
+/// The field (H', W') after each of its points has spread as `place` says.
+pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32> {
+    let (height, width) = field.dim();
+    let nodes = |n: usize| (n - 1) / NODE + 2;
+    let (side, reach) = (place.side(), place.reach());
+    let fft = Fft2::new(side, side, side, side);
+    let all: Vec<(usize, usize)> = (0..nodes(height))
+        .flat_map(|i| (0..nodes(width)).map(move |j| (i, j)))
+        .collect();
+    let mut out = Array2::from_elem((height, width), Complex32::ZERO);
+    // So many at a time that their planes stay small beside the field.
+    for some in all.chunks(64) {
+        let spread: Vec<Option<Vec<Complex32>>> = some
+            .par_iter()
+            .map_init(
+                || fft.scratch(),
+                |scratch, (i, j)| {
+                    let mut plane = vec![Complex32::ZERO; side * side];
+                    let mut lit = false;
+                    for (y, wy) in hat(*i, height) {
+                        for (x, wx) in hat(*j, width) {
+                            let value = field[(y, x)] * (wy * wx);
+                            lit |= value != Complex32::ZERO;
+                            // Pixel (i − 1)·NODE of the field stands at `reach` of the plane.
+                            let (v, u) = (y + NODE + reach - i * NODE, x + NODE + reach - j * NODE);
+                            plane[v * side + u] = value;
+                        }
+                    }
+                    if !lit {
+                        return None;
+                    }
+                    let aberration = place.node(*i, *j);
+                    let scale = 1.0 / (side * side) as f32;
+                    fft.convolve(
+                        &mut plane,
+                        |kx, column| {
+                            for (ky, value) in column.iter_mut().enumerate() {
+                                *value *= place.kernel(&aberration, side, kx, ky) * scale;
+                            }
+                        },
+                        scratch,
+                    );
+                    Some(plane)
+                },
+            )
+            .collect();
+        for ((i, j), plane) in some.iter().zip(&spread) {
+            let Some(plane) = plane else { continue };
+            for v in 0..side {
+                let Some(y) = (v + i * NODE)
+                    .checked_sub(NODE + reach)
+                    .filter(|y| *y < height)
+                else {
+                    continue;
+                };
+                for u in 0..side {
+                    let x = (u + j * NODE).checked_sub(NODE + reach);
+                    if let Some(x) = x.filter(|x| *x < width) {
+                        out[(y, x)] += plane[v * side + u];
+                    }
+                }
+            }
+        }
+    }
+    out
+}
+
+/// The pixels of an axis of `n` between the neighbours of a node, each with its share in the node.
+fn hat(node: usize, n: usize) -> impl Iterator<Item = (usize, f32)> {
+    let centre = node * NODE;
+    ((centre + 1).saturating_sub(NODE)..(centre + NODE).min(n))
+        .map(move |at| (at, 1.0 - at.abs_diff(centre) as f32 / NODE as f32))
+}
+
+/// [`convolve`] as the sum over all pairs of pixels, point spread functions by direct sums: for small fields.
+pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32> {
+    use num_complex::Complex64;
+    let (height, width) = field.dim();
+    let side = place.side();
+    // F⁻¹(Φ) of a node, its centre at (0, 0), periodic in `side`.
+    let spread = |i: usize, j: usize| {
+        let aberration = place.node(i, j);
+        let kernel = Array2::from_shape_fn((side, side), |(ky, kx)| {
+            let v = place.kernel(&aberration, side, kx, ky);
+            Complex64::new(v.re.into(), v.im.into())
+        });
+        phasefront::wave::reference::dft(&kernel, 1.0) / (side * side) as f64
+    };
+    let mut out = Array2::from_elem((height, width), Complex64::ZERO);
+    for i in 0..(height - 1) / NODE + 2 {
+        for j in 0..(width - 1) / NODE + 2 {
+            let psf = spread(i, j);
+            for (y, wy) in hat(i, height) {
+                for (x, wx) in hat(j, width) {
+                    let value = field[(y, x)] * (wy * wx);
+                    let value = Complex64::new(value.re.into(), value.im.into());
+                    let half = side as isize / 2;
+                    for dy in -half..side as isize - half {
+                        for dx in -half..side as isize - half {
+                            let (v, u) = (y as isize + dy, x as isize + dx);
+                            if v >= 0 && u >= 0 && (v as usize) < height && (u as usize) < width {
+                                let n = side as isize;
+                                let at = (dy.rem_euclid(n) as usize, dx.rem_euclid(n) as usize);
+                                out[(v as usize, u as usize)] += value * psf[at];
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+    out.mapv(|v| Complex32::new(v.re as f32, v.im as f32))
+}
+
+/// The midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes, each corrected from place to place. `progress`
+/// hears of the propagations done, of all.
+///
+/// # Errors
+/// No planes, or more propagations than [`MAX_PROPAGATIONS`] a colour.
+pub fn hologram(
+    ldi: &Ldi,
+    display: &Display,
+    planes: usize,
+    aberrations: &SpatialAberrations,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Array3<Complex32>> {
+    if planes == 0 {
+        return Err(Error::Input(
+            "no planes to cut the scene into; at least 1 is needed".into(),
+        ));
+    }
+    let frame @ (height, width) = ldi.shape();
+    let pitch_m = display.pitch_m();
+    let shape = padded_shape_with(height, width, display, aberrations.reach_m(pitch_m))?;
+    let (padded_height, padded_width) = shape;
+    let scene = Planes::of(ldi, planes);
+    let z = |k: usize| plane_z_m(k, planes, display);
+    let Some(front) = scene.occupied.last().map(|(k, _)| *k) else {
+        return Ok(Array3::zeros((3, height, width)));
+    };
+    let count = scene.occupied.len();
+    let propagations = count * (count + 3) / 2;
+    if propagations > MAX_PROPAGATIONS {
+        return Err(Error::Input(format!(
+            "{propagations} propagations a colour for {planes} planes; at most {MAX_PROPAGATIONS} are done: fewer planes are needed"
+        )));
+    }
+    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let mut scratch = fft.scratch();
+    let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
+    let mut sum = plane.clone();
+    let mut hologram = Array3::zeros((3, height, width));
+    let step_m = display.volume_depth_m() / planes as f64;
+    let mut done = 0;
+    for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
+        let transfer =
+            |distance_m| Transfer::new(shape, pitch_m, wavelength_m, distance_m, |_, _| true);
+        sum.fill(Complex32::ZERO);
+        for first in 0..count {
+            let (k, points) = &scene.occupied[first];
+            plane.fill(Complex32::ZERO);
+            for point in &scene.points[points.clone()] {
+                plane[point.y as usize * padded_width + point.x as usize] =
+                    point.rgb[colour].into();
+            }
+            fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+            let mut at = *k;
+            for (next, points) in &scene.occupied[first + 1..] {
+                let across = transfer((at - next) as f64 * step_m);
+                cross(
+                    &fft,
+                    &mut scratch,
+                    &across,
+                    &scene.points[points.clone()],
+                    |_| Complex32::ZERO,
+                );
+                at = *next;
+                done += 1;
+                progress(done, 3 * propagations);
+            }
+            // Back to where the content started, and there its points spread.
+            let back = transfer(z(*k) - z(front));
+            let mut columns = std::mem::take(&mut scratch.columns);
+            fft.columns(
+                &scratch.rows,
+                &mut columns,
+                |x, c| back.apply(x, c),
+                &mut scratch.work,
+            );
+            fft.rows_inverse(&columns, &mut scratch.rows, &mut scratch.work);
+            scratch.columns = columns;
+            let field = Array2::from_shape_vec(shape, scratch.rows.clone())
+                .expect("a plane of the padded shape");
+            let place = Place {
+                aberrations,
+                display,
+                colour,
+                z_m: z(*k),
+                frame,
+            };
+            let spread = convolve(&field, place);
+            let spread = spread.as_slice().expect("standard layout");
+            fft.rows_forward(spread, &mut scratch.rows, &mut scratch.work);
+            let home = transfer(-z(*k));
+            fft.spectrum(
+                &scratch.rows,
+                &mut scratch.columns,
+                |x, column, _| home.apply(x, column),
+                &mut scratch.work,
+            );
+            (sum.par_iter_mut().zip(&scratch.columns)).for_each(|(sum, v)| *sum += v);
+            done += 2;
+            progress(done, 3 * propagations);
+        }
+        fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
+        fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work);
+        let rows = scratch.rows.chunks_exact(padded_width);
+        let mut out = hologram.index_axis_mut(Axis(0), colour);
+        for (mut out, row) in out.rows_mut().into_iter().zip(rows) {
+            out.assign(&ArrayView1::from(&row[..width]));
+        }
+    }
+    Ok(hologram)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn grid() -> SpatialAberrations {
+        let points = (0..15)
+            .map(|i| {
+                let (x, y) = (f64::from(i % 5) / 4.0, f64::from(i / 5) / 2.0);
+                let a = [0.4 * x, -0.8 * y, 0.3, 0.9 * (x - 0.5), 0.5 * x * y];
+                let a = Aberration::new([a, a.map(|v| 1.2 * v), a.map(|v| 1.4 * v)]).unwrap();
+                ([x, y], Aberrations::new(vec![(0.0, a)]).unwrap())
+            })
+            .collect();
+        SpatialAberrations::new(points).unwrap()
+    }
+
+    #[test]
+    fn fifteen_points_are_interpolated_and_wrong_sets_refused() {
+        let grid = grid();
+        let at = |x: f64, y: f64| grid.at(x, y, 1e-3).coefficients()[0];
+        assert!((at(0.6, 0.0)[0] - 0.24).abs() < 1e-12);
+        assert!((at(0.1, 0.75)[1] + 0.6).abs() < 1e-12);
+        assert_eq!(at(1.0, 1.0)[4], 0.5);
+        let one = Aberrations::new(vec![(0.0, Aberration::NONE)]).unwrap();
+        let alone = SpatialAberrations::new(vec![([0.3, 0.3], one.clone())]).unwrap();
+        assert_eq!(alone.at(0.9, 0.1, 0.0), Aberration::NONE);
+        for points in [
+            vec![[0.1, 0.1], [0.2, 0.2]],
+            vec![[0.1, 0.1], [0.1, 0.1]],
+            vec![[-0.1, 0.5]],
+            vec![],
+        ] {
+            let points = points.into_iter().map(|p| (p, one.clone())).collect();
+            assert!(SpatialAberrations::new(points).is_err());
+        }
+    }
+
+    #[test]
+    fn the_convolution_is_the_sum_over_pairs() {
+        let grid = grid();
+        let display = Display::default();
+        let place = Place {
+            aberrations: &grid,
+            display: &display,
+            colour: 1,
+            z_m: 0.0,
+            frame: (37, 45),
+        };
+        let field = Array2::from_shape_fn((37, 45), |(y, x)| {
+            let t = (y * 45 + x) as f32;
+            Complex32::from_polar((t * 0.7).sin().abs(), t * 0.11)
+        });
+        let (ours, naive) = (convolve(&field, place), convolve_reference(&field, place));
+        let square = |a: &Array2<Complex32>| a.iter().map(|v| v.norm_sqr()).sum::<f32>();
+        let error = (square(&(&ours - &naive)) / square(&naive)).sqrt();
+        assert!(error < 1e-4, "{error}");
+    }
+}

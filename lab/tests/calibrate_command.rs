@@ -1,0 +1,337 @@
+//! `phasefront calibrate` as a user runs it, on photographs of a simulated display.
+#![allow(clippy::unwrap_used)]
+
+use ndarray::Array2;
+use phasefront::Display;
+use phasefront::wave::zernike::{Aberration, Coefficients};
+use phasefront_lab::calibrate::photograph::Photograph;
+use phasefront_lab::calibrate::{spot, table};
+use phasefront_lab::simulated_display::SimulatedDisplay;
+use phasefront_lab::{files, metrics};
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Folder(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .args(arguments)
+            .current_dir(self.0.path())
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap()
+    }
+
+    fn succeeds(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Fails with `code`; what it says.
+    fn refuses(&self, arguments: &[&str], code: i32) -> String {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
+        assert!(!errors.contains("panicked"), "{errors}");
+        errors
+    }
+}
+
+#[test]
+fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
+    let folder = Folder::new();
+    let rehearse = [
+        "calibrate",
+        "rehearse",
+        "--size",
+        "144x64",
+        "--zoom",
+        "1.6",
+        "--spot-z-mm",
+        "5.5",
+        "--captures",
+        "--json",
+        "-o",
+        "out",
+    ];
+    let outcome: serde_json::Value = serde_json::from_str(&folder.succeeds(&rehearse)).unwrap();
+    for colour in 0..3 {
+        let number = |what: &str, when: &str| outcome[what][when][colour].as_f64().unwrap();
+        assert!(number("phase_error_rad", "before") > 0.3);
+        assert!(number("phase_error_rad", "after") < 0.05, "{outcome}");
+        assert!(number("black_db", "before") - number("black_db", "after") > 10.0);
+        assert!(
+            number("unevenness", "after") < 0.5 * number("unevenness", "before"),
+            "{outcome}"
+        );
+        assert!(number("strehl", "after") > 0.9, "{outcome}");
+    }
+    for name in [
+        "curves.svg",
+        "residuals.svg",
+        "maps.svg",
+        "laser.svg",
+        "search.svg",
+        "spot.png",
+        "black.png",
+    ] {
+        assert!(folder.path("out").join(name).is_file(), "{name}");
+    }
+    // Nothing is written over.
+    assert!(folder.refuses(&rehearse, 1).contains("--force"));
+
+    // The same photographs by hand give the same files.
+    fs::write(folder.path("bare.toml"), "width = 144\nheight = 64").unwrap();
+    let lut = [
+        "calibrate",
+        "lut",
+        "--captures",
+        "out/captures",
+        "--display",
+        "bare.toml",
+        "--full",
+        "full",
+        "--report",
+        "report",
+        "-o",
+        "table.pfp",
+    ];
+    let said = folder.succeeds(&lut);
+    assert!(said.contains("red") && said.contains("table:"), "{said}");
+    let bytes = |name: &str| fs::read(folder.path(name)).unwrap();
+    assert_eq!(bytes("table.pfp"), bytes("out/table.pfp"));
+    assert!(folder.path("report/curves.svg").is_file());
+    let full: ndarray::Array3<u8> =
+        ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
+    assert_eq!(full.dim(), (64, 144, 256));
+    assert!(full[(32, 72, 255)] > 150 && full[(32, 72, 0)] == 0);
+    assert!(folder.refuses(&lut, 1).contains("--force"));
+    folder.succeeds(&[
+        "calibrate",
+        "laser",
+        "out/captures",
+        "--gaussians",
+        "1",
+        "--display",
+        "bare.toml",
+        "-o",
+        "laser.png",
+    ]);
+    assert_eq!(bytes("laser.png"), bytes("out/laser.png"));
+
+    // Bad captures: each by its name, and the table that was there stays.
+    let captures = folder.path("out/captures");
+    fs::remove_file(captures.join("green/capture_007.png")).unwrap();
+    fs::rename(
+        captures.join("red/capture_200.png"),
+        captures.join("red/capture_201.png"),
+    )
+    .unwrap();
+    fs::write(captures.join("blue/capture_001.png"), b"no picture").unwrap();
+    let forced: Vec<_> = lut.iter().copied().chain(["--force"]).collect();
+    let said = folder.refuses(&forced, 1);
+    for words in [
+        "green/capture_007: is missing",
+        "red/capture_200: is missing",
+        "red/capture_201: shows pattern 200",
+        "blue/capture_001: ",
+        "4 of 768 captures cannot be used",
+    ] {
+        assert!(said.contains(words), "no {words:?} in {said}");
+    }
+    assert_eq!(
+        said.lines().filter(|l| l.starts_with("error")).count(),
+        1,
+        "{said}"
+    );
+    assert_eq!(bytes("table.pfp"), bytes("out/table.pfp"));
+
+    // A hologram for the calibrated display, and its view on it.
+    let rgb = image::RgbImage::from_fn(96, 48, |x, y| {
+        image::Rgb([(x * 2) as u8, (y * 5) as u8, 90])
+    });
+    rgb.save(folder.path("rgb.png")).unwrap();
+    image::GrayImage::from_pixel(96, 48, image::Luma([128]))
+        .save(folder.path("depth.png"))
+        .unwrap();
+    let hologram = |more: &[&'static str]| {
+        let all = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "layers",
+            "--planes",
+            "9",
+        ];
+        folder.succeeds(&all.iter().chain(more).copied().collect::<Vec<_>>());
+    };
+    hologram(&["--display", "bare.toml", "-o", "plain.png"]);
+    hologram(&["--display", "out/display.toml", "-o", "h.png"]);
+    assert_ne!(bytes("plain.png"), bytes("h.png"));
+    let said = folder.refuses(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], 1);
+    assert!(
+        said.contains("per_pixel, laser, aberration") && said.contains("--display"),
+        "{said}"
+    );
+    folder.succeeds(&[
+        "refocus",
+        "plain.png",
+        "--z-mm",
+        "0",
+        "-o",
+        "plain_view.png",
+    ]);
+    folder.succeeds(&[
+        "refocus",
+        "h.png",
+        "--z-mm",
+        "0",
+        "--display",
+        "out/display.toml",
+        "-o",
+        "view.png",
+    ]);
+    let read = |name: &str| files::read_rgb(&folder.path(name)).unwrap();
+    let inner = ndarray::s![.., 8..40, 8..88];
+    let (plain, view) = (read("plain_view.png"), read("view.png"));
+    let alike = metrics::compare(plain.slice(inner), view.slice(inner))
+        .unwrap()
+        .psnr_overall;
+    assert!(alike > 22.0, "{alike}");
+    // On a display of another size it is refused.
+    fs::write(
+        folder.path("other.toml"),
+        "width = 160\nheight = 64\nper_pixel = \"table.pfp\"",
+    )
+    .unwrap();
+    let said = folder.refuses(
+        &[
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--display",
+            "other.toml",
+            "-o",
+            "o.png",
+        ],
+        1,
+    );
+    assert!(said.contains("is for 144×64"), "{said}");
+}
+
+#[test]
+fn patterns_are_written_once() {
+    let folder = Folder::new();
+    fs::write(folder.path("display.toml"), "width = 144\nheight = 64").unwrap();
+    let write = [
+        "calibrate",
+        "lut",
+        "--patterns",
+        "patterns",
+        "--display",
+        "display.toml",
+    ];
+    folder.succeeds(&write);
+    let pattern = image::open(folder.path("patterns/pattern_200.png"))
+        .unwrap()
+        .into_luma8();
+    assert_eq!(pattern.dimensions(), (144, 64));
+    assert_eq!(
+        (pattern.get_pixel(80, 40)[0], pattern.get_pixel(81, 40)[0]),
+        (200, 0)
+    );
+    assert_eq!(fs::read_dir(folder.path("patterns")).unwrap().count(), 256);
+    assert!(folder.refuses(&write, 1).contains("--force"));
+    folder.refuses(&["calibrate", "lut"], 2);
+    folder.refuses(&["calibrate", "lut", "--captures", "x"], 2);
+    fs::write(folder.path("small.toml"), "width = 64\nheight = 64").unwrap();
+    let said = folder.refuses(
+        &[
+            "calibrate",
+            "lut",
+            "--patterns",
+            "p",
+            "--display",
+            "small.toml",
+        ],
+        1,
+    );
+    assert!(said.contains("144×64"), "{said}");
+}
+
+#[test]
+fn an_aberration_is_searched_round_by_round() {
+    let folder = Folder::new();
+    let wanted: Coefficients = [0.6, -0.9, 0.4, 0.5, -0.7];
+    let display = Display::from_toml("width = 80\nheight = 72").unwrap();
+    fs::write(folder.path("display.toml"), "width = 80\nheight = 72").unwrap();
+    let correction = Aberration::new([[0.0; 5], wanted, [0.0; 5]]).unwrap();
+    let simulated = SimulatedDisplay::new(&display, 2.0, 8)
+        .unwrap()
+        .with_aberration(correction);
+    let mut camera = simulated.camera().clone();
+    camera.exposure = spot::exposure(&display, 1, 7e-3);
+    let simulated = simulated.with_camera(camera);
+    let search = [
+        "calibrate",
+        "aberration",
+        "search",
+        "--z-mm",
+        "7",
+        "--colour",
+        "green",
+        "--display",
+        "display.toml",
+        "-o",
+        "aberration.toml",
+    ];
+    for round in 0..spot::ROUNDS {
+        folder.succeeds(&search);
+        let here = folder.path("search").join(format!("round_{round}"));
+        if round == 0 {
+            let said = folder.refuses(&search, 1);
+            assert!(
+                said.contains("capture_00.png") && said.contains("missing"),
+                "{said}"
+            );
+        }
+        for i in 0..spot::TRIALS {
+            let trial = Photograph::read(&here.join(format!("trial_{i:02}.png")), 0).unwrap();
+            let levels: Vec<u8> = trial.values.iter().map(|v| *v as u8).collect();
+            let levels = Array2::from_shape_vec((72, 80), levels).unwrap();
+            let shot = (round * 100 + i) as u64;
+            let photo = simulated.photograph(levels.view(), 1, 7e-3, shot).unwrap();
+            photo
+                .write(&here.join(format!("capture_{i:02}.png")))
+                .unwrap();
+        }
+    }
+    let said = folder.succeeds(&search);
+    assert!(said.contains("coefficients"), "{said}");
+    let entries = table::read_entries(&folder.path("aberration.toml")).unwrap();
+    let left: Coefficients = std::array::from_fn(|i| wanted[i] - entries[0].green[i]);
+    // The modulator itself is not calibrated here.
+    assert!(
+        spot::strehl(&wanted) < 0.5 && spot::strehl(&left) > 0.9,
+        "{left:?}"
+    );
+    assert_eq!(entries[0].red, [0.0; 5]);
+    assert!(folder.refuses(&search, 1).contains("--force"));
+}

@@ -1,0 +1,114 @@
+// The last layer and what becomes of its six planes: the planes themselves, or the complex field that they stand for,
+// with each workgroup's sum of it for the mean phase. Goes behind chain.wgsl or chain_int8.wgsl, whose `sums` gives
+// the planes as t.a… (0 to 3) and t.b… (4 and 5). HEAD: 0 planes, 1 amplitude and phase, 2 correction of the image,
+// 3 correction of a field.
+
+@group(0) @binding(5) var<storage, read_write> planes: array<f32>;
+@group(0) @binding(6) var<storage, read_write> field: array<vec2f>;
+@group(0) @binding(7) var<storage, read_write> partial: array<vec2f>;
+
+const THREADS: u32 = 64u;
+
+var<workgroup> shared_sums: array<vec2f, 3u * THREADS>;
+
+// tanh to 3e-7: drivers promise less. 1 − 2/(e^2x + 1), beyond ±10 it is ±1.
+fn tanh4(x: vec4f) -> vec4f {
+    return 1.0 - 2.0 / (exp2(clamp(x, vec4f(-10), vec4f(10)) * 2.885390081777927) + 1.0);
+}
+
+// (cos πt, sin πt) to 2e-7, which drivers do not promise either; see head.rs.
+fn direction(t: f32) -> vec2f {
+    let k = round(2.0 * t);
+    let r = t - 0.5 * k;
+    let r2 = r * r;
+    let sine = r * (3.14159265 + r2 * (-5.167713 + r2 * (2.550164 + r2 * (-0.5992645 + r2 * 0.08214589))));
+    let cosine = 1.0
+        + r2 * (-4.934802 + r2 * (4.058712 + r2 * (-1.335263 + r2 * (0.23533063 + r2 * -0.02580689))));
+    let quarter = i32(k) & 3;
+    var v = vec2f(cosine, sine);
+    if ((quarter & 1) == 1) { v = vec2f(-sine, cosine); }
+    return select(v, -v, (quarter & 2) == 2);
+}
+
+fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
+    if (x >= frame.width || y >= frame.height) { return; }
+    let at = u32(y * frame.width + x);
+    var a = low;
+    var b = high;
+    if (TANH) {
+        a = tanh4(a);
+        b = tanh4(b);
+    }
+    if (HEAD == 0u) {
+        planes[at] = a.x;
+        planes[frame.plane + at] = a.y;
+        planes[2u * frame.plane + at] = a.z;
+        planes[3u * frame.plane + at] = a.w;
+        planes[4u * frame.plane + at] = b.x;
+        planes[5u * frame.plane + at] = b.y;
+        return;
+    }
+    let first = a.xyz;
+    let second = vec3f(a.w, b.xy);
+    var red: vec2f;
+    var green: vec2f;
+    var blue: vec2f;
+    if (HEAD == 1u) {
+        let amplitude = (first + 1.0) * 0.70710678;
+        red = amplitude.x * direction(second.x);
+        green = amplitude.y * direction(second.y);
+        blue = amplitude.z * direction(second.z);
+    } else {
+        var re = first + base(at).xyz;
+        var im = second;
+        if (HEAD == 2u) {
+            // Colours come in minus a half.
+            re += 0.5;
+        } else {
+            im += vec3f(base(at).w, base(frame.plane + at).xy);
+        }
+        red = vec2f(re.x, im.x);
+        green = vec2f(re.y, im.y);
+        blue = vec2f(re.z, im.z);
+    }
+    field[at] = red;
+    field[frame.plane + at] = green;
+    field[2u * frame.plane + at] = blue;
+    shared_sums[3u * thread] += red;
+    shared_sums[3u * thread + 1u] += green;
+    shared_sums[3u * thread + 2u] += blue;
+}
+
+@compute @workgroup_size(32, 2)
+fn last(
+    @builtin(global_invocation_id) at: vec3u,
+    @builtin(workgroup_id) tile: vec3u,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let x = i32(at.x);
+    let y = 4 * i32(at.y);
+    shared_sums[3u * thread] = vec2f(0);
+    shared_sums[3u * thread + 1u] = vec2f(0);
+    shared_sums[3u * thread + 2u] = vec2f(0);
+    let t = sums(0u, x, y);
+    finish(thread, x, y, t.a0, t.b0);
+    finish(thread, x, y + 1, t.a1, t.b1);
+    finish(thread, x, y + 2, t.a2, t.b2);
+    finish(thread, x, y + 3, t.a3, t.b3);
+    if (HEAD != 0u) {
+        for (var step = THREADS / 2u; step > 0u; step /= 2u) {
+            workgroupBarrier();
+            if (thread < step) {
+                for (var c = 0u; c < 3u; c++) {
+                    shared_sums[3u * thread + c] += shared_sums[3u * (thread + step) + c];
+                }
+            }
+        }
+        if (thread == 0u) {
+            let slot = 3u * (tile.y * frame.tiles + tile.x);
+            partial[slot] = shared_sums[0];
+            partial[slot + 1u] = shared_sums[1];
+            partial[slot + 2u] = shared_sums[2];
+        }
+    }
+}

@@ -1,0 +1,601 @@
+//! A GPU that was opened: its limits, its programs, its memory, and what it has against us as errors.
+//!
+//! Nothing here knows what is computed.
+#![allow(unsafe_code)]
+
+use super::{Error, Result};
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+/// How long a frame may take before the device counts as hung: drivers themselves give up after some seconds.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// The same for drivers in software, which take their time.
+const SOFTWARE_PATIENCE: Duration = Duration::from_secs(300);
+
+/// Which GPU is wanted, and what is known of it from before.
+#[derive(Debug, Clone, Default)]
+pub struct DeviceOptions {
+    /// A part of the adapter's name, in any case; without one the fastest that is hardware is taken. Drivers in
+    /// software are taken by name only: they are slower than the CPU path.
+    pub name: Option<String>,
+    /// What [`Device::programs`] gave on an earlier run. What another GPU or driver compiled is ignored.
+    pub programs: Option<Vec<u8>>,
+}
+
+/// What a device offers beyond what every one has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Features {
+    /// 16-bit floating point in programs and memory.
+    pub(crate) half: bool,
+    /// Time stamps around passes.
+    pub(crate) timestamps: bool,
+}
+
+/// An open GPU. Immutable; threads share it.
+pub struct Device {
+    pub(crate) inner: wgpu::Device,
+    pub(crate) queue: wgpu::Queue,
+    info: wgpu::AdapterInfo,
+    limits: wgpu::Limits,
+    features: Features,
+    cache: Option<wgpu::PipelineCache>,
+    /// By entry and text: layers that are alike, and frames of all sizes, share their programs.
+    compiled: Mutex<HashMap<(&'static str, String), Program>>,
+    lost: Arc<Mutex<Option<String>>>,
+}
+
+impl std::fmt::Debug for Device {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.name())
+    }
+}
+
+impl Device {
+    /// Opens a GPU.
+    ///
+    /// # Errors
+    /// [`Error::None`] where there is none, or none of that name, with those that there are;
+    /// [`Error::Refused`] where the driver does not open it.
+    pub fn open(options: &DeviceOptions) -> Result<Self> {
+        Self::open_with(options, wgpu::Features::all(), |limits| limits)
+    }
+
+    /// [`Device::open`] with no more than the given features, and with limits that `limit` may lower.
+    pub(crate) fn open_with(
+        options: &DeviceOptions,
+        allowed: wgpu::Features,
+        limit: impl Fn(wgpu::Limits) -> wgpu::Limits,
+    ) -> Result<Self> {
+        let adapter = adapter(options.name.as_deref())?;
+        let info = adapter.get_info();
+        let wanted = wgpu::Features::SHADER_F16
+            | wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::PIPELINE_CACHE;
+        let granted = adapter.features() & wanted & allowed;
+        let limits = limit(adapter.limits());
+        let descriptor = wgpu::DeviceDescriptor {
+            required_features: granted,
+            required_limits: limits.clone(),
+            ..Default::default()
+        };
+        let (device, queue) =
+            pollster::block_on(adapter.request_device(&descriptor)).map_err(|why| {
+                Error::Refused(format!("{} cannot be opened: {}", info.name, one_line(why)))
+            })?;
+        let lost = Arc::new(Mutex::new(None));
+        let note = |lost: &Arc<Mutex<Option<String>>>, why: String| {
+            lock(lost).get_or_insert(why);
+        };
+        let state = lost.clone();
+        device.set_device_lost_callback(move |reason, why| {
+            note(&state, format!("{} ({reason:?})", one_line(why)));
+        });
+        // Outside of error scopes nothing is expected to fail but on a device that is about to be lost.
+        let state = lost.clone();
+        device.on_uncaptured_error(Arc::new(move |why: wgpu::Error| {
+            note(&state, one_line(why));
+        }));
+        let cache = granted
+            .contains(wgpu::Features::PIPELINE_CACHE)
+            .then(|| pipeline_cache(&device, options.programs.as_deref()));
+        Ok(Device {
+            inner: device,
+            queue,
+            limits,
+            features: Features {
+                half: granted.contains(wgpu::Features::SHADER_F16),
+                timestamps: granted.contains(wgpu::Features::TIMESTAMP_QUERY),
+            },
+            info,
+            cache,
+            compiled: Mutex::default(),
+            lost,
+        })
+    }
+
+    /// The GPU's name and the interface it is spoken to by.
+    pub fn name(&self) -> String {
+        format!("{} ({:?})", self.info.name, self.info.backend)
+    }
+
+    /// Whether it is a driver in software.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Whether it computes in 16-bit floating point.
+    pub fn has_half(&self) -> bool {
+        self.features.half
+    }
+
+    /// The programs compiled so far, to be kept for the next run; none where the platform keeps them itself.
+    pub fn programs(&self) -> Option<Vec<u8>> {
+        self.cache.as_ref().and_then(wgpu::PipelineCache::get_data)
+    }
+
+    /// The device and the queue themselves, for an app that shows what is computed.
+    pub fn wgpu(&self) -> (&wgpu::Device, &wgpu::Queue) {
+        (&self.inner, &self.queue)
+    }
+
+    pub(crate) fn features(&self) -> Features {
+        self.features
+    }
+
+    pub(crate) fn limits(&self) -> &wgpu::Limits {
+        &self.limits
+    }
+
+    /// Why the device is of no use any more, if so.
+    pub(crate) fn check(&self) -> Result<()> {
+        match lock(&self.lost).as_ref() {
+            Some(why) => Err(Error::Lost(why.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// Gives the device up; what runs on it is lost.
+    pub(crate) fn give_up(&self, why: &str) {
+        lock(&self.lost).get_or_insert_with(|| why.to_owned());
+        self.inner.destroy();
+    }
+
+    /// Waits for what was submitted up to `submission`.
+    pub(crate) fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        self.check()?;
+        let patience = match self.is_software() {
+            true => SOFTWARE_PATIENCE,
+            false => PATIENCE,
+        };
+        let waited = self.inner.poll(wgpu::PollType::Wait {
+            submission_index: Some(submission.clone()),
+            timeout: Some(patience),
+        });
+        match waited {
+            Ok(_) => {}
+            Err(wgpu::PollError::Timeout) => {
+                self.give_up(&format!("no answer for {} s", patience.as_secs()));
+            }
+            Err(why) => self.give_up(&one_line(why)),
+        }
+        self.check()
+    }
+
+    /// Does `work` and gives what the device has against it as an error.
+    pub(crate) fn guarded<T>(&self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        // A device that was lost since says so when it is asked.
+        if let Err(why) = self.inner.poll(wgpu::PollType::Poll) {
+            self.give_up(&one_line(why));
+        }
+        self.check()?;
+        let memory = self.inner.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let internal = self.inner.push_error_scope(wgpu::ErrorFilter::Internal);
+        let validation = self.inner.push_error_scope(wgpu::ErrorFilter::Validation);
+        let done = work();
+        // Scopes are popped last in, first out.
+        let errors = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
+        self.check()?;
+        match errors.into_iter().flatten().next() {
+            Some(wgpu::Error::OutOfMemory { source }) => Err(Error::OutOfMemory(one_line(source))),
+            Some(why) => Err(Error::Refused(format!(
+                "{}: {}",
+                self.name(),
+                one_line(why)
+            ))),
+            None => done,
+        }
+    }
+
+    /// Memory of `bytes`, zeros, for programs and copies.
+    pub(crate) fn buffer(&self, what: &str, bytes: usize) -> Result<wgpu::Buffer> {
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let most = self
+            .limits
+            .max_storage_buffer_binding_size
+            .min(self.limits.max_buffer_size);
+        if bytes as u64 > most {
+            return Err(Error::Refused(format!(
+                "{what} of {} MB is too large for {}, which takes {} MB; smaller frames are right",
+                bytes >> 20,
+                self.name(),
+                most >> 20
+            )));
+        }
+        Ok(self.inner.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            // Bindings hold a whole value at least.
+            size: (bytes.max(16) as u64).next_multiple_of(16),
+            usage,
+            mapped_at_creation: false,
+        }))
+    }
+
+    /// Memory that the CPU reads.
+    pub(crate) fn readable(&self, what: &str, bytes: usize) -> wgpu::Buffer {
+        self.inner.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size: (bytes as u64).next_multiple_of(16),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// Constants: in uniform memory where they fit, which every GPU has the fastest way to.
+    pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
+        let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
+        if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
+            return Err(Error::Refused(format!("{what} do not fit {}", self.name())));
+        }
+        let usage = match uniform {
+            true => wgpu::BufferUsages::UNIFORM,
+            false => wgpu::BufferUsages::STORAGE,
+        };
+        let buffer = self.inner.create_buffer_init(&BufferInitDescriptor {
+            label: Some(what),
+            contents,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+        });
+        Ok(Constants { buffer, uniform })
+    }
+
+    /// Constants that threads look up each at another place.
+    pub(crate) fn table(&self, what: &str, contents: &[u8]) -> Result<Constants> {
+        let buffer = self.buffer(what, contents.len())?;
+        self.queue.write_buffer(&buffer, 0, contents);
+        Ok(Constants {
+            buffer,
+            uniform: false,
+        })
+    }
+
+    /// Compiles `source`, the text of a program of this crate, unless that was done before.
+    pub(crate) fn program(&self, what: &str, source: String, entry: &'static str) -> Program {
+        let key = (entry, source);
+        if let Some(known) = lock(&self.compiled).get(&key) {
+            return known.clone();
+        }
+        let program = self.compile(what, &key.1, entry);
+        lock(&self.compiled).insert(key, program.clone());
+        program
+    }
+
+    fn compile(&self, what: &str, source: &str, entry: &str) -> Program {
+        let descriptor = wgpu::ShaderModuleDescriptor {
+            label: Some(what),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        };
+        // SAFETY: only this crate's own sources come here. Their loops have constant bounds, and every index is held
+        // to the size of what it indexes where it is computed; the tests run each one on frames of odd sizes.
+        let module = unsafe {
+            self.inner
+                .create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
+        };
+        let pipeline = self
+            .inner
+            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(what),
+                layout: None,
+                module: &module,
+                entry_point: Some(entry),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    // Every value is written before it is read.
+                    zero_initialize_workgroup_memory: false,
+                    ..Default::default()
+                },
+                cache: self.cache.as_ref(),
+            });
+        Program(pipeline)
+    }
+
+    /// Reads `buffer` back, once what was submitted is done: for tests and for looking at what is between stages.
+    pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
+        let target = self.readable("read back", bytes);
+        let mut encoder = self.inner.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &target, 0, target.size());
+        let submission = self.queue.submit([encoder.finish()]);
+        let mut all = vec![0; bytes];
+        self.map(&target, &submission)?;
+        copy_mapped(&target, &mut all)?;
+        Ok(all)
+    }
+
+    /// Maps a readable buffer that `submission` writes.
+    pub(crate) fn map(
+        &self,
+        buffer: &wgpu::Buffer,
+        submission: &wgpu::SubmissionIndex,
+    ) -> Result<()> {
+        let (send, receive) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
+            // The receiver waits below, or has given up.
+            let _ = send.send(mapped);
+        });
+        self.wait(submission)?;
+        match receive.try_recv() {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(why)) => Err(Error::Lost(one_line(why))),
+            Err(why) => Err(Error::Lost(one_line(why))),
+        }
+    }
+}
+
+/// Copies a mapped buffer's first bytes.
+pub(crate) fn copy_mapped(buffer: &wgpu::Buffer, into: &mut [u8]) -> Result<()> {
+    let view = buffer
+        .get_mapped_range(..)
+        .map_err(|why| Error::Lost(one_line(why)))?;
+    into.copy_from_slice(&view[..into.len()]);
+    Ok(())
+}
+
+/// Constants of a program and where they lie.
+pub(crate) struct Constants {
+    pub(crate) buffer: wgpu::Buffer,
+    uniform: bool,
+}
+
+impl Constants {
+    /// The address space as WGSL calls it.
+    pub(crate) fn space(&self) -> &'static str {
+        match self.uniform {
+            true => "uniform",
+            false => "storage, read",
+        }
+    }
+}
+
+/// A compiled program.
+#[derive(Clone)]
+pub(crate) struct Program(wgpu::ComputePipeline);
+
+impl Program {
+    /// The program on its arguments, in the order of their bindings, for a grid of so many workgroups.
+    pub(crate) fn on(
+        &self,
+        device: &Device,
+        arguments: &[(u32, wgpu::BindingResource<'_>)],
+        grid: [usize; 3],
+    ) -> Result<Dispatch> {
+        let most = device.limits.max_compute_workgroups_per_dimension as usize;
+        if grid.iter().any(|&n| n > most) {
+            return Err(Error::Refused(format!(
+                "{grid:?} workgroups are too many for {}, which takes {most} a side; smaller frames are right",
+                device.name()
+            )));
+        }
+        let entries: Vec<_> = arguments
+            .iter()
+            .map(|(binding, resource)| wgpu::BindGroupEntry {
+                binding: *binding,
+                resource: resource.clone(),
+            })
+            .collect();
+        Ok(Dispatch {
+            pipeline: self.0.clone(),
+            arguments: device.inner.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &self.0.get_bind_group_layout(0),
+                entries: &entries,
+            }),
+            grid: grid.map(|n| n as u32),
+        })
+    }
+}
+
+/// A program with its arguments, ready to run as often as wanted.
+pub(crate) struct Dispatch {
+    pipeline: wgpu::ComputePipeline,
+    arguments: wgpu::BindGroup,
+    grid: [u32; 3],
+}
+
+impl Dispatch {
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        let [x, y, z] = self.grid;
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.arguments, &[]);
+        pass.dispatch_workgroups(x, y, z);
+    }
+}
+
+/// The adapter of that name, or the fastest that is hardware.
+fn adapter(name: Option<&str>) -> Result<wgpu::Adapter> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    let computes = |adapter: &wgpu::Adapter| {
+        let flags = adapter.get_downlevel_capabilities().flags;
+        flags.contains(wgpu::DownlevelFlags::COMPUTE_SHADERS)
+    };
+    all.retain(computes);
+    all.sort_by_key(rank);
+    let names = all
+        .iter()
+        .map(|adapter| adapter.get_info().name)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let wanted = |adapter: &wgpu::Adapter| match name {
+        Some(name) => {
+            let of = adapter.get_info().name.to_lowercase();
+            of.contains(&name.to_lowercase())
+        }
+        None => rank(adapter) < 4,
+    };
+    all.into_iter().find(wanted).ok_or_else(|| {
+        Error::None(match (name, names.is_empty()) {
+            (_, true) => "no driver of Vulkan, Metal or DirectX 12 answers".into(),
+            (Some(name), _) => format!("none is called '{name}'; there is {names}"),
+            (None, _) => {
+                format!("only drivers in software answer ({names}); they are taken by name")
+            }
+        })
+    })
+}
+
+fn pipeline_cache(device: &wgpu::Device, programs: Option<&[u8]>) -> wgpu::PipelineCache {
+    // SAFETY: the bytes are those of `Device::programs` on an earlier run, which its documentation asks for; wgpu
+    // checks their header against this driver and falls back to an empty cache.
+    unsafe {
+        device.create_pipeline_cache(&wgpu::PipelineCacheDescriptor {
+            label: None,
+            data: programs,
+            fallback: true,
+        })
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+pub(crate) fn one_line(error: impl std::fmt::Display) -> String {
+    error
+        .to_string()
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+/// What the tests of stages share.
+#[cfg(test)]
+pub(super) mod testing {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use num_complex::Complex32;
+    use std::sync::OnceLock;
+
+    /// The device of all tests: a GPU, or a driver in software; none where there is neither, which is said.
+    pub(crate) fn device() -> Option<Arc<Device>> {
+        static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
+        let opened = DEVICE.get_or_init(|| {
+            let opened =
+                Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
+            opened.ok().map(Arc::new)
+        });
+        if opened.is_none() {
+            println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
+        }
+        opened.clone()
+    }
+
+    pub(crate) fn software() -> DeviceOptions {
+        DeviceOptions {
+            name: Some("llvmpipe".into()),
+            programs: None,
+        }
+    }
+
+    pub(crate) fn upload(device: &Device, field: &[Complex32]) -> wgpu::Buffer {
+        let buffer = device.buffer("field", size_of_val(field)).unwrap();
+        device
+            .queue
+            .write_buffer(&buffer, 0, bytemuck::cast_slice(field));
+        buffer
+    }
+
+    pub(crate) fn read(device: &Device, buffer: &wgpu::Buffer, count: usize) -> Vec<Complex32> {
+        bytemuck::pod_collect_to_vec(&device.read(buffer, 8 * count).unwrap())
+    }
+
+    pub(crate) fn run(device: &Device, work: impl Fn(&mut wgpu::ComputePass<'_>)) {
+        let mut encoder = device.inner.create_command_encoder(&Default::default());
+        work(&mut encoder.begin_compute_pass(&Default::default()));
+        device.queue.submit([encoder.finish()]);
+        device.check().unwrap();
+    }
+
+    /// Three planes of a smooth field with noise.
+    pub(crate) fn field(size: usize) -> Vec<Complex32> {
+        (0..3 * size)
+            .map(|i| {
+                let t = i as f32;
+                Complex32::from_polar(0.6 + 0.4 * (t * 0.37).sin(), t * 0.011 + (t * 1.7).cos())
+            })
+            .collect()
+    }
+
+    /// The largest difference, of the largest amplitude.
+    pub(crate) fn apart(a: &[Complex32], b: &[Complex32]) -> f32 {
+        assert_eq!(a.len(), b.len());
+        let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);
+        let worst = |worst: f32, d: f32| if d > worst || d.is_nan() { d } else { worst };
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).norm())
+            .fold(0.0, worst)
+            / most
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::testing::software;
+    use super::*;
+
+    #[test]
+    fn a_gpu_that_is_not_there_is_named() {
+        let options = DeviceOptions {
+            name: Some("no such card".into()),
+            programs: None,
+        };
+        let refused = Device::open(&options).unwrap_err();
+        assert!(matches!(&refused, Error::None(_)));
+        assert!(!refused.to_string().contains('\n'), "{refused}");
+    }
+
+    #[test]
+    fn what_a_device_does_not_take_is_an_error() {
+        let small = |limits: wgpu::Limits| wgpu::Limits {
+            max_storage_buffer_binding_size: 1 << 20,
+            ..limits
+        };
+        let Ok(device) = Device::open_with(&software(), wgpu::Features::empty(), small) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        assert!(!device.has_half() && !device.features().timestamps);
+        let refused = device.buffer("a frame", 1 << 21).unwrap_err();
+        assert!(refused.to_string().contains("a frame of 2 MB"), "{refused}");
+        // What goes wrong in the driver comes back from where it is guarded.
+        let wrong = device.guarded(|| {
+            device.program("nonsense", "fn main( {".into(), "main");
+            Ok(())
+        });
+        assert!(matches!(wrong, Err(Error::Refused(_))), "{wrong:?}");
+        // A lost device says so, and why, to all that comes.
+        device.give_up("pulled out");
+        assert_eq!(device.check(), Err(Error::Lost("pulled out".into())));
+        assert!(matches!(device.guarded(|| Ok(())), Err(Error::Lost(_))));
+    }
+}

@@ -1,0 +1,469 @@
+//! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
+//! double phase, the response. The twin of [`crate::encode`] and [`crate::slm`].
+
+use super::chain::{ChainOptions, ChainPlan, End, Numbers};
+use super::device::{Constants, Device, Dispatch};
+use super::fft::{Convolution, Planes, quadrant};
+use super::input::{Packer, Source};
+use super::{Error, Result};
+use crate::encode::anti_alias::AntiAlias;
+use crate::encode::band_limit::BandLimit;
+use crate::encode::{Encoding, Scale};
+use crate::network::{InputKind, Network};
+use crate::slm::Response;
+
+/// Taps to one side up to which the blur is done in the same sweep as what follows it.
+const FUSED_HALF: usize = 2;
+/// Columns of a workgroup.
+const COLUMNS: usize = 64;
+
+/// The mean phase of a field, from the sums of the workgroups that made it.
+pub(super) struct MeanPhase {
+    step: Dispatch,
+    /// Three complex f32: what each colour is to be multiplied by.
+    pub(super) turn: wgpu::Buffer,
+}
+
+impl MeanPhase {
+    pub(super) fn new(device: &Device, partial: &wgpu::Buffer, parts: usize) -> Result<Self> {
+        let parts = device.constants("parts", bytemuck::cast_slice(&[parts as u32, 0, 0, 0]))?;
+        let turn = device.buffer("the mean phase", 24)?;
+        let program = device.program("the mean phase", include_str!("turn.wgsl").into(), "find");
+        let arguments = [
+            (0, parts.buffer.as_entire_binding()),
+            (1, partial.as_entire_binding()),
+            (2, turn.as_entire_binding()),
+        ];
+        let step = program.on(device, &arguments, [1, 1, 1])?;
+        Ok(MeanPhase { step, turn })
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.step.run(pass);
+    }
+}
+
+/// Where a frame's levels go.
+pub(super) struct Target {
+    /// (H, W) words: red, green, blue, 255 from the lowest byte on.
+    pub(super) levels: wgpu::Buffer,
+    /// The same as a picture.
+    pub(super) texture: wgpu::Texture,
+}
+
+impl Target {
+    pub(super) fn new(device: &Device, (height, width): (usize, usize)) -> Result<Self> {
+        let most = device.limits().max_texture_dimension_2d as usize;
+        if height.max(width) > most {
+            return Err(Error::Refused(format!(
+                "a picture of {width}×{height} is too large for {}, which takes {most} a side",
+                device.name()
+            )));
+        }
+        Ok(Target {
+            levels: device.buffer("levels", 4 * height * width)?,
+            texture: device.inner.create_texture(&wgpu::TextureDescriptor {
+                label: Some("levels"),
+                size: wgpu::Extent3d {
+                    width: width as u32,
+                    height: height as u32,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Unorm,
+                usage: wgpu::TextureUsages::STORAGE_BINDING
+                    | wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            }),
+        })
+    }
+}
+
+/// The encoding of one field buffer into several targets.
+pub(super) struct Encoder {
+    prefilter: Option<Prefilter>,
+    convolution: Option<Convolution>,
+    before: Vec<Dispatch>,
+    /// For each target.
+    encode: Vec<Dispatch>,
+    /// One u32: the bits of the largest squared amplitude.
+    pub(super) largest: wgpu::Buffer,
+    scale: Scale,
+}
+
+impl Encoder {
+    /// `field` is (3, H, W); `turn` is what its colours are multiplied by on the way in, if anything.
+    #[allow(clippy::too_many_arguments)]
+    pub(super) fn new(
+        device: &Device,
+        field: &wgpu::Buffer,
+        size: (usize, usize),
+        encoding: &Encoding,
+        options: ChainOptions,
+        scale: Scale,
+        response: &Response,
+        mut turn: Option<&wgpu::Buffer>,
+        targets: &[Target],
+    ) -> Result<Self> {
+        let (height, width) = size;
+        let frame = [width, height, width * height, 0].map(|n| n as u32);
+        let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
+        let mut convolution = None;
+        let mut before = Vec::new();
+        let mut taps = vec![1.0];
+        let mut prefilter = None;
+        let mut seen = field.clone();
+        match encoding {
+            Encoding::DoublePhase => {}
+            Encoding::AntiAlias { sigma, width: wide } => {
+                taps = AntiAlias::new(*sigma, *wide)?.taps().to_vec();
+            }
+            Encoding::BandLimit { k } => {
+                let limit = BandLimit::new(height, width, *k)?;
+                let kept = quadrant(size, |kx, ky| f32::from(u8::from(limit.keeps(kx, ky))));
+                convolution = Some(Convolution::new(
+                    device,
+                    &Planes {
+                        field,
+                        size,
+                        padded: size,
+                        quadrants: &[&kept],
+                        turn: turn.take(),
+                    },
+                )?);
+            }
+            Encoding::Deep(network) => {
+                let made = Prefilter::new(device, network, field, size, options)?;
+                seen = made.chain.field.clone();
+                prefilter = Some(made);
+            }
+        }
+        let mut half = taps.len() - 1;
+        if half > FUSED_HALF {
+            let room = device.buffer("the blurred field", 24 * height * width)?;
+            let blur = Blur {
+                device,
+                frame: &frame,
+                taps: &taps,
+                size,
+            };
+            before.push(blur.step((1, 0), field, &room, turn.take())?);
+            before.push(blur.step((0, 1), &room, field, None)?);
+            half = 0;
+        }
+        taps.resize(3, 0.0);
+        let fixed = match scale {
+            Scale::Fixed(scale) => scale,
+            Scale::Max => 0.0,
+        };
+        let settings = [taps[0], taps[1], taps[2], fixed];
+        let settings = device.constants("settings", bytemuck::cast_slice(&settings))?;
+        let largest = device.buffer("the largest amplitude", 4)?;
+        let (steps, table) = match response {
+            Response::Linear { bits } => (1u32 << bits, None),
+            Response::Lut { level, .. } => (256, Some(level.map(u32::from))),
+            Response::PerPixel(_) => {
+                return Err(Error::Refused(
+                    "a table for each pixel is read on the CPU alone".into(),
+                ));
+            }
+        };
+        let header = format!(
+            "const HALF: i32 = {half};
+            const TURN: bool = {};
+            const FIXED: bool = {};
+            const STEPS: u32 = {steps}u;
+            const TABLE: bool = {};
+            ",
+            turn.is_some(),
+            scale != Scale::Max,
+            table.is_some()
+        );
+        let source = header + include_str!("encode.wgsl");
+        let response = device.table(
+            "the response",
+            bytemuck::cast_slice(&table.unwrap_or([0; 256])),
+        )?;
+        let turn = turn.unwrap_or(&response.buffer);
+        let common = [
+            (0, frame.buffer.as_entire_binding()),
+            (1, settings.buffer.as_entire_binding()),
+            (2, seen.as_entire_binding()),
+            (3, turn.as_entire_binding()),
+        ];
+        let grid = [width.div_ceil(COLUMNS), height, 1];
+        if scale == Scale::Max {
+            let program = device.program("the largest amplitude", source.clone(), "peak");
+            let mut arguments = common.to_vec();
+            arguments.push((4, largest.as_entire_binding()));
+            before.push(program.on(device, &arguments, grid)?);
+        }
+        let program = device.program("double phase", source, "encode");
+        let encode = targets
+            .iter()
+            .map(|target| {
+                let view = target.texture.create_view(&Default::default());
+                let mut arguments = common.to_vec();
+                arguments.push((5, largest.as_entire_binding()));
+                arguments.push((6, target.levels.as_entire_binding()));
+                arguments.push((7, wgpu::BindingResource::TextureView(&view)));
+                arguments.push((8, response.buffer.as_entire_binding()));
+                program.on(device, &arguments, grid)
+            })
+            .collect::<Result<_>>()?;
+        Ok(Encoder {
+            prefilter,
+            convolution,
+            before,
+            encode,
+            largest,
+            scale,
+        })
+    }
+
+    /// To be called before the pass: the largest amplitude of this frame is not known yet.
+    pub(super) fn reset(&self, encoder: &mut wgpu::CommandEncoder) {
+        if self.scale == Scale::Max {
+            encoder.clear_buffer(&self.largest, 0, None);
+        }
+    }
+
+    /// Encodes into the target of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, target: usize) {
+        if let Some(prefilter) = &self.prefilter {
+            prefilter.packer.run(pass);
+            prefilter.chain.run(pass);
+        }
+        if let Some(convolution) = &self.convolution {
+            convolution.run(pass);
+        }
+        self.before.iter().for_each(|step| step.run(pass));
+        self.encode[target].run(pass);
+    }
+
+    /// The scale that a frame had whose `largest` was read back.
+    pub(super) fn scale(&self, largest: u32) -> f32 {
+        match self.scale {
+            Scale::Fixed(scale) => scale,
+            Scale::Max => f32::from_bits(largest).sqrt(),
+        }
+    }
+}
+
+/// DDPM's network on a field.
+struct Prefilter {
+    packer: Packer,
+    chain: ChainPlan,
+}
+
+impl Prefilter {
+    fn new(
+        device: &Device,
+        network: &Network,
+        field: &wgpu::Buffer,
+        size: (usize, usize),
+        options: ChainOptions,
+    ) -> Result<Self> {
+        if network.input() != InputKind::Field {
+            return Err(crate::Error::Network(format!(
+                "a pre-filter takes 'field', this network '{}'",
+                network.input()
+            ))
+            .into());
+        }
+        let chain = network.chain();
+        let numbers = Numbers::of(device, chain, options.float)?;
+        let packer = Packer::new(device, chain, numbers, size, Source::Field(field))?;
+        let end = End::Field(network.head(), InputKind::Field);
+        let (input, fusion) = (&packer.input, options.fusion);
+        let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
+        Ok(Prefilter { packer, chain })
+    }
+}
+
+struct Blur<'a> {
+    device: &'a Device,
+    frame: &'a Constants,
+    taps: &'a [f32],
+    size: (usize, usize),
+}
+
+impl Blur<'_> {
+    fn step(
+        &self,
+        along: (i32, i32),
+        from: &wgpu::Buffer,
+        to: &wgpu::Buffer,
+        turn: Option<&wgpu::Buffer>,
+    ) -> Result<Dispatch> {
+        let device = self.device;
+        let mut taps = self.taps.to_vec();
+        taps.resize(32, 0.0);
+        let taps = device.constants("taps", bytemuck::cast_slice(&taps))?;
+        let header = format!(
+            "const HALF: i32 = {};\nconst TURN: bool = {};\nconst ALONG: vec2i = vec2i({}, {});\n",
+            self.taps.len() - 1,
+            turn.is_some(),
+            along.0,
+            along.1
+        );
+        let program = device.program("blur", header + include_str!("blur.wgsl"), "blur");
+        let arguments = [
+            (0, self.frame.buffer.as_entire_binding()),
+            (1, taps.buffer.as_entire_binding()),
+            (2, from.as_entire_binding()),
+            (3, to.as_entire_binding()),
+            (4, turn.unwrap_or(from).as_entire_binding()),
+        ];
+        program.on(
+            device,
+            &arguments,
+            [self.size.1.div_ceil(COLUMNS), self.size.0, 3],
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::testing::{apart, device, field, read, run, upload};
+    use super::*;
+    use crate::modulator::remove_mean_phase;
+    use num_complex::Complex32;
+
+    #[test]
+    fn the_mean_phase_is_that_of_the_cpu() {
+        let Some(device) = device() else { return };
+        // Sums of parts, as the last layer leaves them.
+        for parts in [1, 7, 1000] {
+            let mut sums = field(parts);
+            let partial: Vec<Complex32> = (0..3 * parts)
+                .map(|i| sums[i % 3 * parts + i / 3])
+                .collect();
+            let buffer = upload(&device, &partial);
+            let mean = device
+                .guarded(|| MeanPhase::new(&device, &buffer, parts))
+                .unwrap();
+            run(&device, |pass| mean.run(pass));
+            let turn = read(&device, &mean.turn, 3);
+            let expected: Vec<Complex32> = sums
+                .chunks_exact(parts)
+                .map(|plane| {
+                    let sum: Complex32 = plane.iter().sum();
+                    Complex32::from_polar(1.0, -sum.arg())
+                })
+                .collect();
+            assert!(apart(&turn, &expected) < 1e-4, "{turn:?} {expected:?}");
+            remove_mean_phase(&mut sums);
+        }
+        // Darkness has no phase and is left alone.
+        let buffer = upload(&device, &[Complex32::ZERO; 3]);
+        let mean = device
+            .guarded(|| MeanPhase::new(&device, &buffer, 1))
+            .unwrap();
+        run(&device, |pass| mean.run(pass));
+        assert_eq!(read(&device, &mean.turn, 3), [Complex32::ONE; 3]);
+    }
+
+    #[test]
+    fn levels_are_those_of_the_cpu() {
+        let Some(device) = device() else { return };
+        let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
+        let wide = Encoding::AntiAlias {
+            sigma: 2.0,
+            width: 9,
+        };
+        let five = Encoding::AntiAlias {
+            sigma: 1.0,
+            width: 5,
+        };
+        let eight = Response::Linear { bits: 8 };
+        let wide = || wide.clone();
+        let cases = [
+            ((61, 47), Encoding::DoublePhase, Scale::Max, eight.clone()),
+            ((61, 47), Encoding::ANTI_ALIAS, Scale::Max, lut.clone()),
+            (
+                (61, 47),
+                Encoding::ANTI_ALIAS,
+                Scale::Fixed(0.7),
+                Response::Linear { bits: 5 },
+            ),
+            ((61, 47), five, Scale::Max, eight.clone()),
+            ((61, 47), wide(), Scale::Fixed(1.1), eight.clone()),
+            ((61, 47), Encoding::BAND_LIMIT, Scale::Max, lut),
+            ((1, 1), wide(), Scale::Max, eight.clone()),
+            ((384, 384), Encoding::ANTI_ALIAS, Scale::Max, eight.clone()),
+            ((540, 960), Encoding::ANTI_ALIAS, Scale::Fixed(1.0), eight),
+        ];
+        for (size, encoding, scale, response) in cases {
+            let area = size.0 * size.1;
+            let turns =
+                [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
+            let turn = upload(&device, &turns);
+            let mut expected = field(area);
+            let buffer = upload(&device, &expected);
+            let (encoder, targets) = device
+                .guarded(|| {
+                    let targets = [Target::new(&device, size)?, Target::new(&device, size)?];
+                    let encoder = Encoder::new(
+                        &device,
+                        &buffer,
+                        size,
+                        &encoding,
+                        ChainOptions::default(),
+                        scale,
+                        &response,
+                        Some(&turn),
+                        &targets,
+                    )?;
+                    Ok((encoder, targets))
+                })
+                .unwrap();
+            run(&device, |pass| encoder.run(pass, 1));
+            let words: Vec<u32> =
+                bytemuck::pod_collect_to_vec(&device.read(&targets[1].levels, 4 * area).unwrap());
+            for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
+                plane.iter_mut().for_each(|value| *value *= turn);
+            }
+            let twin = crate::encode::Encoder::new(size.0, size.1, encoding.clone()).unwrap();
+            let mut levels = vec![0; 3 * area];
+            let used = twin.encode_levels(
+                &mut expected,
+                scale,
+                &response,
+                &mut levels,
+                &mut twin.scratch(),
+            );
+            let mut phase = vec![0.0; 3 * area];
+            crate::encode::double_phase::encode(&expected, size.1, area, used, &mut phase);
+            let largest: Vec<u32> =
+                bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
+            let found = encoder.scale(largest[0]);
+            assert!(
+                (found - used).abs() < 1e-4 * used,
+                "{size:?} {encoding:?}: {found} {used}"
+            );
+            // A level may be its neighbour where the phase lies within rounding of the bound between them.
+            let steps = match response {
+                Response::Linear { bits } => (1 << bits) as f32,
+                _ => 256.0,
+            };
+            for c in 0..3 {
+                for i in 0..area {
+                    let (level, expected) = ((words[i] >> (8 * c)) as u8, levels[c * area + i]);
+                    let step = phase[c * area + i] / std::f32::consts::TAU * steps;
+                    // acos is steep at full light.
+                    let near = (step - step.floor() - 0.5).abs();
+                    assert!(
+                        level == expected || near < 0.1,
+                        "{size:?} {encoding:?} {scale:?}: {level} for {expected} at {i} of {c}, step {step}"
+                    );
+                }
+            }
+            assert!(words.iter().all(|word| word >> 24 == 255));
+        }
+    }
+}

@@ -1,0 +1,123 @@
+// From the field at the modulator to levels: blur, double phase, response. `peak` finds the largest amplitude that
+// `encode` then scales by. The header that encode.rs writes before this text gives the constants in capitals.
+
+struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
+// The centre tap of the blur and those to one side; the fixed scale.
+struct Settings { taps: vec3f, scale: f32 }
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> settings: Settings;
+@group(0) @binding(2) var<storage, read> field: array<vec2f>;
+@group(0) @binding(3) var<storage, read> turn: array<vec2f>;
+// The largest squared amplitude, its bits: those of numbers from 0 on are in order.
+@group(0) @binding(4) var<storage, read_write> largest: atomic<u32>;
+@group(0) @binding(5) var<storage, read> found: array<u32>;
+@group(0) @binding(6) var<storage, read_write> levels: array<u32>;
+@group(0) @binding(7) var shown: texture_storage_2d<rgba8unorm, write>;
+@group(0) @binding(8) var<storage, read> response: array<u32>;
+
+const PI: f32 = 3.14159265358979;
+const TAU: f32 = 6.28318530717959;
+
+var<workgroup> most: array<f32, 64>;
+
+// A colour's value at a pixel: blurred, and turned where nothing before did it.
+fn value(colour: u32, x: i32, y: i32) -> vec2f {
+    var sum = vec2f(0);
+    if (HALF == 0) {
+        sum = field[colour * frame.plane + u32(y * frame.width + x)];
+    } else {
+        for (var dy = -HALF; dy <= HALF; dy++) {
+            let j = clamp(y + dy, 0, frame.height - 1);
+            for (var dx = -HALF; dx <= HALF; dx++) {
+                let i = clamp(x + dx, 0, frame.width - 1);
+                let weight = settings.taps[abs(dx)] * settings.taps[abs(dy)];
+                sum += weight * field[colour * frame.plane + u32(j * frame.width + i)];
+            }
+        }
+    }
+    if (TURN) {
+        let v = turn[colour];
+        sum = vec2f(sum.x * v.x - sum.y * v.y, sum.x * v.y + sum.y * v.x);
+    }
+    return sum;
+}
+
+// Of numbers in [0, 1], to 1e-6; see double_phase.rs. Drivers promise 5e-4.
+fn arc_cosine(a: f32) -> f32 {
+    var p = -0.0012624911;
+    p = p * a + 0.00667009;
+    p = p * a - 0.017088126;
+    p = p * a + 0.03089188;
+    p = p * a - 0.050174305;
+    p = p * a + 0.08897899;
+    p = p * a - 0.2145988;
+    p = p * a + PI / 2.0;
+    return sqrt(max(1.0 - a, 0.0)) * p;
+}
+
+fn angle(v: vec2f) -> f32 {
+    let a = abs(v);
+    let slope = min(a.x, a.y) / max(max(a.x, a.y), 1.17549435e-38);
+    let q = slope * slope;
+    var p = 0.0028662257;
+    p = p * q - 0.016165737;
+    p = p * q + 0.042909614;
+    p = p * q - 0.07528964;
+    p = p * q + 0.10656264;
+    p = p * q - 0.142089;
+    p = p * q + 0.1999355;
+    p = p * q - 0.33333145;
+    p = p * q + 1.0;
+    let octant = slope * p;
+    let quadrant = select(octant, PI / 2.0 - octant, a.y > a.x);
+    let half = select(quadrant, PI - quadrant, v.x < 0.0);
+    return select(half, -half, v.y < 0.0);
+}
+
+fn level(v: vec2f, inverse: f32, even: bool) -> u32 {
+    let amplitude = min(sqrt(dot(v, v)) * inverse, 1.0);
+    let half = arc_cosine(amplitude);
+    let sum = angle(v) + select(-half, half, even);
+    let phase = select(sum, sum + TAU, sum < 0.0);
+    let step = u32(phase * (f32(STEPS) / TAU) + 0.5) & (STEPS - 1u);
+    if (TABLE) { return response[step]; }
+    return step;
+}
+
+@compute @workgroup_size(64)
+fn encode(@builtin(global_invocation_id) at: vec3u) {
+    let x = i32(at.x);
+    let y = i32(at.y);
+    if (x >= frame.width) { return; }
+    var scale = settings.scale;
+    if (!FIXED) { scale = sqrt(bitcast<f32>(found[0])); }
+    let inverse = select(0.0, 1.0 / scale, scale > 0.0);
+    let even = ((x + y) & 1) == 0;
+    let rgb = vec3u(
+        level(value(0u, x, y), inverse, even),
+        level(value(1u, x, y), inverse, even),
+        level(value(2u, x, y), inverse, even),
+    );
+    levels[u32(y * frame.width + x)] = rgb.x | (rgb.y << 8u) | (rgb.z << 16u) | 0xff000000u;
+    textureStore(shown, vec2i(x, y), vec4f(vec3f(rgb) / 255.0, 1.0));
+}
+
+@compute @workgroup_size(64)
+fn peak(@builtin(global_invocation_id) at: vec3u, @builtin(local_invocation_index) thread: u32) {
+    let x = i32(at.x);
+    let y = i32(at.y);
+    var square = 0.0;
+    if (x < frame.width) {
+        for (var c = 0u; c < 3u; c++) {
+            let v = value(c, x, y);
+            square = max(square, dot(v, v));
+        }
+    }
+    most[thread] = square;
+    for (var step = 32u; step > 0u; step /= 2u) {
+        workgroupBarrier();
+        if (thread < step) { most[thread] = max(most[thread], most[thread + step]); }
+    }
+    if (thread == 0u) { atomicMax(&largest, bitcast<u32>(most[0])); }
+}

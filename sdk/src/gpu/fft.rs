@@ -1,0 +1,484 @@
+//! A filter in the Fourier domain of zero-padded planes, in three dispatches: rows, columns with the filter between
+//! their two transforms, rows back. The twin of [`crate::wave::fft`].
+//!
+//! A line is transformed in workgroup memory, so its length is bounded by that: 4096 where there are 32 KiB.
+
+use super::device::{Device, Dispatch};
+use super::{Error, Result};
+use num_complex::Complex32;
+use std::f64::consts::PI;
+use std::fmt::Write;
+
+/// Most threads of a workgroup: what every GPU has.
+const MOST_THREADS: usize = 256;
+/// Values that a thread holds at a time, where there are threads enough.
+const PER_THREAD: usize = 8;
+
+/// A filter over the padded plane: one quadrant of it, `(W'/2 + 1, H'/2 + 1)`, with 1/(H'·W') in it.
+pub(super) type Quadrant = Vec<Complex32>;
+
+/// The quadrant of what `factor` gives for (kx, ky), without the transforms' scale.
+pub(super) fn quadrant(
+    (padded_height, padded_width): (usize, usize),
+    factor: impl Fn(usize, usize) -> f32,
+) -> Quadrant {
+    let scale = 1.0 / (padded_height * padded_width) as f32;
+    let rows = padded_height / 2 + 1;
+    (0..(padded_width / 2 + 1) * rows)
+        .map(|i| Complex32::new(scale * factor(i / rows, i % rows), 0.0))
+        .collect()
+}
+
+/// What a convolution is made from.
+pub(super) struct Planes<'a> {
+    /// (3, H, W), replaced by itself filtered.
+    pub(super) field: &'a wgpu::Buffer,
+    /// (H, W).
+    pub(super) size: (usize, usize),
+    /// (H', W').
+    pub(super) padded: (usize, usize),
+    /// One quadrant for all colours, or three.
+    pub(super) quadrants: &'a [&'a [Complex32]],
+    /// What each colour is multiplied by on the way in, if anything.
+    pub(super) turn: Option<&'a wgpu::Buffer>,
+}
+
+/// A convolution of three planes, ready to run.
+pub(super) struct Convolution {
+    steps: [Dispatch; 3],
+    table: wgpu::Buffer,
+}
+
+/// What one of the three dispatches does.
+#[derive(Clone, Copy)]
+struct Stage {
+    length: usize,
+    forward: bool,
+    filter: bool,
+    inverse: bool,
+    in_place: bool,
+    turn: bool,
+}
+
+impl Convolution {
+    pub(super) fn new(device: &Device, planes: &Planes<'_>) -> Result<Self> {
+        let (height, width) = planes.size;
+        let (padded_height, padded_width) = planes.padded;
+        let quadrant = (padded_height / 2 + 1) * (padded_width / 2 + 1);
+        let table: Vec<Complex32> = planes.quadrants.concat();
+        let table = device.table("a filter", bytemuck::cast_slice(&table))?;
+        let rows = device.buffer("spectra", 3 * height * padded_width * 8)?;
+        let [row_roots, column_roots] = [padded_width, padded_height].map(|n| {
+            let roots: Vec<Complex32> = (0..n)
+                .map(|j| {
+                    let (sin, cos) = (2.0 * PI * j as f64 / n as f64).sin_cos();
+                    Complex32::new(cos as f32, sin as f32)
+                })
+                .collect();
+            device.table("roots of unity", bytemuck::cast_slice(&roots))
+        });
+        let (row_roots, column_roots) = (row_roots?, column_roots?);
+        let row = Stage {
+            length: padded_width,
+            forward: true,
+            filter: false,
+            inverse: false,
+            in_place: false,
+            turn: planes.turn.is_some(),
+        };
+        let column = Stage {
+            length: padded_height,
+            filter: true,
+            inverse: true,
+            in_place: true,
+            turn: false,
+            ..row
+        };
+        let back = Stage {
+            forward: false,
+            inverse: true,
+            turn: false,
+            ..row
+        };
+        let turn = planes.turn.unwrap_or(&row_roots.buffer);
+        let make = |what,
+                    stage: Stage,
+                    lines: usize,
+                    roots: &wgpu::Buffer,
+                    from: &wgpu::Buffer,
+                    to: &wgpu::Buffer,
+                    places: [usize; 8]| {
+            let together = stage.lines_together(device)?;
+            let mut numbers = vec![lines];
+            numbers.extend(places);
+            numbers.push(if planes.quadrants.len() > 1 {
+                quadrant
+            } else {
+                0
+            });
+            numbers.resize(12, 0);
+            let numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
+            let numbers = device.constants("lines", bytemuck::cast_slice(&numbers))?;
+            let program = device.program(what, stage.source(together), "convolve");
+            let arguments = [
+                (0, numbers.buffer.as_entire_binding()),
+                (1, roots.as_entire_binding()),
+                (2, from.as_entire_binding()),
+                (3, to.as_entire_binding()),
+                (4, table.buffer.as_entire_binding()),
+                (5, turn.as_entire_binding()),
+            ];
+            program.on(device, &arguments, [lines.div_ceil(together), 3, 1])
+        };
+        let frame = [height * width, width, 1, width];
+        let spectra = [height * padded_width, padded_width, 1, padded_width];
+        let columns = [height * padded_width, 1, padded_width, height];
+        let places = |from: [usize; 4], to: [usize; 4]| -> [usize; 8] {
+            std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] })
+        };
+        let steps = [
+            make(
+                "rows",
+                row,
+                height,
+                &row_roots.buffer,
+                planes.field,
+                &rows,
+                places(frame, spectra),
+            )?,
+            // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
+            make(
+                "columns",
+                column,
+                padded_width,
+                &column_roots.buffer,
+                &column_roots.buffer,
+                &rows,
+                places(columns, columns),
+            )?,
+            make(
+                "rows back",
+                back,
+                height,
+                &row_roots.buffer,
+                &rows,
+                planes.field,
+                places(spectra, frame),
+            )?,
+        ];
+        Ok(Convolution {
+            steps,
+            table: table.buffer,
+        })
+    }
+
+    /// Another filter from the next submission on: as many quadrants as were planned, one after another.
+    pub(super) fn set(&self, device: &Device, quadrants: &[Complex32]) {
+        device
+            .queue
+            .write_buffer(&self.table, 0, bytemuck::cast_slice(quadrants));
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.steps.iter().for_each(|step| step.run(pass));
+    }
+}
+
+impl Stage {
+    /// How many lines a workgroup transforms: columns in fours where they fit, since four values are what memory
+    /// hands out at a time.
+    fn lines_together(&self, device: &Device) -> Result<usize> {
+        let most = device.limits().max_compute_workgroup_storage_size as usize;
+        let wanted: &[usize] = if self.in_place { &[4, 2, 1] } else { &[1] };
+        let fits = |lines: &&usize| **lines * self.length * 8 <= most;
+        wanted.iter().find(fits).copied().ok_or_else(|| {
+            Error::Refused(format!(
+                "lines of {} values do not fit the {most} bytes of workgroup memory of {}; smaller frames or distances are right",
+                self.length,
+                device.name()
+            ))
+        })
+    }
+
+    /// The program for so many lines a workgroup.
+    fn source(&self, lines: usize) -> String {
+        let Stage { length, .. } = *self;
+        let each = length
+            .div_ceil(PER_THREAD)
+            .next_power_of_two()
+            .clamp(32, MOST_THREADS / lines);
+        let header = format!(
+            "const N: u32 = {length}u;
+            const LINES: u32 = {lines}u;
+            const EACH: u32 = {each}u;
+            const THREADS: u32 = {threads}u;
+            const FORWARD: bool = {};
+            const FILTER: bool = {};
+            const INVERSE: bool = {};
+            const IN_PLACE: bool = {};
+            const TURN: bool = {};
+            ",
+            self.forward,
+            self.filter,
+            self.inverse,
+            self.in_place,
+            self.turn,
+            threads = each * lines,
+        );
+        header + include_str!("fft.wgsl") + &stages(length, each)
+    }
+}
+
+/// The radices of a length, whose product it is: those that have a form of their own, then other primes.
+fn radices(mut n: usize) -> Vec<usize> {
+    let mut all = Vec::new();
+    for radix in [7, 5, 4, 3, 2] {
+        while n.is_multiple_of(radix) {
+            all.push(radix);
+            n /= radix;
+        }
+    }
+    let mut prime = 11;
+    while n > 1 {
+        while n.is_multiple_of(prime) {
+            all.push(prime);
+            n /= prime;
+        }
+        prime += 2;
+        if prime * prime > n && n > 1 {
+            all.push(n);
+            n = 1;
+        }
+    }
+    all
+}
+
+/// The stages of a transform of length `n` by `each` threads, and `transform`, which runs them: a thread holds what
+/// its butterflies give until all have read.
+fn stages(n: usize, each: usize) -> String {
+    let mut text = String::new();
+    let mut calls = String::new();
+    let mut done = 1;
+    for (i, radix) in radices(n).into_iter().enumerate() {
+        let _ = writeln!(calls, "    stage{i}(t, l, sign);");
+        let _ = writeln!(text, "\nfn stage{i}(t: u32, l: u32, sign: f32) {{");
+        match radix {
+            2 | 3 | 4 | 5 | 7 => butterflies(&mut text, n, each, radix, done),
+            _ => direct(&mut text, n, each, radix, done),
+        }
+        text += "}\n";
+        done *= radix;
+    }
+    text + "\nfn transform(t: u32, l: u32, sign: f32) {\n" + &calls + "}\n"
+}
+
+/// A stage of radix `r` after stages of product `done`: butterfly j reads j + q·n/r, turned by the root
+/// q·(j mod done)/(done·r), and writes ⌊j/done⌋·done·r + (j mod done) + q·done.
+fn butterflies(text: &mut String, n: usize, each: usize, r: usize, done: usize) {
+    let count = n / r;
+    let rounds = count.div_ceil(each);
+    let step = n / (done * r);
+    for k in 0..rounds {
+        let mut values = Vec::new();
+        for q in 0..r {
+            let value = format!("row[(j + {}u) * LINES + l]", q * count);
+            values.push(match q * (done - 1) {
+                0 => value,
+                _ => format!("times({value}, root((j % {done}u) * {}u, sign))", q * step),
+            });
+        }
+        let _ = writeln!(
+            text,
+            "    var v{k}: array<vec2f, {r}>;
+    {{ let j = t + {}u; if (j < {count}u) {{ v{k} = dft{r}({}, sign); }} }}",
+            k * each,
+            values.join(", ")
+        );
+    }
+    *text += "    workgroupBarrier();\n";
+    for k in 0..rounds {
+        let _ = writeln!(
+            text,
+            "    {{ let j = t + {}u; if (j < {count}u) {{ let at = (j / {done}u) * {}u + j % {done}u;",
+            k * each,
+            done * r
+        );
+        for q in 0..r {
+            let _ = writeln!(
+                text,
+                "        row[(at + {}u) * LINES + l] = v{k}[{q}];",
+                q * done
+            );
+        }
+        *text += "    } }\n";
+    }
+    *text += "    workgroupBarrier();\n";
+}
+
+/// The same for a prime that has no butterfly here: each value by its sum.
+fn direct(text: &mut String, n: usize, each: usize, r: usize, done: usize) {
+    let rounds = n.div_ceil(each);
+    for k in 0..rounds {
+        let _ = writeln!(
+            text,
+            "    var v{k} = vec2f(0);
+    {{ let o = t + {start}u; if (o < {n}u) {{
+        let place = o % {span}u;
+        let j = (o / {span}u) * {done}u + place % {done}u;
+        for (var m = 0u; m < {r}u; m++) {{
+            v{k} += times(row[(j + m * {count}u) * LINES + l], root((m * place * {step}u) % {n}u, sign));
+        }}
+    }} }}",
+            start = k * each,
+            span = done * r,
+            count = n / r,
+            step = n / (done * r),
+        );
+    }
+    *text += "    workgroupBarrier();\n";
+    for k in 0..rounds {
+        let _ = writeln!(
+            text,
+            "    {{ let o = t + {}u; if (o < {n}u) {{ row[o * LINES + l] = v{k}; }} }}",
+            k * each
+        );
+    }
+    *text += "    workgroupBarrier();\n";
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn radices_multiply_to_the_length() {
+        for n in 1..5000 {
+            let all = radices(n);
+            assert_eq!(all.iter().product::<usize>(), n);
+            assert!(
+                all.iter().all(|&r| r == 4 || (2..r).all(|d| r % d != 0)),
+                "{n}: {all:?}"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod twins {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::testing::{apart, device, field, read, run, upload};
+    use super::*;
+    use crate::encode::band_limit::BandLimit;
+    use crate::wave::aperture::{self, Aperture};
+    use crate::wave::asm::{Padding, Propagator};
+
+    const WAVELENGTHS_M: [f64; 3] = [638e-9, 520e-9, 450e-9];
+
+    fn check(size: (usize, usize), distance_m: f64, padding: Padding) {
+        let Some(device) = device() else { return };
+        let plans =
+            Propagator::for_colours(size.0, size.1, 8e-6, WAVELENGTHS_M, distance_m, padding)
+                .unwrap();
+        let given = field(size.0 * size.1);
+        let buffer = upload(&device, &given);
+        let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
+        let planes = Planes {
+            field: &buffer,
+            size,
+            padded: plans[0].padded_shape(),
+            quadrants: &plans.each_ref().map(|plan| plan.transfer().quadrant()),
+            turn: Some(&upload(&device, &turns)),
+        };
+        let convolution = device
+            .guarded(|| Convolution::new(&device, &planes))
+            .unwrap();
+        run(&device, |pass| convolution.run(pass));
+        let mut expected = given;
+        let mut scratch = plans[0].scratch();
+        let colours = expected.chunks_exact_mut(size.0 * size.1);
+        for ((plan, plane), turn) in plans.iter().zip(colours).zip(turns) {
+            plane.iter_mut().for_each(|value| *value *= turn);
+            plan.propagate(plane, &mut scratch);
+        }
+        let worst = apart(&read(&device, &buffer, expected.len()), &expected);
+        assert!(
+            worst < 1e-4,
+            "{size:?}, {distance_m} m, {padding:?}: {worst}"
+        );
+    }
+
+    #[test]
+    fn propagation_agrees_with_the_cpu() {
+        for (size, distance_m, padding) in [
+            ((61, 47), 6e-3, Padding::Reach),
+            ((61, 47), -20e-3, Padding::Double),
+            // 7 and 49 have a form of their own; 11, 13 and 61 have not.
+            ((49, 22), 1e-3, Padding::Circular),
+            ((61, 26), 1e-3, Padding::Circular),
+            ((1, 1), 1e-3, Padding::Reach),
+            ((384, 384), 6e-3, Padding::Reach),
+            ((540, 960), 10e-3, Padding::Reach),
+        ] {
+            check(size, distance_m, padding);
+        }
+    }
+
+    #[test]
+    fn aperture_and_band_limit_agree_with_the_cpu() {
+        let Some(device) = device() else { return };
+        for size in [(61, 47), (48, 96)] {
+            let plans = (
+                Aperture::new(size.0, size.1, 0.8).unwrap(),
+                BandLimit::new(size.0, size.1, 1.0).unwrap(),
+            );
+            let round = |kx: usize, ky: usize| {
+                let (fx, fy) = (kx as f64 / size.1 as f64, ky as f64 / size.0 as f64);
+                f32::from(u8::from(aperture::passes(fx, fy, 0.8)))
+            };
+            let limit = |kx, ky| f32::from(u8::from(plans.1.keeps(kx, ky)));
+            for (name, kept) in [
+                ("aperture", quadrant(size, round)),
+                ("limit", quadrant(size, limit)),
+            ] {
+                let given = field(size.0 * size.1);
+                let buffer = upload(&device, &given);
+                let planes = Planes {
+                    field: &buffer,
+                    size,
+                    padded: size,
+                    quadrants: &[&kept],
+                    turn: None,
+                };
+                let convolution = device
+                    .guarded(|| Convolution::new(&device, &planes))
+                    .unwrap();
+                run(&device, |pass| convolution.run(pass));
+                let mut expected = given;
+                for plane in expected.chunks_exact_mut(size.0 * size.1) {
+                    match name {
+                        "aperture" => plans.0.filter(plane, &mut plans.0.scratch()),
+                        _ => plans.1.filter(plane, &mut plans.1.scratch()),
+                    }
+                }
+                let worst = apart(&read(&device, &buffer, expected.len()), &expected);
+                assert!(worst < 1e-4, "{name} {size:?}: {worst}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_does_not_fit_is_refused() {
+        let Some(device) = device() else { return };
+        let buffer = upload(&device, &field(9000));
+        let size = (1, 9000);
+        let planes = Planes {
+            field: &buffer,
+            size,
+            padded: size,
+            quadrants: &[&quadrant(size, |_, _| 1.0)],
+            turn: None,
+        };
+        let refused = device.guarded(|| Convolution::new(&device, &planes)).err();
+        assert!(refused.unwrap().to_string().contains("9000"));
+    }
+}

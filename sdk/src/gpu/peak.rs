@@ -1,0 +1,100 @@
+//! What a device can do at its best, measured: the yardstick of the benchmark.
+
+use super::Result;
+use super::chain::Numbers;
+use super::device::{Device, Dispatch};
+use std::time::Instant;
+
+/// Bytes that are copied.
+const COPIED: usize = 1 << 26;
+/// What a thread copies: so many words of 16 bytes.
+const COPIES_EACH: usize = 16;
+/// Rounds of eight chains of four multiply-adds, and workgroups of 256 threads.
+const ROUNDS: usize = 1024;
+const GROUPS: usize = 4096;
+
+/// The best of a device.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peak {
+    /// Multiply-adds a second in the numbers of the network, from registers alone.
+    pub mac_per_s: f64,
+    /// Bytes read and written a second by a copy that no cache holds.
+    pub bytes_per_s: f64,
+}
+
+pub(super) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
+    device.guarded(|| {
+        let [from, to] = [
+            device.buffer("source", COPIED)?,
+            device.buffer("copy", COPIED)?,
+        ];
+        let arguments = [(0, from.as_entire_binding()), (1, to.as_entire_binding())];
+        let words = COPIED / 16 / 256 / COPIES_EACH;
+        let header = format!("const EACH: u32 = {COPIES_EACH}u;\n");
+        let copy = device
+            .program("a copy", header.clone() + include_str!("peak.wgsl"), "copy")
+            .on(device, &arguments, [words, 1, 1])?;
+        // A lane holds four numbers, or words of four.
+        let (lane, per_step) = match numbers {
+            Numbers::F32 => (
+                "fn lane(v: vec4u) -> vec4f { return vec4f(v) * 1e-9; }
+                fn bits(v: vec4f) -> vec4u { return bitcast<vec4u>(v); }
+                fn more(v: vec4f, x: vec4f) -> vec4f { return fma(v, x, x); }\n",
+                4,
+            ),
+            Numbers::F16 => (
+                "fn lane(v: vec4u) -> vec4<f16> { return vec4<f16>(vec4f(v) * 1e-9); }
+                fn bits(v: vec4<f16>) -> vec4u { return bitcast<vec4u>(vec4f(v)); }
+                fn more(v: vec4<f16>, x: vec4<f16>) -> vec4<f16> { return fma(v, x, x); }\n",
+                4,
+            ),
+            Numbers::Int8 => (
+                "fn lane(v: vec4u) -> vec4i { return vec4i(v); }
+                fn bits(v: vec4i) -> vec4u { return vec4u(v); }
+                fn more(v: vec4i, x: vec4i) -> vec4i {
+                    let w = vec4u(x);
+                    let u = vec4u(v);
+                    return v + vec4i(
+                        dot4I8Packed(u.x, w.x), dot4I8Packed(u.y, w.y),
+                        dot4I8Packed(u.z, w.z), dot4I8Packed(u.w, w.w),
+                    );
+                }\n",
+                16,
+            ),
+        };
+        let enable = match numbers {
+            Numbers::F16 => "enable f16;\n",
+            _ => "",
+        };
+        let header = format!("{enable}const ROUNDS: u32 = {ROUNDS}u;\n{header}{lane}");
+        let source = header + include_str!("peak.wgsl") + include_str!("peak_arithmetic.wgsl");
+        // A driver in software does in one workgroup what a GPU does in thousands.
+        let groups = if device.is_software() { 4 } else { GROUPS };
+        let compute = device.program("arithmetic", source, "compute").on(
+            device,
+            &arguments,
+            [groups, 1, 1],
+        )?;
+        let macs = groups * 256 * ROUNDS * 8 * per_step;
+        Ok(Peak {
+            mac_per_s: macs as f64 / seconds(device, &compute)?,
+            bytes_per_s: 2.0 * COPIED as f64 / seconds(device, &copy)?,
+        })
+    })
+}
+
+/// The shortest time of one dispatch, among several submissions of several.
+fn seconds(device: &Device, step: &Dispatch) -> Result<f64> {
+    const TOGETHER: usize = 4;
+    let mut best = f64::INFINITY;
+    for _ in 0..4 {
+        let mut encoder = device.inner.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        (0..TOGETHER).for_each(|_| step.run(&mut pass));
+        drop(pass);
+        let start = Instant::now();
+        device.wait(&device.queue.submit([encoder.finish()]))?;
+        best = best.min(start.elapsed().as_secs_f64() / TOGETHER as f64);
+    }
+    Ok(best)
+}

@@ -1,0 +1,215 @@
+//! The laser's light over the modulator: a Gaussian beam is brighter in the middle than at the rim, so the
+//! target amplitude is divided by what arrives.
+//!
+//! The map is coarse, as beams are smooth; it is interpolated linearly between nodes that are spread evenly from
+//! the first to the last pixel of each axis.
+
+use crate::error::{Error, Result};
+use ndarray::{ArrayView3, Axis};
+use num_complex::Complex32;
+use rayon::prelude::*;
+
+/// The most that a value is brightened: light below a tenth of the brightest is taken as that.
+pub const MAX_GAIN: f32 = 10.0;
+
+/// One over the laser's amplitude, for a modulator of any size. Immutable; shared between threads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Illumination {
+    /// (Gh, Gw).
+    nodes: (usize, usize),
+    /// (3, Gh, Gw).
+    gain: Vec<f32>,
+}
+
+impl Illumination {
+    /// From the laser's amplitude, (3, Gh, Gw), of any scale: each colour is divided by its largest value.
+    ///
+    /// # Errors
+    /// Not three colours, fewer than 2 nodes along an axis, or a value that is not finite or negative, or a colour
+    /// without light.
+    pub fn new(amplitude: ArrayView3<'_, f32>) -> Result<Self> {
+        let refuse = |what: String| Err(Error::Plan(format!("laser map: {what}")));
+        let (colours, rows, columns) = amplitude.dim();
+        if colours != 3 || rows < 2 || columns < 2 {
+            return refuse(format!(
+                "{colours} colours of {columns}×{rows}; there must be 3 of at least 2×2"
+            ));
+        }
+        let mut gain = Vec::with_capacity(amplitude.len());
+        for plane in amplitude.axis_iter(Axis(0)) {
+            if plane.iter().any(|a| !a.is_finite() || *a < 0.0) {
+                return refuse("an amplitude below 0 or not finite".into());
+            }
+            let most = plane.iter().copied().fold(0.0, f32::max);
+            if most == 0.0 {
+                return refuse("a colour without light".into());
+            }
+            gain.extend(plane.iter().map(|a| (most / a).min(MAX_GAIN)));
+        }
+        Ok(Illumination {
+            nodes: (rows, columns),
+            gain,
+        })
+    }
+
+    /// (Gh, Gw).
+    pub fn nodes(&self) -> (usize, usize) {
+        self.nodes
+    }
+
+    /// One over the amplitude of each node, (3, Gh, Gw), at least 1, at most [`MAX_GAIN`].
+    pub fn gains(&self) -> &[f32] {
+        &self.gain
+    }
+
+    /// One over the amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator: in y first, then in x. The oracle of
+    /// [`Self::divide`].
+    ///
+    /// # Panics
+    /// If `colour` is over 2 or the pixel outside.
+    pub fn gain(&self, colour: usize, y: usize, x: usize, (height, width): (usize, usize)) -> f32 {
+        assert!(y < height && x < width);
+        let (i, fy) = split(y, height, self.nodes.0);
+        let (j, fx) = split(x, width, self.nodes.1);
+        let column = |j: usize| self.column(colour, i, j, fy);
+        let (left, right) = (column(j), column(j + 1));
+        left + (right - left) * fx
+    }
+
+    fn column(&self, colour: usize, i: usize, j: usize, fy: f32) -> f32 {
+        let (rows, columns) = self.nodes;
+        let node = |i: usize| self.gain[(colour * rows + i) * columns + j];
+        let (top, bottom) = (node(i), node(i + 1));
+        top + (bottom - top) * fy
+    }
+
+    /// Divides `field`, (3, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's amplitude. An
+    /// axis of the modulator shorter than the field's counts as that. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` has not 3·H·W values.
+    pub fn divide(
+        &self,
+        field: &mut [Complex32],
+        shape: (usize, usize),
+        modulator: (usize, usize),
+    ) {
+        self.each_row(field, shape, modulator, |value, gain| *value *= gain);
+    }
+
+    /// Multiplies by the laser's amplitude as [`Self::divide`] divides: what becomes of light on its way over the
+    /// modulator.
+    ///
+    /// # Panics
+    /// If `field` has not 3·H·W values.
+    pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
+        self.each_row(field, shape, modulator, |value, gain| *value /= gain);
+    }
+
+    fn each_row(
+        &self,
+        field: &mut [Complex32],
+        (height, width): (usize, usize),
+        modulator: (usize, usize),
+        change: impl Fn(&mut Complex32, f32) + Sync,
+    ) {
+        assert_eq!(field.len(), 3 * height * width);
+        let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));
+        let (top, left) = ((rows - height) / 2, (columns - width) / 2);
+        let lines = field.par_chunks_exact_mut(width).enumerate();
+        lines.for_each(|(row, values)| {
+            let (colour, y) = (row / height, row % height + top);
+            let (i, fy) = split(y, rows, self.nodes.0);
+            let mut at = 0;
+            while at < width {
+                // All pixels that lie between the same two nodes.
+                let (j, _) = split(at + left, columns, self.nodes.1);
+                let (near, far) = (
+                    self.column(colour, i, j, fy),
+                    self.column(colour, i, j + 1, fy),
+                );
+                while at < width {
+                    let (k, fx) = split(at + left, columns, self.nodes.1);
+                    if k != j {
+                        break;
+                    }
+                    change(&mut values[at], near + (far - near) * fx);
+                    at += 1;
+                }
+            }
+        });
+    }
+}
+
+/// The node before pixel `n` of `count`, and how far it is to the next of `nodes`.
+fn split(n: usize, count: usize, nodes: usize) -> (usize, f32) {
+    let steps = (count - 1).max(1);
+    let scaled = n * (nodes - 1);
+    let before = (scaled / steps).min(nodes - 2);
+    (before, (scaled - before * steps) as f32 / steps as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use ndarray::Array3;
+
+    fn beam(rows: usize, columns: usize) -> Array3<f32> {
+        Array3::from_shape_fn((3, rows, columns), |(c, y, x)| {
+            let (u, v) = (
+                x as f32 / columns as f32 - 0.5,
+                y as f32 / rows as f32 - 0.45,
+            );
+            (c as f32 + 1.0) * (-(u * u + v * v) * (2.0 + c as f32)).exp()
+        })
+    }
+
+    #[test]
+    fn rows_agree_with_the_value_by_value_form() {
+        for shape in [(7, 33), (1, 1), (40, 3), (2, 64)] {
+            for nodes in [(2, 2), (5, 9), (50, 70)] {
+                let map = Illumination::new(beam(nodes.0, nodes.1).view()).unwrap();
+                let (h, w) = shape;
+                let plane = |i: usize| Complex32::new(1.0 + i as f32, -0.5);
+                let field: Vec<_> = (0..3 * h * w).map(plane).collect();
+                let mut divided = field.clone();
+                map.divide(&mut divided, shape, (h + 5, w + 8));
+                for (i, value) in divided.iter().enumerate() {
+                    // Five rows and eight columns more: two above, four on the left.
+                    let (y, x) = (i / w % h + 2, i % w + 4);
+                    let gain = map.gain(i / (h * w), y, x, (h + 5, w + 8));
+                    assert_eq!(*value, field[i] * gain, "{shape:?} {nodes:?} {i}");
+                }
+                map.shine(&mut divided, shape, (h + 5, w + 8));
+                for (a, b) in divided.iter().zip(&field) {
+                    assert!((a - b).norm() < 1e-5 * b.norm());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn corners_are_nodes_and_gains_are_bounded() {
+        let mut amplitude = beam(4, 5);
+        amplitude[(1, 0, 4)] = 0.0;
+        let map = Illumination::new(amplitude.view()).unwrap();
+        let most = amplitude
+            .index_axis(Axis(0), 0)
+            .iter()
+            .copied()
+            .fold(0.0, f32::max);
+        assert_eq!(map.gain(0, 99, 49, (100, 50)), most / amplitude[(0, 3, 4)]);
+        assert_eq!(map.gain(1, 0, 49, (100, 50)), MAX_GAIN);
+        assert!(map.gains().iter().all(|g| (1.0..=MAX_GAIN).contains(g)));
+    }
+
+    #[test]
+    fn unusable_maps_are_named() {
+        let message = |a: Array3<f32>| Illumination::new(a.view()).unwrap_err().to_string();
+        assert!(message(Array3::ones((1, 4, 4))).contains("3 of"));
+        assert!(message(Array3::ones((3, 1, 4))).contains("2×2"));
+        assert!(message(Array3::zeros((3, 4, 4))).contains("without light"));
+        assert!(message(Array3::from_elem((3, 4, 4), f32::NAN)).contains("not finite"));
+    }
+}

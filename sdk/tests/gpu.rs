@@ -1,0 +1,557 @@
+//! What runs on the GPU against its twin on the CPU, on whatever device there is: Mesa's driver in software will do.
+#![cfg(feature = "gpu")]
+#![allow(clippy::unwrap_used)]
+
+mod network_models;
+
+use ndarray::{Array2, Array3};
+use network_models::{Model, frame};
+use num_complex::Complex32;
+use phasefront::encode::{Encoding, Scale};
+use phasefront::frame::{
+    ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
+};
+use phasefront::gpu::{
+    self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions,
+    Float, Frame, Fusion, Job, NetworkPlan,
+};
+use phasefront::network::{Isa, reference};
+use phasefront::slm::Response;
+use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
+use std::sync::{Arc, OnceLock};
+
+/// The device of all tests; none where there is no driver, which the test says.
+fn device() -> Option<Arc<Device>> {
+    static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
+    let opened = DEVICE.get_or_init(|| {
+        let software = DeviceOptions {
+            name: Some("llvmpipe".into()),
+            ..Default::default()
+        };
+        let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
+        opened.ok().map(Arc::new)
+    });
+    if opened.is_none() {
+        println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
+    }
+    opened.clone()
+}
+
+fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(
+            0.0,
+            |worst, d| if d > worst || d.is_nan() { d } else { worst },
+        )
+}
+
+fn run(
+    network: &Network,
+    options: ChainOptions,
+    (h, w): (usize, usize),
+    input: &[f32],
+) -> Vec<f32> {
+    let device = device().unwrap();
+    let plan = NetworkPlan::new(&device, network, h, w, options).unwrap();
+    let mut output = vec![f32::NAN; 6 * h * w];
+    plan.run(input, &mut output).unwrap();
+    output
+}
+
+const SIZES: [(usize, usize); 3] = [(1, 1), (7, 33), (47, 61)];
+
+#[test]
+fn chains_in_f32_and_f16_agree_with_the_definition() {
+    let Some(device) = device() else { return };
+    let models = [
+        Model::new(2, 8),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(5, 24)
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(4, 8)
+        },
+        Model {
+            inputs: 20,
+            input: "ldi5",
+            ..Model::new(8, 16)
+        },
+        // Filters that fill no block of eight, and a width that fills no group.
+        Model::new(7, 12),
+        Model::new(6, 5),
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in SIZES {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let expected = reference::run(network.chain(), &input, size.0, size.1);
+            let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+            let mut fused = Vec::new();
+            for (float, fusion, tolerance) in [
+                (Float::F32, Fusion::Layers, 1e-4),
+                (Float::F32, Fusion::Pairs, 1e-4),
+                (Float::F16, Fusion::Layers, 0.02),
+                (Float::F16, Fusion::Pairs, 0.02),
+            ] {
+                if float == Float::F16 && !device.has_half() {
+                    println!("skipped: {device:?} has no 16-bit floating point");
+                    continue;
+                }
+                let options = ChainOptions { float, fusion };
+                let output = run(&network, options, size, &input);
+                let worst = largest_difference(&output, &expected) / largest;
+                assert!(
+                    worst < tolerance,
+                    "{} layers, {size:?}, {options:?}: {worst}",
+                    model.layers
+                );
+                fused.push(output);
+            }
+            for both in fused.chunks_exact(2) {
+                assert!(both[0] == both[1], "{size:?}: fusion changes bits");
+            }
+        }
+    }
+}
+
+#[test]
+fn chains_in_int8_have_the_bits_of_the_cpu() {
+    if device().is_none() {
+        return;
+    }
+    let models = [
+        Model::int8(2, 8),
+        Model::int8(3, 24),
+        Model::int8(4, 16),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(8, 8)
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::int8(6, 8)
+        },
+        Model::int8(8, 24),
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in SIZES {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let plan = network.plan_on(Isa::Portable, size.0, size.1).unwrap();
+            let mut expected = vec![0.0; 6 * size.0 * size.1];
+            plan.run(&input, &mut expected, &mut plan.scratch())
+                .unwrap();
+            for fusion in [Fusion::Layers, Fusion::Pairs] {
+                let options = ChainOptions {
+                    float: Float::F32,
+                    fusion,
+                };
+                let output = run(&network, options, size, &input);
+                let what = format!("{} layers, {size:?}, {fusion:?}", model.layers);
+                if model.tanh {
+                    assert!(largest_difference(&output, &expected) < 1e-5, "{what}");
+                } else {
+                    assert!(output == expected, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// A frame with detail everywhere, of values that 8 bits and 16 bits hold.
+fn rgbd(height: usize, width: usize) -> RgbdFrame {
+    let byte = |c: usize, y: usize, x: usize| ((c * 70 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    RgbdFrame::new(
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| byte(c, y, x)),
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            ((x / 8 * 4099 + y / 8 * 257) % 65536) as f32 / 65535.0
+        }),
+    )
+    .unwrap()
+}
+
+fn int8_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../models/rgbd-8-int8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
+}
+
+fn f32_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../models/rgbd-8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
+}
+
+/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
+    let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level, 0));
+    let sum: f32 = a
+        .iter()
+        .zip(b)
+        .map(|(&a, &b)| (shown(a) - shown(b)).norm())
+        .sum();
+    sum / a.len() as f32
+}
+
+/// The CPU's levels and scale of a job.
+fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
+    let (h, w) = (job.height, job.width);
+    let job = job.clone();
+    let plan = Pipeline::new(
+        h,
+        w,
+        job.method,
+        &job.display,
+        job.encoding,
+        job.scale,
+        job.response,
+    )
+    .unwrap();
+    let mut levels = vec![0; 3 * h * w];
+    let mut field = vec![Complex32::ZERO; 3 * h * w];
+    let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
+    (levels, report.unwrap().scale)
+}
+
+#[test]
+fn whole_frames_are_those_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let (int8, f32) = (int8_network(), f32_network());
+    let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
+    let linear = Response::linear(8).unwrap();
+    let half = if device.has_half() {
+        Float::F16
+    } else {
+        Float::F32
+    };
+    let cases = [
+        (
+            &int8,
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Scale::Max,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (61, 47),
+            6e-3,
+            Encoding::BAND_LIMIT,
+            Scale::Max,
+            &lut,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            -3e-3,
+            Encoding::DoublePhase,
+            Scale::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            2e-3,
+            Encoding::ANTI_ALIAS,
+            Scale::Fixed(0.8),
+            &lut,
+            half,
+        ),
+        (
+            &f32,
+            (384, 384),
+            4e-3,
+            Encoding::ANTI_ALIAS,
+            Scale::Max,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (540, 960),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Scale::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
+    ];
+    for (network, (h, w), offset_m, encoding, scale, response, float) in cases {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let method = Method::Network(network.clone());
+        let encoded = format!("{encoding:?} {scale:?}");
+        let mut job = Job::new(h, w, method, &display, encoding, scale, response.clone());
+        job.chain.float = float;
+        let frame = rgbd(h, w);
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let tolerance = if float == Float::F16 { 0.05 } else { 0.002 };
+        let what = format!("{} {h}×{w} {encoded}", plan.describe());
+        let apart = apart(&levels, &expected, response);
+        println!("{what}: {apart} {report:?}");
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(
+            scales < tolerance,
+            "{what}: {} {expected_scale}",
+            report.scale
+        );
+    }
+}
+
+/// Bytes of camera planes for an odd-sided sensor, with strides as cameras have them.
+struct Sensor {
+    format: ColourFormat,
+    planes: Vec<(Vec<u8>, usize, usize)>,
+}
+
+impl Sensor {
+    fn all((h, w): (usize, usize)) -> Vec<Sensor> {
+        let plane = |rows: usize, columns: usize, step: usize, pad: usize, seed: usize| {
+            let row = columns * step + pad;
+            let smooth = |i: usize| 127.0 + 100.0 * ((i % row) as f32 * 0.13 + seed as f32).sin();
+            let bytes = (0..rows * row).map(|i| (smooth(i) + (i / row % 23) as f32) as u8);
+            (bytes.collect(), row, step)
+        };
+        let (half_h, half_w) = (h.div_ceil(2), w.div_ceil(2));
+        let video = YuvEncoding {
+            matrix: YuvMatrix::Bt709,
+            video_range: true,
+        };
+        let full = YuvEncoding::default();
+        vec![
+            Sensor {
+                format: ColourFormat::Rgba,
+                planes: vec![plane(h, w, 4, 0, 1)],
+            },
+            Sensor {
+                format: ColourFormat::Bgra,
+                planes: vec![plane(h, w, 4, 12, 2)],
+            },
+            Sensor {
+                format: ColourFormat::Rgb,
+                planes: vec![plane(h, w, 3, 1, 3)],
+            },
+            Sensor {
+                format: ColourFormat::Nv12(video),
+                planes: vec![plane(h, w, 1, 7, 4), plane(half_h, half_w, 2, 6, 5)],
+            },
+            Sensor {
+                format: ColourFormat::Yuv420(full),
+                planes: vec![
+                    plane(h, w, 1, 3, 6),
+                    plane(half_h, half_w, 2, 1, 7),
+                    // A stride beyond what there is room for.
+                    plane(half_h, half_w, 9, 900, 8),
+                ],
+            },
+        ]
+    }
+
+    fn image(&self, (h, w): (usize, usize)) -> ColourImage<'_> {
+        let planes: Vec<Plane<'_>> = self
+            .planes
+            .iter()
+            .map(|(bytes, row, step)| Plane::new(bytes, *row, *step))
+            .collect();
+        ColourImage::new(self.format, w, h, &planes).unwrap()
+    }
+}
+
+#[test]
+fn images_of_cameras_are_read_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let network = int8_network();
+    // Odd, so that rows of 16-bit depth do not begin at words.
+    let (h, w) = (33, 45);
+    let words: Vec<u16> = (0..h * w).map(|i| (i * 4099 % 65536) as u16).collect();
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(network);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let planar = Job::new(h, w, method, &display, encoding, scale, response);
+    let turned = Orientation {
+        rotation: Rotation::Clockwise90,
+        mirrored: true,
+    };
+    for (sensor, orientation) in [((33, 45), Orientation::default()), ((75, 49), turned)] {
+        for camera in Sensor::all(sensor) {
+            let image = camera.image(sensor);
+            let job = Job {
+                colour: Colour::Camera {
+                    format: camera.format,
+                    height: sensor.0,
+                    width: sensor.1,
+                    orientation,
+                },
+                depth: Depth::U16,
+                ..planar.clone()
+            };
+            let frame = Frame {
+                colour: ColourData::Camera(image),
+                depth: DepthData::U16(&words),
+            };
+            let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
+            let mut levels = vec![0; 3 * h * w];
+            let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+            plan.process(&frame, &mut levels).unwrap();
+            let apart = apart(&levels, &expected, &planar.response);
+            assert!(apart < 0.003, "{:?} {sensor:?}: {apart}", camera.format);
+            for other in [
+                Frame {
+                    depth: DepthData::U16(&words[1..]),
+                    ..frame
+                },
+                Frame {
+                    depth: DepthData::F32(&[0.0; 33 * 45]),
+                    ..frame
+                },
+                Frame {
+                    colour: ColourData::Planar(&[0.0; 3 * 33 * 45]),
+                    ..frame
+                },
+            ] {
+                assert!(plan.submit(&other, Deliver::Levels).is_err());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pre_filter_network_filters_as_on_the_cpu() {
+    let Some(device) = device() else { return };
+    let tanh = Model {
+        inputs: 6,
+        input: "field",
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(4, 8)
+    };
+    let models = [
+        tanh.clone(),
+        Model {
+            int8: true,
+            ..tanh.clone()
+        },
+        Model {
+            tanh: false,
+            head: "real-imaginary",
+            ..tanh
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            ..Model::int8(5, 8)
+        },
+    ];
+    for model in models {
+        let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let (h, w) = (47, 61);
+        let display = Display::default();
+        let response = Response::linear(8).unwrap();
+        let method = Method::Network(f32_network());
+        let encoding = Encoding::Deep(prefilter);
+        let mut job = Job::new(h, w, method, &display, encoding, Scale::Max, response);
+        job.chain.float = Float::F32;
+        let frame = rgbd(h, w);
+        let (expected, scale) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.response);
+        // A step of 8 bits to the other side is worth more than rounding.
+        let tolerance = if model.int8 { 0.02 } else { 0.003 };
+        assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
+        assert!(
+            (report.scale - scale).abs() < tolerance * scale,
+            "{report:?} {scale}"
+        );
+    }
+}
+
+#[test]
+fn several_frames_fly_and_each_has_its_own_levels() {
+    let Some(device) = device() else { return };
+    let network = int8_network();
+    let (h, w) = (33, 45);
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(network.clone());
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let job = Job::new(h, w, method, &display, encoding, scale, response);
+    let frames: Vec<RgbdFrame> = (0..3)
+        .map(|i| {
+            let frame = rgbd(h, w);
+            let rgb = frame
+                .rgb()
+                .mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
+            RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
+        })
+        .collect();
+    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let tickets: Vec<_> = frames
+        .iter()
+        .map(|frame| plan.submit(&Frame::of(frame), Deliver::Levels).unwrap())
+        .collect();
+    let full = plan.submit(&Frame::of(&frames[0]), Deliver::Levels);
+    assert!(full.unwrap_err().to_string().contains("in flight"));
+    let mut scales = Vec::new();
+    // Collected in another order than submitted.
+    for (ticket, frame) in tickets.into_iter().zip(&frames).rev() {
+        let (expected, scale) = on_cpu(&job, frame);
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.collect(ticket, &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.response);
+        assert!(apart < 0.002, "{apart}");
+        assert!((report.scale - scale).abs() < 1e-3, "{report:?} {scale}");
+        scales.push(report.scale);
+    }
+    assert!(scales[0] < scales[1] && scales[1] < scales[2]);
+    // One that is shown, and its picture.
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
+    let texture = plan.texture(&ticket);
+    assert_eq!((texture.width(), texture.height()), (w as u32, h as u32));
+    plan.finish(ticket).unwrap();
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
+    let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
+    assert!(refused.to_string().contains("shown"), "{refused}");
+}
+
+#[test]
+fn a_device_is_tried_out_before_it_is_used() {
+    let Some(device) = device() else { return };
+    let (int8, f32) = (int8_network(), f32_network());
+    for network in [&int8, &f32] {
+        let display = Display::default().with_offset_m(5e-3).unwrap();
+        let response = Response::linear(8).unwrap();
+        let method = Method::Network(network.clone());
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+        let job = Job::new(1080, 1920, method, &display, encoding, scale, response);
+        gpu::probe(&device, &job).unwrap();
+    }
+}
