@@ -215,7 +215,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let display = phasefront::Display::try_from(&options.display)?;
         let sweep = Sweep::for_display(&display);
         let method = |rung: &Rung| match &rung.method {
-            Method::Trained { network } => phasefront::Method::Network(network.core.clone()),
+            Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
             Method::Sweep => phasefront::Method::Sweep(sweep),
         };
         let mut to = session::SessionOptions::new(display, method(best))?;

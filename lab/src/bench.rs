@@ -9,10 +9,9 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::network::{Precision, f32_peak, int8_peak};
 use phasefront::slm::Response;
-use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
+use phasefront::{Display, Method, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long the peak is measured.
@@ -21,8 +20,8 @@ const PEAK_TIME: Duration = Duration::from_millis(200);
 /// One combination that is measured.
 #[derive(Debug, Clone)]
 pub struct Case<'a> {
-    /// The network.
-    pub network: &'a Arc<Network>,
+    /// What makes the hologram.
+    pub method: &'a Method,
     /// Width and height, pixels.
     pub size: (usize, usize),
     /// Threads of the pool.
@@ -32,7 +31,9 @@ pub struct Case<'a> {
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
 #[derive(Debug, Clone, Serialize)]
 pub struct Row {
-    /// Convolution layers.
+    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    pub method: &'static str,
+    /// Convolution layers; 0 without a network.
     pub layers: usize,
     /// `f32` or `int8`.
     pub precision: String,
@@ -54,8 +55,8 @@ pub struct Row {
     pub spread_ms: [f64; 2],
     /// Frames that were measured.
     pub frames: usize,
-    /// The network's multiply-adds in its median time, 10⁹ a second.
-    pub gmac_per_s: f64,
+    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
+    pub gmac_per_s: Option<f64>,
     /// That, of what these kernels' instructions do here from registers alone, on as many threads.
     pub peak_percent: Option<f64>,
     /// The most memory this process held, where the system tells.
@@ -104,12 +105,16 @@ pub fn measure(case: &Case<'_>, display: &Display, budget: Duration) -> Result<R
 
 fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
     let (width, height) = case.size;
-    let network = case.network;
+    let (name, network) = match case.method {
+        Method::Network(network) => ("network", Some(network)),
+        Method::Seeded(network) => ("seeded", Some(network)),
+        _ => ("sweep", None),
+    };
     forget_peak_memory();
     let pipeline = Pipeline::new(
         height,
         width,
-        Method::Network(network.clone()),
+        case.method.clone(),
         display,
         Encoding::ANTI_ALIAS,
         Scale::Fixed(1.0),
@@ -129,7 +134,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
             .times;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         for (stage, time) in [
-            ("network", times.method),
+            (name, times.method),
             ("propagate", times.propagate),
             ("encode", times.encode),
         ] {
@@ -141,16 +146,21 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         .map(|(stage, mut times)| (stage, median(&mut times)))
         .collect();
     let total_ms = median(&mut totals);
-    let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
-    let gmac_per_s = macs / stage_ms["network"] / 1e6;
+    let alone = network.filter(|_| name == "network");
+    let gmac_per_s = alone.map(|network| {
+        let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
+        macs / stage_ms[name] / 1e6
+    });
     let isa = pipeline.method().engine().and_then(|engine| engine.isa);
-    let peak = isa.and_then(|isa| match network.precision() {
+    let precision = network.map_or(Precision::F32, |network| network.precision());
+    let peak = isa.and_then(|isa| match precision {
         Precision::Int8 => int8_peak(isa, PEAK_TIME),
         _ => f32_peak(isa, PEAK_TIME),
     });
     Ok(Row {
-        layers: network.layers(),
-        precision: network.precision().to_string(),
+        method: name,
+        layers: network.map_or(0, |network| network.layers()),
+        precision: precision.to_string(),
         backend: "cpu",
         kernels: (pipeline.method().engine())
             .map_or("", |engine| engine.name)
@@ -163,17 +173,34 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         spread_ms: [totals[0], totals[totals.len() - 1]],
         frames: totals.len(),
         gmac_per_s,
-        peak_percent: peak.map(|peak| 100.0 * gmac_per_s * 1e9 / peak),
+        peak_percent: peak
+            .zip(gmac_per_s)
+            .map(|(peak, gmac_per_s)| 100.0 * gmac_per_s * 1e9 / peak),
         peak_memory_mb: peak_memory_mb(),
     })
 }
 
-/// A frame with detail everywhere: what is in it does not change what it costs.
+/// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it. What
+/// is in it does not change what a network costs; a sweep costs more the more depths are near each other.
 fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
     let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    let depth = |y: usize, x: usize| {
+        let (v, u) = (y as f32 / height as f32, x as f32 / height as f32);
+        let ground = (2.0 * (1.0 - v)).min(0.95);
+        (0..6).fold(ground, |depth, ball| {
+            let (at, radius) = (0.2 + 0.27 * ball as f32, 0.1 + 0.02 * (ball % 3) as f32);
+            let inside = radius.powi(2) - (u - at).powi(2) - (v - 0.6).powi(2);
+            match inside > 0.0 {
+                true => depth
+                    .min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0)
+                    .max(0.0),
+                false => depth,
+            }
+        })
+    };
     Ok(RgbdFrame::new(
         Array3::from_shape_fn((3, height, width), |(c, y, x)| value(c, y, x)),
-        Array2::from_shape_fn((height, width), |(y, x)| value(9, y / 8, x / 8)),
+        Array2::from_shape_fn((height, width), |(y, x)| depth(y, x)),
     )?)
 }
 

@@ -9,7 +9,7 @@
 use crate::dataset::{self, Manifest};
 use crate::error::Result;
 use crate::files;
-use crate::ldi::Ldi;
+use crate::ldi::{Ldi, LdiLayer};
 use crate::metrics;
 use crate::point_based::{self, Occlusion};
 use crate::reconstruct::APERTURE_RADIUS;
@@ -22,8 +22,10 @@ use phasefront::method::check_display;
 use phasefront::modulator::{Modulator, remove_mean_phase};
 use phasefront::network::InputKind;
 use phasefront::refocus::{Refocus, phase_only_field};
+use phasefront::seeded::SeededPlan;
 use phasefront::slm::Response;
-use phasefront::sweep::SweepPlan;
+use phasefront::sweep::hidden::{Hidden, NOTHING};
+use phasefront::sweep::{SweepPlan, hidden_reach};
 use phasefront::{Display, Network, RgbdFrame, Sweep};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -87,6 +89,15 @@ impl<'a> Method<'a> {
         })
     }
 
+    /// SM-LBM with `planes` planes on what is visible and the hidden surfaces that the sweep adds to it: the sweep by
+    /// exact waves.
+    pub fn filled(display: &'a Display, planes: usize) -> Self {
+        Self::new("filled", move |ldi| {
+            let filled = filled(&visible_frame(ldi)?, display)?;
+            sm_lbm::hologram(&filled, display, planes, &|_, _| {})
+        })
+    }
+
     /// The plane sweep on what is visible of scenes of `size`×`size` pixels.
     ///
     /// # Errors
@@ -94,6 +105,17 @@ impl<'a> Method<'a> {
     pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
         let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
         Ok(Self::new("sweep", move |ldi| {
+            let mut field = Array3::zeros((3, size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?;
+            Ok(field)
+        }))
+    }
+
+    fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
+        check_display(network, display)?;
+        let plan = SeededPlan::new(size, size, network, display)?;
+        Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");
             plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?;
@@ -111,12 +133,14 @@ impl<'a> Method<'a> {
         size: usize,
         display: &Display,
     ) -> Result<Self> {
+        let name = name.into();
         let layers = match network.input() {
             InputKind::Rgbd | InputKind::RgbdXy => 1,
+            InputKind::Seeded => return Self::seeded(name, network, size, display),
             InputKind::Ldi { layers } => layers,
             other => {
                 return Err(phasefront::Error::Network(format!(
-                    "it takes '{other}'; a network for 'rgbd' or layered depth images is needed"
+                    "it takes '{other}'; a network for 'rgbd', 'seeded' or layered depth images is needed"
                 ))
                 .into());
             }
@@ -159,6 +183,39 @@ fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
         .depth
         .mapv(|d| if d.is_nan() { 1.0 } else { d });
     Ok(RgbdFrame::new(visible_rgb(ldi), depth)?)
+}
+
+/// `frame` with its hidden surfaces, as the sweep finds them.
+///
+/// # Errors
+/// Never, for the layers are of one shape.
+pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
+    let (height, width) = frame.shape();
+    let size = height * width;
+    let depth = frame.depth().to_owned();
+    let hidden = Hidden::new(height, width, hidden_reach(display));
+    let mut sources = vec![0; 2 * size];
+    let values = depth.as_slice().expect("standard layout");
+    hidden.find(values, &mut sources, &mut hidden.scratch());
+    let behind = sources.chunks_exact(size).map(|sources| {
+        let of = |y: usize, x: usize| match sources[y * width + x] {
+            NOTHING => None,
+            source => Some((source as usize / width, source as usize % width)),
+        };
+        LdiLayer {
+            rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+                of(y, x).map_or(0.0, |(y, x)| frame.rgb()[(c, y, x)])
+            }),
+            depth: Array2::from_shape_fn((height, width), |(y, x)| {
+                of(y, x).map_or(f32::NAN, |at| depth[at])
+            }),
+        }
+    });
+    let front = LdiLayer {
+        rgb: frame.rgb().to_owned(),
+        depth: depth.clone(),
+    };
+    Ldi::new(std::iter::once(front).chain(behind).collect())
 }
 
 /// A network's input of `layers` layers, (4·layers, H, W): colour and depth of each, minus ½; black and farthest

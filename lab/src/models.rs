@@ -8,34 +8,55 @@ use std::sync::Arc;
 /// A network of `models/` that the command holds.
 #[derive(Debug)]
 pub struct Built {
-    /// Convolution layers: its name for `--network`.
+    /// Its name for `--network`.
+    pub name: &'static str,
+    /// Convolution layers.
     pub layers: usize,
     /// Whether it is the quantized one.
     pub int8: bool,
     onnx: &'static [u8],
 }
 
+/// The name of the seeded network that comes along.
+pub const SEEDED: &str = "seeded-6";
+
 /// What comes along.
 pub const BUILT_IN: &[Built] = &[
     Built {
+        name: "8",
         layers: 8,
         int8: false,
         onnx: include_bytes!("../../models/rgbd-8.onnx"),
     },
     Built {
+        name: "8",
         layers: 8,
         int8: true,
         onnx: include_bytes!("../../models/rgbd-8-int8.onnx"),
     },
     Built {
+        name: "15",
         layers: 15,
         int8: false,
         onnx: include_bytes!("../../models/rgbd-15.onnx"),
     },
     Built {
+        name: "15",
         layers: 15,
         int8: true,
         onnx: include_bytes!("../../models/rgbd-15-int8.onnx"),
+    },
+    Built {
+        name: SEEDED,
+        layers: 6,
+        int8: false,
+        onnx: include_bytes!("../../models/seeded-6.onnx"),
+    },
+    Built {
+        name: SEEDED,
+        layers: 6,
+        int8: true,
+        onnx: include_bytes!("../../models/seeded-6-int8.onnx"),
     },
 ];
 
@@ -47,22 +68,18 @@ pub fn built_in(built: &Built) -> Result<Arc<Network>> {
     Ok(Arc::new(Network::from_onnx(built.onnx)?))
 }
 
-/// The network called `name`: its number of layers, where one comes along in that precision, or an ONNX
-/// file, whose precision is its own.
+/// The network called `name`, where one comes along in that precision, or of an ONNX file, whose precision is its own.
 ///
 /// # Errors
 /// A name that is neither, or a file that is no hologram network.
 pub fn network(name: &str, int8: bool) -> Result<Arc<Network>> {
-    let named = |built: &&Built| built.layers.to_string() == name && built.int8 == int8;
+    let named = |built: &&Built| built.name == name && built.int8 == int8;
     if let Some(built) = BUILT_IN.iter().find(named) {
         return built_in(built);
     }
     let path = Path::new(name);
     let bytes = std::fs::read(path).map_err(|e| {
-        let mut names: Vec<_> = BUILT_IN
-            .iter()
-            .map(|built| built.layers.to_string())
-            .collect();
+        let mut names: Vec<_> = BUILT_IN.iter().map(|built| built.name).collect();
         names.dedup();
         Error::file(
             path,

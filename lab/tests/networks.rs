@@ -1,17 +1,22 @@
 //! The networks that come along: they load, and the fast path gives what tract gives.
 #![allow(clippy::unwrap_used)]
 
-use phasefront::network::Precision;
+use phasefront::network::{InputKind, Precision};
 use phasefront_lab::models::{self, BUILT_IN};
 use phasefront_lab::scene;
 
-/// A rendered frame as network input, (4, H, W).
-fn input(height: usize, width: usize) -> Vec<f32> {
+/// A rendered frame as network input, planes of `kind`; a seed is its colours, turned.
+fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
     let scene = scene::random_scene(11, height, width);
     let ldi = scene::render_ldi_reference(&scene, height, width, 1).unwrap();
     let layer = &ldi.layers[0];
     let depth = layer.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
-    layer.rgb.iter().chain(&depth).map(|v| v - 0.5).collect()
+    let mut planes: Vec<f32> = layer.rgb.iter().chain(&depth).map(|v| v - 0.5).collect();
+    if kind == InputKind::Seeded {
+        planes.extend(layer.rgb.iter().map(|v| 0.5 * (v * 0.8 - 0.5)));
+        planes.extend(layer.rgb.iter().map(|v| 0.5 * v * 0.6));
+    }
+    planes
 }
 
 #[test]
@@ -21,7 +26,7 @@ fn the_fast_path_agrees_with_tract() {
         assert_eq!(network.layers(), built.layers);
         assert_eq!(network.precision() == Precision::Int8, built.int8);
         for (height, width) in [(61, 47), (40, 64)] {
-            let input = input(height, width);
+            let input = input(network.input(), height, width);
             let outputs = [
                 network.plan(height, width).unwrap(),
                 network.plan_on_stock_tract(height, width).unwrap(),

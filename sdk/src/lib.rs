@@ -22,6 +22,7 @@ pub mod output;
 pub mod pipeline;
 pub mod preview;
 pub mod refocus;
+pub mod seeded;
 pub mod session;
 pub mod slm;
 pub mod sweep;

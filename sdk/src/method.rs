@@ -4,6 +4,7 @@ use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
 use crate::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::seeded::{SeededPlan, SeededScratch};
 use crate::sweep::{self, Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
 use std::sync::Arc;
@@ -19,6 +20,18 @@ pub enum Method {
     Network(Arc<Network>),
     /// The plane sweep, for any display.
     Sweep(Sweep),
+    /// The plane sweep, corrected by a network trained on it.
+    Seeded(Arc<Network>),
+}
+
+impl Method {
+    /// A trained network as its input asks for.
+    pub fn trained(network: Arc<Network>) -> Self {
+        match network.input() {
+            InputKind::Seeded => Method::Seeded(network),
+            _ => Method::Network(network),
+        }
+    }
 }
 
 /// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
@@ -30,6 +43,7 @@ pub struct MethodPlan {
 enum Way {
     Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
+    Seeded(Box<SeededPlan>),
 }
 
 /// Working memory of a [`MethodPlan`] for one frame at a time.
@@ -38,6 +52,7 @@ pub struct MethodScratch(Scratch);
 enum Scratch {
     Network(NetworkScratch),
     Sweep(SweepScratch),
+    Seeded(SeededScratch),
 }
 
 impl MethodPlan {
@@ -48,14 +63,17 @@ impl MethodPlan {
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         let way = match method {
             Method::Network(network) => {
-                if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
-                    return Err(Error::Network(format!(
-                        "it takes {} planes of a layered depth image; a network for RGB-D frames is needed",
-                        network.input().channels()
-                    )));
+                if network.input() != InputKind::RgbdXy {
+                    check_input(&network, InputKind::Rgbd)?;
                 }
                 check_display(&network, display)?;
                 Way::Network(Box::new(network.plan(height, width)?))
+            }
+            Method::Seeded(network) => {
+                check_input(&network, InputKind::Seeded)?;
+                check_display(&network, display)?;
+                let plan = SeededPlan::new(height, width, &network, display)?;
+                Way::Seeded(Box::new(plan))
             }
             Method::Sweep(sweep) => {
                 let offset_m = display.offset_m();
@@ -83,7 +101,7 @@ impl MethodPlan {
     /// far away, all else ends at the midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.way {
-            Way::Network(_) => 0.0,
+            Way::Network(_) | Way::Seeded(_) => 0.0,
             Way::Sweep(plan) => plan.z_m(),
         }
     }
@@ -92,6 +110,7 @@ impl MethodPlan {
     pub fn engine(&self) -> Option<&Engine> {
         match &self.way {
             Way::Network(plan) => Some(plan.engine()),
+            Way::Seeded(plan) => Some(plan.engine()),
             Way::Sweep(_) => None,
         }
     }
@@ -101,6 +120,7 @@ impl MethodPlan {
         MethodScratch(match &self.way {
             Way::Network(plan) => Scratch::Network(plan.scratch()),
             Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
+            Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
         })
     }
 
@@ -121,9 +141,21 @@ impl MethodPlan {
         match (&self.way, &mut scratch.0) {
             (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
+            (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
             _ => panic!("the scratch is another plan's"),
         }
     }
+}
+
+/// Checks that `network` takes `input`.
+fn check_input(network: &Network, input: InputKind) -> Result<()> {
+    if network.input() != input {
+        return Err(Error::Network(format!(
+            "its input is '{}'; this method needs a network for '{input}'",
+            network.input()
+        )));
+    }
+    Ok(())
 }
 
 /// Checks that `network` was trained for a display like `display`: on another it gives wrong depths.

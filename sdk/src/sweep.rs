@@ -341,6 +341,11 @@ pub fn reaches(display: &Display, z_m: f64) -> bool {
 }
 
 fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
+    if !z_m.is_finite() {
+        return Err(Error::Plan(format!(
+            "sweep: the hologram cannot stand at z = {z_m} m; it must be finite"
+        )));
+    }
     let step_m = display.volume_depth_m() / sweep.planes as f64;
     let home_m = z_m - (display.volume_depth_m() - step_m) / 2.0;
     let reach = reach_px(display, home_m);

@@ -3,18 +3,20 @@
 
 mod network_models;
 
+use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
 use phasefront::depth::refine::Refiner;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
+use phasefront::method::MethodPlan;
 use phasefront::preview::Preview;
 use phasefront::slm::Response;
 use phasefront::slm::per_pixel::{self, PerPixel};
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{Padding, Propagator};
 use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Modulator, Network};
+use phasefront::{Display, Illumination, Method, Modulator, Network, RgbdFrame, Sweep};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -96,6 +98,17 @@ fn hot_calls_allocate_nothing() {
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
     let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    let seeded = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(4, 8)
+    };
+    let seeded = Arc::new(Network::from_onnx(&seeded.bytes()).unwrap());
+    let swept = RgbdFrame::new(
+        Array3::from_elem((3, h, w), 0.4),
+        Array2::from_shape_fn((h, w), |(y, x)| ((x / 9 + y / 7) % 5) as f32 / 4.0),
+    )
+    .unwrap();
     for threads in [1, 3] {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -144,6 +157,15 @@ fn hot_calls_allocate_nothing() {
                 plan.modulate(&mut field, &mut levels, &mut scratch);
             };
             assert_eq!(count(frame), 0, "a calibrated display");
+            for method in [
+                Method::Sweep(Sweep::for_display(&display)),
+                Method::trained(seeded.clone()),
+            ] {
+                let plan = MethodPlan::new(h, w, method.clone(), &display).unwrap();
+                let mut scratch = plan.scratch();
+                let sweep = || plan.field(&swept, &mut field, &mut scratch).unwrap();
+                assert_eq!(count(sweep), 0, "{method:?}");
+            }
             camera_frames_and_previews();
         });
     }

@@ -1,11 +1,16 @@
 //! The plane sweep against its naive oracle, on every instruction set, and its edge cases.
 #![allow(clippy::unwrap_used)]
 
+mod network_models;
+
 use ndarray::{Array2, Array3};
+use network_models::Model;
 use num_complex::Complex32;
-use phasefront::network::Isa;
+use phasefront::method::MethodPlan;
+use phasefront::network::{self, Isa};
 use phasefront::sweep::{SweepPlan, hidden, reference};
-use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront::{Display, Method, Network, RgbdFrame, Sweep};
+use std::sync::Arc;
 
 /// A small volume, so that the naive oracle has little black to carry around.
 fn display() -> Display {
@@ -106,6 +111,125 @@ fn the_sweep_is_its_oracle() {
         let slow = reference::field(&frame, &display(), sweep, z_m).unwrap();
         let worst = farthest(&run(&plan, &frame), &slow);
         assert!(worst < 1e-3, "{width}×{height} {sweep:?} {z_m}: {worst}");
+    }
+}
+
+#[test]
+fn the_worst_frames_are_right() {
+    let (height, width) = (34, 38);
+    let depths: [fn(usize, usize) -> f32; 5] = [
+        |_, _| 0.0,
+        |_, _| 1.0,
+        |_, _| 0.5,
+        |y, x| ((y * 31 + x * 17) % 23) as f32 / 22.0,
+        |y, x| ((y + x) % 2) as f32,
+    ];
+    for (case, depth) in depths.into_iter().enumerate() {
+        let depth = Array2::from_shape_fn((height, width), |(y, x)| depth(y, x));
+        let frame = RgbdFrame::new(frame(height, width).rgb().to_owned(), depth).unwrap();
+        let plan = SweepPlan::new(height, width, &display(), sweep(), 0.0).unwrap();
+        let slow = reference::field(&frame, &display(), sweep(), 0.0).unwrap();
+        let worst = farthest(&run(&plan, &frame), &slow);
+        assert!(worst < 1e-3, "case {case}: {worst}");
+    }
+}
+
+#[test]
+fn a_flat_frame_of_one_colour_stays_as_it_is_far_from_its_border() {
+    let size = 140;
+    let display = Display::default();
+    let sweep = Sweep::for_display(&display);
+    let plan = SweepPlan::new(size, size, &display, sweep, 0.0).unwrap();
+    for depth in [0.0, 0.3, 1.0] {
+        let depth = Array2::from_elem((size, size), depth);
+        let frame = RgbdFrame::new(Array3::from_elem((3, size, size), 0.6), depth).unwrap();
+        for value in run(&plan, &frame)
+            .iter()
+            .skip(size * size / 2 + size / 2)
+            .step_by(size * size)
+        {
+            // Fresnel's fringes of the border are still there.
+            assert!((value - 0.6).norm() < 0.03, "{value}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_swept_is_named() {
+    let refused = |sweep: Sweep, z_m: f64| {
+        let plan = SweepPlan::new(8, 8, &Display::default(), sweep, z_m);
+        plan.err().unwrap().to_string()
+    };
+    let usual = Sweep::for_display(&Display::default());
+    for (sweep, z_m, message) in [
+        (
+            Sweep { planes: 0, ..usual },
+            0.0,
+            "0 planes; 1 to 1024 are right",
+        ),
+        (
+            Sweep { taps: 8, ..usual },
+            0.0,
+            "an odd number from 3 to 63",
+        ),
+        (
+            Sweep {
+                taps: 3,
+                planes: 8,
+                ..usual
+            },
+            0.0,
+            "9 taps or 30 planes are right",
+        ),
+        (
+            Sweep {
+                hidden_layers: 3,
+                ..usual
+            },
+            0.0,
+            "3 hidden layers; 0 to 2",
+        ),
+        (Sweep { tile: 20, ..usual }, 0.0, "a multiple of 16"),
+        (usual, 0.1, "end at the midpoint and propagate from there"),
+        (usual, f64::NAN, "must be finite"),
+    ] {
+        let is = refused(sweep, z_m);
+        assert!(is.contains(message), "{is}");
+    }
+}
+
+#[test]
+fn a_seeded_network_corrects_the_sweep() {
+    let (height, width) = (37, 45);
+    let display = Display::default();
+    let frame = frame(height, width);
+    let sweep = SweepPlan::new(height, width, &display, Sweep::for_display(&display), 0.0).unwrap();
+    let seed = run(&sweep, &frame);
+    for (model, tolerance) in [(Model::new(4, 8), 1e-5), (Model::int8(5, 8), 0.05)] {
+        let model = Model {
+            inputs: 10,
+            input: "seeded",
+            ..model
+        };
+        let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let mut input: Vec<f32> = frame
+            .rgb()
+            .iter()
+            .chain(frame.depth())
+            .map(|v| v - 0.5)
+            .collect();
+        input.extend(seed.iter().map(|u| 0.5 * (u.re - 0.5)));
+        input.extend(seed.iter().map(|u| 0.5 * u.im));
+        let output = network::reference::run(network.chain(), &input, height, width);
+        let (re, im) = output.split_at(seed.len());
+        let expected: Vec<_> = (seed.iter().zip(re).zip(im))
+            .map(|((u, re), im)| u + Complex32::new(*re, *im))
+            .collect();
+        let plan = MethodPlan::new(height, width, Method::trained(network), &display).unwrap();
+        let mut field = vec![Complex32::ZERO; seed.len()];
+        plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
+        let worst = farthest(&field, &expected);
+        assert!(worst < tolerance, "{worst}");
     }
 }
 

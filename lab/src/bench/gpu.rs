@@ -1,7 +1,7 @@
 //! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
 //! measured in the same run.
 
-use super::{Case, median};
+use super::median;
 use crate::error::Result;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::frame::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
@@ -10,13 +10,13 @@ use phasefront::gpu::{
     Pipeline, StageTimes, probe,
 };
 use phasefront::slm::Response;
-use phasefront::{Display, Method};
+use phasefront::{Display, Method, Network};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What was measured of one [`Case`] on a GPU. Times are milliseconds, medians over frames.
+/// What was measured of one network and frame size on a GPU. Times are milliseconds, medians over frames.
 #[derive(Debug, Clone, Serialize)]
 pub struct GpuRow {
     /// Convolution layers.
@@ -49,19 +49,18 @@ pub struct GpuRow {
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures one case on `device`: frames until `budget` is spent, five at least, after one that is not counted.
+/// Measures `network` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not counted.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
 pub fn measure(
-    case: &Case<'_>,
+    network: &Arc<Network>,
+    (width, height): (usize, usize),
     device: &Arc<Device>,
     display: &Display,
     chain: ChainOptions,
     budget: Duration,
 ) -> Result<GpuRow> {
-    let (width, height) = case.size;
-    let network = case.network;
     let mut job = Job::new(
         height,
         width,

@@ -5,7 +5,7 @@ use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront::network::Precision;
-use phasefront::{Display, Network};
+use phasefront::{Display, Method, Network, Sweep};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network
+    /// Layers of the network; 0 is the plane sweep
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
     /// Its numbers
@@ -59,13 +59,16 @@ impl Bench {
             self.layers.is_none_or(|layers| layers == built.layers)
                 && self.precision.is_none_or(|p| p.is_int8() == built.int8)
         };
-        let networks: Vec<_> = match &self.network {
-            Some(file) => vec![models::network(file, false)?],
+        let mut methods: Vec<_> = match &self.network {
+            Some(file) => vec![Method::trained(models::network(file, false)?)],
             None => (BUILT_IN.iter().filter(wanted))
-                .map(models::built_in)
+                .map(|built| Ok(Method::trained(models::built_in(built)?)))
                 .collect::<Result<_>>()?,
         };
-        if networks.is_empty() {
+        if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
+            methods.push(Method::Sweep(Sweep::for_display(&display)));
+        }
+        if methods.is_empty() {
             return Err(Error::Input(
                 "no network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
             ));
@@ -76,6 +79,12 @@ impl Bench {
                 vec![size]
             });
         if let Some(options) = self.backend.device()? {
+            let networks: Vec<_> = (methods.into_iter())
+                .filter_map(|method| match method {
+                    Method::Network(network) => Some(network),
+                    _ => None,
+                })
+                .collect();
             return self.on_gpu(&networks, &sizes, &display, &options, json);
         }
         let machine = Machine::this();
@@ -87,10 +96,10 @@ impl Bench {
             |threads| vec![threads],
         );
         let mut cases = Vec::new();
-        for network in &networks {
+        for method in &methods {
             for &size in &sizes {
                 cases.extend(threads.iter().map(|&threads| Case {
-                    network,
+                    method,
                     size,
                     threads,
                 }));
@@ -135,16 +144,13 @@ impl Bench {
                 _ => vec![Float::F32],
             };
             for &size in sizes {
-                let case = Case {
-                    network,
-                    size,
-                    threads: 1,
-                };
                 for &float in &floats {
                     for &fusion in &fusions {
                         let chain = ChainOptions { float, fusion };
                         let budget = Duration::from_secs_f64(self.seconds);
-                        rows.push(bench::gpu::measure(&case, &device, display, chain, budget)?);
+                        rows.push(bench::gpu::measure(
+                            network, size, &device, display, chain, budget,
+                        )?);
                     }
                 }
             }
@@ -190,25 +196,26 @@ fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
 
 fn table(machine: &Machine, rows: &[Row]) -> String {
     let mut text = format!("{}, {} cores\n\n", machine.cpu, machine.cores);
-    text += "| layers | precision | kernels | size | threads | network ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(0.0);
         text += &format!(
-            "\n| {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {:.0} | {} | {} |",
+            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} |",
+            row.method,
             row.layers,
             row.precision,
             row.kernels,
             row.width,
             row.height,
             row.threads,
-            stage("network"),
+            stage(row.method),
             stage("propagate"),
             stage("encode"),
             row.total_ms,
             row.spread_ms[0],
             row.spread_ms[1],
-            row.gmac_per_s,
+            whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.peak_memory_mb),
         );

@@ -28,8 +28,8 @@ pub(crate) struct Evaluate {
         required_unless_present = "network"
     )]
     method: Vec<MethodName>,
-    /// Networks to judge, separated by commas: one that comes along (8), or an ONNX file
-    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
+    /// Networks to judge, separated by commas: one that comes along, or an ONNX file
+    #[arg(long, value_name = "8|15|seeded-6|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that networks which come along compute in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -72,6 +72,8 @@ enum MethodName {
     Rgb,
     /// SM-LBM of what is visible
     Visible,
+    /// SM-LBM of what is visible and the hidden surfaces that the sweep adds
+    Filled,
     /// The plane sweep of what is visible
     Sweep,
     /// SM-LBM of all layers
@@ -175,6 +177,7 @@ impl Evaluate {
                 Ok(match name {
                     MethodName::Rgb => Method::rgb(),
                     MethodName::Visible => Method::visible(display, planes),
+                    MethodName::Filled => Method::filled(display, planes),
                     MethodName::Sweep => {
                         Method::sweep(manifest.size, display, self.sweep(display))?
                     }

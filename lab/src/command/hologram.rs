@@ -29,9 +29,9 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// Layers of a network that comes along (8, 15), or an ONNX file
-    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
-    network: String,
+    /// A network that comes along, or an ONNX file [default: 8; seeded-6 with --method seeded]
+    #[arg(long, value_name = "8|15|seeded-6|FILE")]
+    network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
@@ -67,6 +67,8 @@ enum Method {
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, any display
     Sweep,
+    /// The plane sweep corrected by a network that was trained on it
+    Seeded,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -161,12 +163,20 @@ impl Hologram {
             ));
         }
         let made = match (method, &self.ldi) {
-            (Method::Network, None) => {
-                let network = models::network(&self.network, self.precision.is_int8())?;
-                let method = phasefront::Method::Network(network);
+            (Method::Network | Method::Seeded, None) => {
+                let (stage, usual) = match method {
+                    Method::Seeded => ("seeded", models::SEEDED),
+                    _ => ("network", "8"),
+                };
+                let name = self.network.as_deref().unwrap_or(usual);
+                let network = models::network(name, self.precision.is_int8())?;
+                let method = match method {
+                    Method::Seeded => phasefront::Method::Seeded(network),
+                    _ => phasefront::Method::trained(network),
+                };
                 match &device {
                     Some(options) => self.on_gpu(method, &display, encoding, options)?,
-                    None => self.by_pipeline("network", method, &display, encoding)?,
+                    None => self.by_pipeline(stage, method, &display, encoding)?,
                 }
             }
             (Method::Sweep, None) => {
@@ -174,10 +184,10 @@ impl Hologram {
                 let method = phasefront::Method::Sweep(sweep);
                 self.by_pipeline("sweep", method, &display, encoding)?
             }
-            (Method::Network | Method::Sweep, Some(dir)) => {
+            (Method::Network | Method::Sweep | Method::Seeded, Some(dir)) => {
                 return Err(Error::file(
                     dir,
-                    "--method network and sweep take --rgb and --depth; for a layered depth image use --method layers or points",
+                    "--method network, sweep and seeded take --rgb and --depth; for a layered depth image use --method layers or points",
                 ));
             }
             (Method::Layers | Method::Points, source) => {

@@ -83,6 +83,8 @@ enum MethodName {
     Network,
     /// The plane sweep: any display
     Sweep,
+    /// The plane sweep corrected by a network
+    Seeded,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -278,7 +280,10 @@ impl Video {
         let display: Display = file.display.clone().with_size(height, width)?;
         let method = match self.method {
             MethodName::Network => {
-                Method::Network(models::network(&self.network, self.precision.is_int8())?)
+                Method::trained(models::network(&self.network, self.precision.is_int8())?)
+            }
+            MethodName::Seeded => {
+                Method::Seeded(models::network(models::SEEDED, self.precision.is_int8())?)
             }
             MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
         };

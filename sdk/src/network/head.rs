@@ -16,7 +16,7 @@ pub enum Head {
     /// The paper's: with `t` the tanh of the last layer, amplitude `(t[c] + 1)·√½ ∈ [0, √2]` and phase `π·t[3+c]`.
     AmplitudePhase,
     /// A correction `o` of what came in: of the flat field, real part `rgb[c] + o[c]` with the front image's value in
-    /// [0, 1], imaginary `o[3+c]`; or, where the input is a field `u`, `u[c] + o[c] + i·o[3+c]`.
+    /// [0, 1], imaginary `o[3+c]`; or, where the input is or holds a field `u`, `u[c] + o[c] + i·o[3+c]`.
     RealImaginary,
 }
 
@@ -91,12 +91,23 @@ impl Head {
             let (mut re, mut im) = ([0.0; PIECE], [0.0; PIECE]);
             for (piece, out) in field.chunks_mut(PIECE).enumerate() {
                 let (at, count) = (piece * PIECE, out.len());
-                base(c, at, &mut re[..count]);
-                if kind == InputKind::Field {
-                    base(3 + c, at, &mut im[..count]);
-                } else {
-                    // Colours come in minus a half.
-                    re[..count].iter_mut().for_each(|re| *re += 0.5);
+                match kind {
+                    InputKind::Field => {
+                        base(c, at, &mut re[..count]);
+                        base(3 + c, at, &mut im[..count]);
+                    }
+                    InputKind::Seeded => {
+                        // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
+                        base(4 + c, at, &mut re[..count]);
+                        base(7 + c, at, &mut im[..count]);
+                        re[..count].iter_mut().for_each(|re| *re = 2.0 * *re + 0.5);
+                        im[..count].iter_mut().for_each(|im| *im *= 2.0);
+                    }
+                    InputKind::Rgbd | InputKind::RgbdXy | InputKind::Ldi { .. } => {
+                        base(c, at, &mut re[..count]);
+                        // Colours come in minus a half.
+                        re[..count].iter_mut().for_each(|re| *re += 0.5);
+                    }
                 }
                 let parts = out.iter_mut().zip(&first[at..]).zip(&second[at..]);
                 for (((out, first), second), (re, im)) in parts.zip(re.iter().zip(&im)) {

@@ -18,6 +18,8 @@ pub enum InputKind {
         /// How many layers.
         layers: usize,
     },
+    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see [`crate::seeded`].
+    Seeded,
     /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,
 }
@@ -29,6 +31,7 @@ impl InputKind {
             InputKind::Rgbd => 4,
             InputKind::RgbdXy => 6,
             InputKind::Ldi { layers } => 4 * layers,
+            InputKind::Seeded => 10,
             InputKind::Field => 6,
         }
     }
@@ -37,6 +40,7 @@ impl InputKind {
         match name.as_bytes() {
             b"rgbd" => Some(InputKind::Rgbd),
             b"rgbdxy" => Some(InputKind::RgbdXy),
+            b"seeded" => Some(InputKind::Seeded),
             b"field" => Some(InputKind::Field),
             [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
                 layers: usize::from(n - b'0'),
@@ -52,10 +56,14 @@ impl std::fmt::Display for InputKind {
             InputKind::Rgbd => f.write_str("rgbd"),
             InputKind::RgbdXy => f.write_str("rgbdxy"),
             InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
+            InputKind::Seeded => f.write_str("seeded"),
             InputKind::Field => f.write_str("field"),
         }
     }
 }
+
+/// What `phasefront.input` may be.
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9' or 'field'";
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,14 +82,8 @@ pub struct TrainedDisplay {
 pub(super) fn read(
     metadata: &[StringStringEntryProto],
 ) -> Result<(InputKind, Head, TrainedDisplay)> {
-    let input = text(metadata, "input", "'rgbd', 'rgbdxy', 'ldi5' or 'field'")?;
-    let input = InputKind::from_name(input).ok_or_else(|| {
-        wrong(
-            "input",
-            input,
-            "'rgbd', 'rgbdxy', 'ldi2' to 'ldi9' or 'field'",
-        )
-    })?;
+    let input = text(metadata, "input", INPUTS)?;
+    let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;
     let heads = "'amplitude-phase' or 'real-imaginary'";
     let head = text(metadata, "head", heads)?;
     let head = [Head::AmplitudePhase, Head::RealImaginary]

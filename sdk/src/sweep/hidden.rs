@@ -3,8 +3,8 @@
 //! Behind a pixel lies what its deeper neighbours show: the hidden layers continue them under the nearer surface, as
 //! far as light can reach. Of a pixel's left, right, upper and lower side, each is searched for
 //!
-//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`] that is not itself at the upper
-//!   end of such a jump, as pixels of blurred edges are, and
+//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`] whose next pixel is not yet another
+//!   jump deeper, as it is where an edge is blurred, and
 //! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
 //!
 //! by a rule from pixel to pixel ([`Found::next`]), so that the search costs the same for any reach. The nearest source
@@ -36,6 +36,8 @@ struct Source {
 struct Found {
     near: Source,
     far: Source,
+    /// Whether the next pixel on that side is a jump deeper.
+    edge: bool,
 }
 
 const NONE: Source = Source {
@@ -47,10 +49,11 @@ impl Found {
     const NOTHING: Found = Found {
         near: NONE,
         far: NONE,
+        edge: false,
     };
 
     fn is_nothing(&self) -> bool {
-        self.near.depth == NO_DEPTH
+        self.near.depth == NO_DEPTH && !self.edge
     }
 
     /// From the sources of the neighbour on that side, and the neighbour's own depth, to those of a pixel of `depth`:
@@ -73,13 +76,11 @@ impl Found {
             distance: 1,
         };
         let deeper = |source: Source| source.depth > least;
-        // A neighbour whose own neighbour is yet another jump deeper stands on a blurred edge, on neither surface.
-        let itself = if self.near.distance == 1 {
-            NONE
-        } else {
-            itself
-        };
+        let edge = deeper(itself);
+        // A neighbour at an edge itself is a pixel of a blurred one, of neither surface.
+        let itself = if self.edge { NONE } else { itself };
         Found {
+            edge,
             near: if deeper(itself) {
                 itself
             } else if deeper(near) {
@@ -236,11 +237,13 @@ impl Hidden {
         for (y, layers) in layers.chunks_exact_mut(width).enumerate() {
             along(row(top + y), layers, (top + y) * width, reach);
         }
-        // Sources are at most `reach` rows away, so a walk that begins there with nothing finds the same.
+        // Sources are at most `reach` rows away, and whether one stands at an edge the row behind it tells: a walk
+        // that begins there with nothing finds the same.
+        let before = self.reach + 1;
         let (columns, busy) = (&mut work.columns, &mut work.busy);
         columns.fill(Found::NOTHING);
         busy.fill(false);
-        for y in top.saturating_sub(self.reach) + 1..top + rows {
+        for y in top.saturating_sub(before) + 1..top + rows {
             let layers = y
                 .checked_sub(top)
                 .map(|y| &mut layers[y * width..][..width]);
@@ -250,7 +253,7 @@ impl Hidden {
         }
         columns.fill(Found::NOTHING);
         busy.fill(false);
-        let last = (top + rows - 1 + self.reach).min(self.height - 1);
+        let last = (top + rows - 1 + before).min(self.height - 1);
         for y in (top..last).rev() {
             let layers = (y < top + rows).then(|| &mut layers[(y - top) * width..][..width]);
             step(columns, busy, row(y + 1), row(y), reach, layers, |x, d| {
@@ -358,7 +361,7 @@ fn step(
     }
 }
 
-/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from `reach` pixels away.
+/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from a pixel beyond `reach`.
 pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Vec<u32> {
     let size = height * width;
     assert_eq!(depth.len(), size);
@@ -376,7 +379,7 @@ pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Ve
                 let at =
                     |distance: usize| (y * width + x).wrapping_add_signed(step * distance as isize);
                 let mut found = Found::NOTHING;
-                for distance in (0..room.min(reach)).rev() {
+                for distance in (0..room.min(reach + 1)).rev() {
                     found = found.next(depth[at(distance + 1)], depth[at(distance)], reach as u32);
                 }
                 layers.add(found, |distance| at(distance as usize));

@@ -1,0 +1,83 @@
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from phasefront_training.__main__ import main
+from phasefront_training.data import DataError, Manifest, Sampler, Scenes
+from phasefront_training.degrade import degrade_depth
+from phasefront_training.evaluate import degradation, evaluate, seed_as_field, torch_predictor
+from phasefront_training.networks import Architecture, Chain
+from phasefront_training.seeds import Seeds
+
+SCALE = 8192.0
+
+
+def stored(field):
+    return (np.concatenate([field.real, field.imag]) * SCALE).round().astype(np.int16)
+
+
+@pytest.fixture
+def seeds_folder(data_folder, tmp_path):
+    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on degraded depth half of it."""
+    folder = tmp_path / "seeds"
+    main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront", "true"])
+    for i in range(8):
+        truth = np.load(data_folder / f"pair_{i:06d}.npz")["hologram"]
+        np.save(folder / f"seed_{i:06d}.npy", np.stack([stored(truth), stored(truth / 2), stored(truth / 2)]))
+    (folder / "seeds.json").write_text(json.dumps({"format": "phasefront-seeds-1", "scale": SCALE, "planes": 3}))
+    return folder
+
+
+def scenes(data_folder, seeds_folder, split="train"):
+    return Scenes(Manifest.read(data_folder), split, seeds=Seeds.read(seeds_folder))
+
+
+def test_depths_are_the_clean_one_and_those_that_scenes_are_judged_on(data_folder, seeds_folder):
+    found = scenes(data_folder, seeds_folder)
+    for i in range(len(found)):
+        colour, depth, _ = found.scene(i)
+        assert torch.allclose(found.variant(i, 0)[0], depth, atol=1e-3)
+        degraded = degrade_depth(colour[:3], depth[0], degradation(found.numbers[i]))
+        assert torch.allclose(found.variant(i, 1)[0][0], degraded, atol=1e-3)
+        assert not torch.equal(found.variant(i, 1)[0], found.variant(i, 2)[0])
+
+
+def test_a_network_that_adds_nothing_gives_the_seed(data_folder, seeds_folder):
+    found = scenes(data_folder, seeds_folder, "validation")
+    network = Chain(Architecture(4, 8, "seeded"))
+    torch.nn.init.zeros_(network.convs[-1].weight)
+    for degraded in (False, True):
+        alone = evaluate(seed_as_field, found, degraded, full=False)["amplitude_psnr"]
+        assert evaluate(torch_predictor(network), found, degraded, full=False)["amplitude_psnr"] == pytest.approx(alone, abs=1e-3)
+    assert evaluate(seed_as_field, found, full=False)["amplitude_psnr"] > 60
+
+
+def test_samples_hold_the_seed_of_their_depth(data_folder, seeds_folder):
+    found = scenes(data_folder, seeds_folder)
+    for degraded, factor in ((0.0, 1.0), (1.0, 0.5)):
+        batch = Sampler(found, 4, 48, 4, degraded).draw(0)
+        real, imaginary = 2 * batch.input[:, 4:7] + 0.5, 2 * batch.input[:, 7:]
+        assert torch.allclose(real, factor * batch.target.real, atol=2e-3)
+        assert torch.allclose(imaginary, factor * batch.target.imag, atol=2e-3)
+
+
+def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_folder, tmp_path, capsys):
+    common = ["--data", str(data_folder), "--seeds", str(seeds_folder)]
+    train = ["stage1", *common, "-o", str(tmp_path / "out"), "--input", "seeded", "--layers", "4", "--filters", "8"]
+    assert main([*train, "--steps", "3", "--crop", "48", "--degraded", "0.5", "--f32"]) == 0
+    checkpoint, onnx = str(tmp_path / "out" / "checkpoint.pt"), str(tmp_path / "small.onnx")
+    assert main(["quantize", checkpoint, *common, "-o", onnx, "--steps", "2", "--crop", "48"]) == 0
+    assert main(["evaluate", checkpoint, onnx, *common]) == 0
+    assert "the sweep" in capsys.readouterr().out
+    assert main(["evaluate", checkpoint, "--data", str(data_folder)]) == 1
+    assert "--seeds" in capsys.readouterr().err
+
+
+def test_seeds_that_do_not_fit_are_named(data_folder, seeds_folder, tmp_path):
+    with pytest.raises(DataError, match="make the seeds first"):
+        Seeds.read(tmp_path / "nowhere")
+    np.save(seeds_folder / "seed_000000.npy", np.zeros((3, 6, 8, 8), np.int16))
+    with pytest.raises(DataError, match="do not belong together"):
+        scenes(data_folder, seeds_folder)
