@@ -96,7 +96,8 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    /// `field` is (3, H, W); `light` is that of a modulator of (H, W), in whose middle the frame stands; `turn` is what its colours are multiplied by on the way in, if anything.
+    /// `field` is (3, H, W); `light` is that of a modulator of (H, W), in whose middle the frame stands; `turn` is what
+    /// the field's colours are multiplied by on the way in, if anything.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         device: &Device,
@@ -175,7 +176,8 @@ impl Encoder {
                 (256, values.map(|value| value.to_bits()).collect())
             }
         };
-        let gains = light.map_or(&[1.0; 12][..], |(light, _)| light.gains());
+        static UNLIT: [f32; 12] = [1.0; 12];
+        let gains = light.map_or(&UNLIT[..], |(light, _)| light.gains());
         let (lit, modulator) = light.map_or(((2, 2), size), |(light, modulator)| {
             (light.nodes(), modulator)
         });
