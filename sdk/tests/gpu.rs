@@ -534,6 +534,31 @@ fn several_frames_fly_and_each_has_its_own_levels() {
 }
 
 #[test]
+fn a_network_that_reads_the_place_is_that_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let model = Model {
+        inputs: 6,
+        input: "rgbdxy",
+        ..Model::new(5, 8)
+    };
+    let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+    let (h, w) = (21, 34);
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(network);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let mut job = Job::new(h, w, method, &display, encoding, scale, response);
+    job.chain.float = Float::F32;
+    let frame = rgbd(h, w);
+    let (expected, _) = on_cpu(&job, &frame);
+    let mut levels = vec![0; 3 * h * w];
+    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    plan.process(&Frame::of(&frame), &mut levels).unwrap();
+    let apart = apart(&levels, &expected, &job.response);
+    assert!(apart < 0.003, "{apart}");
+}
+
+#[test]
 fn a_calibrated_display_gets_the_levels_of_the_cpu() {
     let Some(device) = device() else { return };
     let (h, w) = (47, 61);
@@ -549,11 +574,12 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
         (2e-3, Some(beam), Some(bent)),
         (0.0, None, Some(bent)),
     ] {
-        let display = Display::default().with_size(h, w).unwrap();
+        // A modulator that is wider than the frame, and lower.
+        let display = Display::default().with_size(h - 3, w + 9).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
         let response = Response::linear(8).unwrap();
         let method = Method::Network(network.clone());
-        let (encoding, scale) = (Encoding::DoublePhase, Scale::Fixed(1.0));
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
         let job = Job {
             illumination,
             correction,

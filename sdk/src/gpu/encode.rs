@@ -44,40 +44,6 @@ impl MeanPhase {
     }
 }
 
-/// The lasers' light taken out of a field, in place.
-pub(super) struct Light(Dispatch);
-
-impl Light {
-    /// `turn` is what the colours of `field`, (3, H, W), are multiplied by too, if anything.
-    pub(super) fn new(
-        device: &Device,
-        field: &wgpu::Buffer,
-        (height, width): (usize, usize),
-        illumination: &Illumination,
-        turn: Option<&wgpu::Buffer>,
-    ) -> Result<Self> {
-        let (rows, columns) = illumination.nodes();
-        let frame = [width, height, width * height, rows, columns, 0, 0, 0].map(|n| n as u32);
-        let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
-        let gains = device.table("light", bytemuck::cast_slice(illumination.gains()))?;
-        let header = format!("const TURN: bool = {};\n", turn.is_some());
-        let source = header + include_str!("light.wgsl");
-        let program = device.program("light", source, "divide");
-        let arguments = [
-            (0, frame.buffer.as_entire_binding()),
-            (1, gains.buffer.as_entire_binding()),
-            (2, field.as_entire_binding()),
-            (3, turn.unwrap_or(&gains.buffer).as_entire_binding()),
-        ];
-        let grid = [width.div_ceil(COLUMNS), height, 3];
-        Ok(Light(program.on(device, &arguments, grid)?))
-    }
-
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        self.0.run(pass);
-    }
-}
-
 /// Where a frame's levels go.
 pub(super) struct Target {
     /// (H, W) words: red, green, blue, 255 from the lowest byte on.
@@ -130,7 +96,8 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    /// `field` is (3, H, W); `turn` is what its colours are multiplied by on the way in, if anything.
+    /// `field` is (3, H, W); `light` is that of a modulator of (H, W), in whose middle the frame stands; `turn` is what
+    /// the field's colours are multiplied by on the way in, if anything.
     #[allow(clippy::too_many_arguments)]
     pub(super) fn new(
         device: &Device,
@@ -140,6 +107,7 @@ impl Encoder {
         options: ChainOptions,
         scale: Scale,
         response: &Response,
+        light: Option<(&Illumination, (usize, usize))>,
         mut turn: Option<&wgpu::Buffer>,
         targets: &[Target],
     ) -> Result<Self> {
@@ -208,6 +176,12 @@ impl Encoder {
                 (256, values.map(|value| value.to_bits()).collect())
             }
         };
+        static UNLIT: [f32; 12] = [1.0; 12];
+        let gains = light.map_or(&UNLIT[..], |(light, _)| light.gains());
+        let (lit, modulator) = light.map_or(((2, 2), size), |(light, modulator)| {
+            (light.nodes(), modulator)
+        });
+        let gains = device.table("light", bytemuck::cast_slice(gains))?;
         let ((rows, columns), spacing, intervals) = curves.unwrap_or(((1, 1), 1, 1));
         let header = format!(
             "const HALF: i32 = {half};
@@ -220,16 +194,27 @@ impl Encoder {
             const COLUMNS: u32 = {columns}u;
             const SPACING: u32 = {spacing}u;
             const INTERVALS: u32 = {intervals}u;
+            const LIT: bool = {};
+            const LIGHT_ROWS: u32 = {}u;
+            const LIGHT_COLUMNS: u32 = {}u;
+            const ALL_HEIGHT: u32 = {}u;
+            const ALL_WIDTH: u32 = {}u;
             ",
             turn.is_some(),
             scale != Scale::Max,
             table.len() > 1,
             curves.is_some(),
+            light.is_some(),
+            lit.0,
+            lit.1,
+            modulator.0,
+            modulator.1,
         );
         let source = header + include_str!("encode.wgsl");
         let response = device.table("the response", bytemuck::cast_slice(&table))?;
         let turn = turn.unwrap_or(&response.buffer);
         let common = [
+            (9, gains.buffer.as_entire_binding()),
             (0, frame.buffer.as_entire_binding()),
             (1, settings.buffer.as_entire_binding()),
             (2, seen.as_entire_binding()),
@@ -475,6 +460,7 @@ mod tests {
                         ChainOptions::default(),
                         scale,
                         &response,
+                        None,
                         Some(&turn),
                         &targets,
                     )?;

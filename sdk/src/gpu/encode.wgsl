@@ -1,4 +1,4 @@
-// From the field at the modulator to levels: blur, double phase, response. `peak` finds the largest amplitude that
+// From the field at the modulator to levels: blur, light, double phase, response. `peak` finds the largest amplitude that
 // `encode` then scales by. The header that encode.rs writes before this text gives the constants in capitals.
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
@@ -18,12 +18,38 @@ struct Settings { taps: vec3f, scale: f32 }
 // read. See slm.rs and slm/per_pixel.rs.
 @group(0) @binding(8) var<storage, read> response: array<u32>;
 
+// One over the amplitude of the lasers' light at the nodes, three planes; see illumination.rs.
+@group(0) @binding(9) var<storage, read> gains: array<f32>;
+
 const PI: f32 = 3.14159265358979;
 const TAU: f32 = 6.28318530717959;
 
 var<workgroup> most: array<f32, 64>;
 
-// A colour's value at a pixel: blurred, and turned where nothing before did it.
+// The node before pixel n of `count`, and how far it is to the next of `nodes`.
+fn before(n: u32, count: u32, nodes: u32) -> u32 { return min(n * (nodes - 1u) / max(count - 1u, 1u), nodes - 2u); }
+
+fn beyond(n: u32, count: u32, nodes: u32) -> f32 {
+    let steps = max(count - 1u, 1u);
+    return f32(n * (nodes - 1u) - before(n, count, nodes) * steps) / f32(steps);
+}
+
+// What a pixel shall send over what it gets, the frame in the middle of the modulator.
+fn gain(colour: u32, x: u32, y: u32) -> f32 {
+    let height = max(ALL_HEIGHT, u32(frame.height));
+    let width = max(ALL_WIDTH, u32(frame.width));
+    let row = y + (height - u32(frame.height)) / 2u;
+    let column = x + (width - u32(frame.width)) / 2u;
+    let fx = beyond(column, width, LIGHT_COLUMNS);
+    let fy = beyond(row, height, LIGHT_ROWS);
+    let at = (colour * LIGHT_ROWS + before(row, height, LIGHT_ROWS)) * LIGHT_COLUMNS
+        + before(column, width, LIGHT_COLUMNS);
+    let left = gains[at] + (gains[at + LIGHT_COLUMNS] - gains[at]) * fy;
+    let right = gains[at + 1u] + (gains[at + LIGHT_COLUMNS + 1u] - gains[at + 1u]) * fy;
+    return left + (right - left) * fx;
+}
+
+// A colour's value at a pixel: blurred, turned where nothing before did it, and divided by the light.
 fn value(colour: u32, x: i32, y: i32) -> vec2f {
     var sum = vec2f(0);
     if (HALF == 0) {
@@ -42,6 +68,7 @@ fn value(colour: u32, x: i32, y: i32) -> vec2f {
         let v = turn[colour];
         sum = vec2f(sum.x * v.x - sum.y * v.y, sum.x * v.y + sum.y * v.x);
     }
+    if (LIT) { sum *= gain(colour, u32(x), u32(y)); }
     return sum;
 }
 

@@ -1,4 +1,4 @@
-// Channels from colour and depth, each minus a half. Goes behind input.wgsl and input_planar.wgsl or
+// Channels from colour and depth, each minus a half, and of a second group the place in the frame. Goes behind input.wgsl and input_planar.wgsl or
 // input_camera.wgsl, which know what `colour` holds.
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
@@ -9,5 +9,9 @@ fn distance_at(at: u32) -> f32 {
 }
 
 fn channels(group: u32, x: u32, y: u32) -> vec4f {
+    if (group == 1u) {
+        let place = (vec2f(vec2u(x, y)) + 0.5) / vec2f(vec2u(frame.width, frame.height)) - 0.5;
+        return vec4f(place, 0.0, 0.0);
+    }
     return vec4f(rgb(x, y), distance_at(y * frame.width + x)) - 0.5;
 }

@@ -2,7 +2,7 @@
 
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Device, copy_mapped};
-use super::encode::{Encoder, Light, MeanPhase, Target};
+use super::encode::{Encoder, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame, Packer, Source};
 use super::peak::Peak;
@@ -112,7 +112,7 @@ impl Job {
                 "methods without a network run on the CPU only".into(),
             ));
         };
-        if network.input() != InputKind::Rgbd {
+        if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
             return Err(crate::Error::Network(format!(
                 "it takes {} planes; a network for RGB-D frames is needed",
                 network.input().channels()
@@ -180,7 +180,6 @@ pub struct Pipeline {
     mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
     offset: Option<Convolution>,
-    light: Option<Light>,
     encoder: Encoder,
     targets: Vec<Target>,
     slots: Vec<Slot>,
@@ -288,18 +287,8 @@ impl Pipeline {
                 },
             )?),
         };
-        let modulator = (job.display.height(), job.display.width());
-        if job.illumination.is_some()
-            && (!matches!(job.encoding, Encoding::DoublePhase) || size != modulator)
-        {
-            return Err(Error::Refused(
-                "the lasers' light is taken out on the GPU for plain double phase over the whole modulator; the CPU does it for all".into(),
-            ));
-        }
-        let light = match &job.illumination {
-            None => None,
-            Some(light) => Some(Light::new(device, &chain.field, size, light, turn.take())?),
-        };
+        let modulator = (display.height(), display.width());
+        let light = (job.illumination.as_ref()).map(|light| (light, modulator));
         let targets = (0..FLIGHTS)
             .map(|_| Target::new(device, size))
             .collect::<Result<Vec<_>>>()?;
@@ -311,6 +300,7 @@ impl Pipeline {
             job.chain,
             job.scale,
             &job.response,
+            light,
             turn,
             &targets,
         )?;
@@ -323,7 +313,6 @@ impl Pipeline {
             chain,
             mean,
             offset,
-            light,
             encoder,
             targets,
             slots,
@@ -426,12 +415,7 @@ impl Pipeline {
                 offset.run(pass);
             }
         });
-        stage(3, &|pass| {
-            if let Some(light) = &self.light {
-                light.run(pass);
-            }
-            self.encoder.run(pass, at);
-        });
+        stage(3, &|pass| self.encoder.run(pass, at));
         encoder.copy_buffer_to_buffer(&self.encoder.largest, 0, &slot.readable, 0, 16);
         if let Some((set, resolved)) = &slot.stamps {
             let bytes = u64::from(STAMPS) * 8;
