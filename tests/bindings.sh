@@ -29,6 +29,8 @@ install() {
 # Builds the whole workspace, for a part of it alone has other features and builds tract anew (10 minutes; never use -p).
 # Runs the conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`.
 build_library() {
+    [ -e tests/conformance/cases.json ] && [ -e ios/Generated/PhasefrontFFI.h ] ||
+        cannot 'the conformance suite and the generated Swift are not written yet: CONTRIBUTING.md has the two commands'
     need cargo || PATH="$HOME/.cargo/bin:$PATH"
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
     export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"

@@ -23,7 +23,8 @@
     ) throws -> R {
         guard let depth = frame.smoothedSceneDepth ?? frame.sceneDepth else {
             throw PhasefrontError.Frame(
-                message: "frame: ARKit gave no depth; run a configuration with the frame semantics sceneDepth, on a device with LiDAR"
+                message:
+                    "frame: ARKit gave no depth; run a configuration with the frame semantics sceneDepth, on a device with LiDAR"
             )
         }
         return try withColourImage(frame.capturedImage) { colour in

@@ -85,8 +85,9 @@ final class ConformanceTests: XCTestCase {
     }
 
     private func levels(_ one: Case, _ frames: Data) throws -> Data {
-        let method = try XCTUnwrap([String: Method](
-            uniqueKeysWithValues: [("network", .trained(network: try network.get())), ("sweep", .sweep)])[one.method])
+        let method = try XCTUnwrap(
+            [String: Method](
+                uniqueKeysWithValues: [("network", .trained(network: try network.get())), ("sweep", .sweep)])[one.method])
         var options = SessionOptions(display: try displayFromToml(text: one.display), method: method)
         options.encoding = try XCTUnwrap(Self.encodings[one.encoding])
         if let lut = one.lut { options.response = .lut(levels: Data(lut)) }
