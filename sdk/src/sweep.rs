@@ -40,7 +40,7 @@ pub const MAX_TAPS: usize = 63;
 pub const MAX_HIDDEN_LAYERS: usize = 2;
 /// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
 /// from the midpoint by Fourier transforms.
-pub const MAX_HOME_REACH: usize = 96;
+pub const MAX_HOME_REACH: usize = 32;
 
 /// How a sweep is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -247,7 +247,7 @@ fn bad_frames_are_named_and_harm_nothing() {
         ..camera
     };
     let mut cameras = CameraFrame::new(
-        141,
+        1130,
         scene.colour(),
         depth(&flat, DepthFormat::NormalizedU8, W, H),
     );
