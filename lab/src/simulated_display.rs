@@ -116,7 +116,7 @@ impl SimulatedDisplay {
                 corner(1.0, 1.0),
             ],
             shape: (size(h) as usize, size(w) as usize),
-            exposure: 0.65,
+            exposure: 0.55,
             full_well: 20_000.0,
             read_noise: 12.0,
             stray: 2e-4,
