@@ -22,7 +22,7 @@ pub enum RunningMode {
 }
 
 /// How the field becomes phases.
-#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+#[derive(Debug, Clone, uniffi::Enum)]
 pub enum Encoding {
     /// Double phase on the field as it is.
     DoublePhase,
@@ -37,6 +37,11 @@ pub enum Encoding {
     BandLimit {
         /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
         k: f32,
+    },
+    /// A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+    Deep {
+        /// The pre-filter.
+        prefilter: Arc<Network>,
     },
 }
 
@@ -228,13 +233,14 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             .collect();
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
-        to.encoding = match options.encoding {
+        to.encoding = match &options.encoding {
             Encoding::DoublePhase => encode::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => encode::Encoding::AntiAlias {
-                sigma,
-                width: width as usize,
+                sigma: *sigma,
+                width: *width as usize,
             },
-            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k },
+            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k: *k },
+            Encoding::Deep { prefilter } => encode::Encoding::Deep(prefilter.core.clone()),
         };
         if let Response::Lut { levels } = &options.response {
             let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {

@@ -79,15 +79,17 @@ class ConformanceTest {
     private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
         "network" -> Method.Trained(network)
         "sweep" -> Method.Sweep
-        else -> error(name)
+        else -> Method.Trained(model(name))
     }
+
+    private fun model(file: String): Network = Network.fromFile(folder.resolve("../../models/$file").path)
 
     private fun options(case: JSONObject): SessionOptions = sessionOptions(method(case), displayFromToml(case.getString("display"))).copy(
         encoding = when (val name = case.getString("encoding")) {
             "double-phase" -> Encoding.DoublePhase
             "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
             "band-limit" -> Encoding.BandLimit(1.0f)
-            else -> error(name)
+            else -> Encoding.Deep(model(name))
         },
         response = case.optJSONArray("lut")?.let { lut -> Response.Lut(ByteArray(lut.length()) { lut.getInt(it).toByte() }) }
             ?: Response.Linear,
