@@ -1,5 +1,6 @@
 //! What a session makes, and how.
 
+use crate::calibration::CalibratedDisplay;
 use crate::display::Display;
 use crate::error::PhasefrontError;
 use crate::network::Network;
@@ -157,6 +158,9 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with; none for as many as the device has.
     pub threads: Option<u32>,
+    /// The display's calibration, which brings its own response.
+    #[uniffi(default = None)]
+    pub calibration: Option<Arc<CalibratedDisplay>>,
 }
 
 /// How the levels of the colours lie in images for a modulator's driver.
@@ -242,6 +246,22 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             Encoding::BandLimit { k } => encode::Encoding::BandLimit { k: *k },
             Encoding::Deep { prefilter } => encode::Encoding::Deep(prefilter.core.clone()),
         };
+        if let Some(calibrated) = &options.calibration {
+            let core = &calibrated.core;
+            if Display::from(core.display.clone()) != options.display {
+                return Err(PhasefrontError::Setting(
+                    "the calibration is another display's; give the session the one that the calibration holds".into(),
+                ));
+            }
+            if options.response != Response::Linear {
+                return Err(PhasefrontError::Setting(
+                    "the calibration brings its own response; leave the other linear".into(),
+                ));
+            }
+            to.response = core.response.clone();
+            to.illumination = core.illumination.clone();
+            to.correction = core.correction;
+        }
         if let Response::Lut { levels } = &options.response {
             let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {
                 PhasefrontError::Setting(format!(

@@ -8,6 +8,7 @@ from conftest import SUITE
 
 from phasefront import (
     Brightness,
+    CalibratedDisplay,
     ColourFormat,
     ConfidenceFormat,
     DepthFormat,
@@ -90,6 +91,8 @@ def model(file):
 def levels_of(case, memory, network):
     encoding = case["encoding"]
     changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
+    if case["calibration"] is not None:
+        changes["calibration"] = CalibratedDisplay.from_file(str(SUITE / case["calibration"]))
     if case["lut"] is not None:
         changes["response"] = Response.LUT(levels=bytes(case["lut"]))
     if case["brightness"] is not None:
