@@ -224,6 +224,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
                 method: method(rung),
                 height: rung.height as usize,
                 width: rung.width as usize,
+                backend: None,
             })
             .collect();
         to.quality = options.quality.into();
