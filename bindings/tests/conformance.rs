@@ -103,6 +103,7 @@ fn options(case: &Value) -> SessionOptions {
         },
         least_confidence: 0.25,
         threads: None,
+        backend: None,
     }
 }
 
