@@ -30,7 +30,7 @@ pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{Network, NetworkInfo};
 pub use options::{
-    Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
+    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
     RunningMode, SessionOptions, Thermal,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

@@ -135,6 +135,16 @@ pub enum Thermal {
     Critical,
 }
 
+/// Where frames are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Backend {
+    /// On the CPU.
+    Cpu,
+    /// On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
+    /// The statistics' `backend` and `backend_why` say which it is, and why.
+    Gpu,
+}
+
 /// What a session makes, and how.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
@@ -161,6 +171,9 @@ pub struct SessionOptions {
     /// The display's calibration, which brings its own response.
     #[uniffi(default = None)]
     pub calibration: Option<Arc<CalibratedDisplay>>,
+    /// Where frames are computed; none for the CPU.
+    #[uniffi(default = None)]
+    pub backend: Option<Backend>,
 }
 
 /// How the levels of the colours lie in images for a modulator's driver.
@@ -233,6 +246,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
                 method: method(rung),
                 height: rung.height as usize,
                 width: rung.width as usize,
+                backend: None,
             })
             .collect();
         to.quality = options.quality.into();
@@ -281,6 +295,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             DepthRange::Fixed { near_m, far_m } => range::DepthRange::Fixed { near_m, far_m },
         };
         to.depth.least_confidence = options.least_confidence;
+        to.backend = match options.backend {
+            None | Some(Backend::Cpu) => session::Backend::Cpu,
+            Some(Backend::Gpu) => session::Backend::Gpu,
+        };
         to.threads = match options.threads {
             None => None,
             Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {

@@ -120,6 +120,7 @@ fn options(case: &Value) -> SessionOptions {
         least_confidence: 0.25,
         threads: None,
         calibration,
+        backend: None,
     }
 }
 

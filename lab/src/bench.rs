@@ -2,6 +2,7 @@
 //! machine's own peak measured in the same run.
 
 pub mod gpu;
+pub mod random;
 
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3};

@@ -7,6 +7,7 @@
 //! at z = 0. An image's value is the amplitude. Plans are immutable and shared between threads;
 //! their hot calls take scratch memory and allocate nothing.
 
+mod brightness;
 pub mod calibration;
 pub mod depth;
 pub mod display;

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network; 0 is the plane sweep
+    /// Layers of the network; 0 is the plane sweep. Where none of so many comes along, one with random weights in f32
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
     /// Its numbers
@@ -40,6 +40,9 @@ pub(crate) struct Bench {
     #[command(flatten)]
     display: DisplayFlags,
 }
+
+/// Layers of the deepest network that GPUs are measured with.
+const DEEPEST: usize = 30;
 
 /// How many layers a dispatch of the GPU computes.
 #[derive(Clone, Copy, ValueEnum)]
@@ -68,9 +71,22 @@ impl Bench {
         if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
             methods.push(Method::Sweep(Sweep::for_display(&display)));
         }
+        let device = self.backend.device()?;
+        // What a GPU is judged by, unless it comes along.
+        let made = match self.layers {
+            Some(layers) => Some(layers).filter(|&layers| layers > 0),
+            None => device.is_some().then_some(DEEPEST),
+        };
+        if let Some(layers) = made
+            && self.network.is_none()
+            && self.precision.is_none_or(|p| !p.is_int8())
+            && !BUILT_IN.iter().any(|built| built.layers == layers)
+        {
+            methods.push(Method::Network(bench::random::network(layers)?));
+        }
         if methods.is_empty() {
             return Err(Error::Input(
-                "no network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
+                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
             ));
         }
         let sizes = self
@@ -78,7 +94,7 @@ impl Bench {
             .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| {
                 vec![size]
             });
-        if let Some(options) = self.backend.device()? {
+        if let Some(options) = device {
             let networks: Vec<_> = (methods.into_iter())
                 .filter_map(|method| match method {
                     Method::Network(network) => Some(network),
