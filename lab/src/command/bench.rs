@@ -5,6 +5,7 @@ use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront::network::Precision;
+use phasefront::slm::per_pixel::PerPixel;
 use phasefront::{Display, Method, Network, Sweep};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
@@ -15,6 +16,8 @@ use std::sync::Arc;
 use std::time::Duration;
 
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
+///
+/// With a --display that has a per-pixel table, also what reading it adds to a frame.
 #[derive(Args)]
 pub(crate) struct Bench {
     /// Layers of the network; 0 is the plane sweep. Where none of so many comes along, one with random weights in f32
@@ -55,7 +58,8 @@ enum FusionName {
 
 impl Bench {
     pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        let file = self.display.read()?;
+        let (display, table) = (file.display, file.per_pixel);
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
         let wanted = |built: &&Built| {
@@ -101,7 +105,7 @@ impl Bench {
                     _ => None,
                 })
                 .collect();
-            return self.on_gpu(&networks, &sizes, &display, &options, json);
+            return self.on_gpu(&networks, &sizes, &display, table.as_ref(), &options, json);
         }
         let machine = Machine::this();
         let threads = threads.map_or_else(
@@ -118,6 +122,7 @@ impl Bench {
                     method,
                     size,
                     threads,
+                    table: table.as_ref(),
                 }));
             }
         }
@@ -131,7 +136,7 @@ impl Bench {
         super::print(
             json,
             &json!({"machine": machine, "rows": rows}),
-            table(&machine, &rows),
+            as_table(&machine, &rows),
         );
         Ok(())
     }
@@ -144,6 +149,7 @@ impl Bench {
         networks: &[Arc<Network>],
         sizes: &[(usize, usize)],
         display: &Display,
+        table: Option<&Arc<PerPixel>>,
         options: &DeviceOptions,
         json: bool,
     ) -> Result<()> {
@@ -165,7 +171,7 @@ impl Bench {
                         let chain = ChainOptions { float, fusion };
                         let budget = Duration::from_secs_f64(self.seconds);
                         rows.push(bench::gpu::measure(
-                            network, size, &device, display, chain, budget,
+                            network, size, &device, display, chain, table, budget,
                         )?);
                     }
                 }
@@ -175,20 +181,20 @@ impl Bench {
         super::print(
             json,
             &json!({"machine": device.name(), "rows": rows}),
-            gpu_table(&device, &rows),
+            as_gpu_table(&device, &rows),
         );
         Ok(())
     }
 }
 
-fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
+fn as_gpu_table(device: &Device, rows: &[GpuRow]) -> String {
     let mut text = format!("{}\n\n", device.name());
-    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(f64::NAN);
         text += &format!(
-            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} |",
+            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} | {} |",
             row.layers,
             row.precision,
             row.kernels,
@@ -205,19 +211,20 @@ fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
             whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.bandwidth_percent),
+            tenths(row.table_percent),
         );
     }
     text
 }
 
-fn table(machine: &Machine, rows: &[Row]) -> String {
+fn as_table(machine: &Machine, rows: &[Row]) -> String {
     let mut text = format!("{}, {} cores\n\n", machine.cpu, machine.cores);
-    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(0.0);
         text += &format!(
-            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} |",
+            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} | {} |",
             row.method,
             row.layers,
             row.precision,
@@ -234,9 +241,14 @@ fn table(machine: &Machine, rows: &[Row]) -> String {
             whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.peak_memory_mb),
+            tenths(row.table_percent),
         );
     }
     text
+}
+
+fn tenths(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value:.1}"))
 }
 
 fn whole(value: Option<f64>) -> String {
