@@ -24,6 +24,8 @@ pub struct Case<'a> {
     pub size: (usize, usize),
     /// Threads of the pool.
     pub threads: usize,
+    /// The pre-filter of the deep encoding; AA-DPM without.
+    pub prefilter: Option<&'a Network>,
 }
 
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
@@ -43,6 +45,10 @@ pub struct Row {
     pub height: usize,
     /// Threads of the pool.
     pub threads: usize,
+    /// z of the modulator against the midpoint, mm.
+    pub offset_mm: f64,
+    /// `anti-alias` or `deep`.
+    pub encoder: &'static str,
     /// Each stage's median.
     pub stage_ms: BTreeMap<&'static str, f64>,
     /// The median of whole frames.
@@ -108,7 +114,10 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         Method::Network(network),
         display,
-        Encoding::ANTI_ALIAS,
+        match case.prefilter {
+            Some(network) => Encoding::Deep(network),
+            None => Encoding::ANTI_ALIAS,
+        },
         Scale::Fixed(1.0),
         Response::linear(display.bits())?,
     )?;
@@ -155,6 +164,11 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         height,
         threads: case.threads,
+        offset_mm: display.offset_m() * 1e3,
+        encoder: match case.prefilter {
+            Some(_) => "deep",
+            None => "anti-alias",
+        },
         stage_ms,
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],

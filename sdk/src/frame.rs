@@ -78,6 +78,7 @@ impl RgbdFrame {
 
 /// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½.
 impl Source for RgbdFrame {
+    #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let (height, width) = self.shape();
         let (values, plane) = match plane {

@@ -123,8 +123,8 @@ impl Pipeline {
             .modulate(field, levels, &mut scratch.modulator)
     }
 
-    /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as
-    /// the encoder's filter made it.
+    /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked
+    /// on: what it holds afterwards means nothing.
     ///
     /// # Errors
     /// A frame of another shape.

@@ -86,6 +86,7 @@ impl Response {
     ///
     /// # Panics
     /// If the lengths differ.
+    #[inline(always)]
     pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         match self {
@@ -104,6 +105,7 @@ impl Response {
 }
 
 /// round(φ/2π·n) mod n, for n a power of two up to 256.
+#[inline(always)]
 fn step(phase: f32, n: i32) -> usize {
     // Phases are not negative, so the conversion's truncation is the floor.
     ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize

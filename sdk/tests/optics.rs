@@ -12,7 +12,7 @@ use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{self, Padding, Propagator};
-use phasefront::{Display, Modulator, Network, wave};
+use phasefront::{Display, Method, Modulator, Network, Pipeline, RgbdFrame, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -333,4 +333,54 @@ fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
     assert!(why(&elsewhere, &network).contains("offset of 6.000 mm"));
     let hologram = Network::from_onnx(&Model::new(3, 8).bytes()).unwrap();
     assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
+}
+
+#[test]
+fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
+    let network = Network::from_onnx(&Model::int8(8, 24).bytes()).unwrap();
+    let prefilter = Network::from_onnx(&Model::prefilter("6").bytes()).unwrap();
+    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let pipeline = |height, width| {
+        let method = Method::Network(&network);
+        let encoding = Encoding::Deep(&prefilter);
+        let response = Response::linear(8).unwrap();
+        Pipeline::new(
+            height,
+            width,
+            method,
+            &display,
+            encoding,
+            Scale::Max,
+            response,
+        )
+    };
+    for (h, w) in [(1, 1), (7, 5000), (5000, 7)] {
+        let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
+        let rgb = Array3::from_shape_fn((3, h, w), |(c, y, x)| value(c, y, x));
+        let depth = Array2::from_shape_fn((h, w), |(y, x)| value(9, y, x));
+        let frame = RgbdFrame::new(rgb, depth).unwrap();
+        let levels = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let plan = pipeline(h, w).unwrap();
+                let mut field = vec![Complex32::new(f32::NAN, 0.0); 3 * h * w];
+                let mut levels = vec![0; 3 * h * w];
+                let report = plan.process(&frame, &mut field, &mut levels, &mut plan.scratch());
+                assert!(report.unwrap().scale.is_finite());
+                levels
+            })
+        });
+        assert!(
+            levels[0] == levels[1],
+            "{w}×{h}: other bits on other threads"
+        );
+        assert!(h * w == 1 || levels[0].iter().any(|level| *level != levels[0][0]));
+    }
+    for side in [0, 1 << 14, 1 << 15, 1 << 40] {
+        let why = pipeline(side, side).err().unwrap().to_string();
+        let named = ["empty", "too large", "over the"]
+            .iter()
+            .any(|word| why.contains(word));
+        assert!(!why.contains('\n') && named, "{why}");
+    }
 }

@@ -5,8 +5,10 @@ use super::hologram::PrecisionName;
 use clap::Args;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
-use phasefront_lab::{Error, Result};
+use phasefront_lab::plot::{self, Bar};
+use phasefront_lab::{Error, Result, files};
 use serde_json::json;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
@@ -27,13 +29,28 @@ pub(crate) struct Bench {
     /// Seconds to spend on each combination; five frames at least
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
+    /// ONNX file of a pre-filter, for the deep encoding instead of AA-DPM
+    #[arg(long, value_name = "FILE")]
+    prefilter: Option<String>,
+    /// Draw the stages' times there
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
 }
 
 impl Bench {
     pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
+        if let Some(path) = &self.plot
+            && !files::has_extension(path, "svg")
+        {
+            return Err(Error::file(path, "the name must end in .svg"));
+        }
         let display = self.display.read()?.display;
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
         let wanted = |built: &&Built| {
@@ -71,6 +88,7 @@ impl Bench {
                     network,
                     size,
                     threads,
+                    prefilter: prefilter.as_ref(),
                 }));
             }
         }
@@ -81,6 +99,9 @@ impl Bench {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        if let Some(path) = &self.plot {
+            plot::write_bars(path, &title(&machine, &rows[0]), &bars(&rows))?;
+        }
         super::print(
             json,
             &json!({"machine": machine, "rows": rows}),
@@ -116,6 +137,26 @@ fn table(machine: &Machine, rows: &[Row]) -> String {
         );
     }
     text
+}
+
+fn title(machine: &Machine, row: &Row) -> String {
+    format!(
+        "{}, {} cores: ms a frame, offset {} mm, {}",
+        machine.cpu, machine.cores, row.offset_mm, row.encoder
+    )
+}
+
+fn bars(rows: &[Row]) -> Vec<Bar> {
+    let bar = |row: &Row| Bar {
+        label: format!(
+            "{} layers {} {}×{}, {} thr.",
+            row.layers, row.precision, row.width, row.height, row.threads
+        ),
+        parts: ["network", "propagate", "encode"]
+            .map(|stage| (stage, row.stage_ms.get(stage).copied().unwrap_or(0.0)))
+            .to_vec(),
+    };
+    rows.iter().map(bar).collect()
 }
 
 fn whole(value: Option<f64>) -> String {

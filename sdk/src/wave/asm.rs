@@ -10,7 +10,7 @@
 //! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
 //! phase zero here, and both agree at z = 0.
 
-use super::fft::{Fft2, Scratch, smooth_size};
+use super::fft::{ConvolveScratch, Fft2, fast_size};
 use crate::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -87,7 +87,7 @@ pub fn padded_shape(
     }
     Ok(match padding {
         Padding::Circular => (height, width),
-        _ => (smooth_size(h as usize), smooth_size(w as usize)),
+        _ => (fast_size(h as usize), fast_size(w as usize)),
     })
 }
 
@@ -136,6 +136,7 @@ impl Transfer {
     }
 
     /// Multiplies column `x` of a spectrum by the transfer function.
+    #[inline(always)]
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
         let rows = self.padded_height / 2 + 1;
         let x = x.min(self.padded_width - x);
@@ -261,15 +262,15 @@ impl Propagator {
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.
-    pub fn scratch(&self) -> Scratch {
-        self.fft.scratch()
+    pub fn scratch(&self) -> ConvolveScratch {
+        self.fft.convolve_scratch()
     }
 
     /// Replaces `plane`, (H, W), by the field at the planned distance. Allocates nothing.
     ///
     /// # Panics
     /// If `plane` has not H·W values or `scratch` is another plan's.
-    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
+    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         self.fft
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
     }
