@@ -9,9 +9,10 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::network::{Precision, f32_peak, int8_peak};
 use phasefront::slm::Response;
-use phasefront::{Display, Method, Pipeline, RgbdFrame};
+use phasefront::{Display, Method, Network, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long the peak is measured.
@@ -26,6 +27,8 @@ pub struct Case<'a> {
     pub size: (usize, usize),
     /// Threads of the pool.
     pub threads: usize,
+    /// The pre-filter of the deep encoding; AA-DPM without.
+    pub prefilter: Option<&'a Arc<Network>>,
 }
 
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
@@ -47,6 +50,10 @@ pub struct Row {
     pub height: usize,
     /// Threads of the pool.
     pub threads: usize,
+    /// z of the modulator against the midpoint, mm.
+    pub offset_mm: f64,
+    /// `anti-alias` or `deep`.
+    pub encoder: &'static str,
     /// Each stage's median.
     pub stage_ms: BTreeMap<&'static str, f64>,
     /// The median of whole frames.
@@ -116,7 +123,10 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         case.method.clone(),
         display,
-        Encoding::ANTI_ALIAS,
+        match case.prefilter {
+            Some(network) => Encoding::Deep(network.clone()),
+            None => Encoding::ANTI_ALIAS,
+        },
         Scale::Fixed(1.0),
         Response::linear(display.bits())?,
     )?;
@@ -168,6 +178,11 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         height,
         threads: case.threads,
+        offset_mm: display.offset_m() * 1e3,
+        encoder: match case.prefilter {
+            Some(_) => "deep",
+            None => "anti-alias",
+        },
         stage_ms,
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],

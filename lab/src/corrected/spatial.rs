@@ -18,7 +18,7 @@ use ndarray::{Array2, Array3, ArrayView1, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::wave::asm::Transfer;
-use phasefront::wave::fft::{Fft2, smooth_size};
+use phasefront::wave::fft::{Fft2, fast_size};
 use phasefront::wave::zernike::{Aberration, Aberrations};
 use rayon::prelude::*;
 
@@ -146,7 +146,7 @@ impl Place<'_> {
 
     /// The side of the plane of a node's convolution.
     fn side(&self) -> usize {
-        smooth_size(2 * NODE + 2 * self.reach())
+        fast_size(2 * NODE + 2 * self.reach())
     }
 
     /// Φ of node (i, j) at frequency bins (kx, ky) of a plane of `n`×`n`.
@@ -180,7 +180,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
         let spread: Vec<Option<Vec<Complex32>>> = some
             .par_iter()
             .map_init(
-                || fft.scratch(),
+                || fft.convolve_scratch(),
                 |scratch, (i, j)| {
                     let mut plane = vec![Complex32::ZERO; side * side];
                     let mut lit = false;
