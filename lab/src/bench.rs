@@ -11,7 +11,7 @@ use phasefront::encode::{Encoding, Scale};
 use phasefront::network::{Precision, f32_peak, int8_peak};
 use phasefront::slm::Response;
 use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method, Modulator, Pipeline, RgbdFrame};
+use phasefront::{Display, Method, Modulator, Network, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,6 +31,8 @@ pub struct Case<'a> {
     pub threads: usize,
     /// A per-pixel table, if what it costs shall be measured: each frame is encoded once more, through it.
     pub table: Option<&'a Arc<PerPixel>>,
+    /// The pre-filter of the deep encoding; AA-DPM without.
+    pub prefilter: Option<&'a Arc<Network>>,
 }
 
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
@@ -52,6 +54,10 @@ pub struct Row {
     pub height: usize,
     /// Threads of the pool.
     pub threads: usize,
+    /// z of the modulator against the midpoint, mm.
+    pub offset_mm: f64,
+    /// `anti-alias` or `deep`.
+    pub encoder: &'static str,
     /// Each stage's median.
     pub stage_ms: BTreeMap<&'static str, f64>,
     /// The median of whole frames.
@@ -123,7 +129,10 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         case.method.clone(),
         display,
-        Encoding::ANTI_ALIAS,
+        match case.prefilter {
+            Some(network) => Encoding::Deep(network.clone()),
+            None => Encoding::ANTI_ALIAS,
+        },
         Scale::Fixed(1.0),
         Response::linear(display.bits())?,
     )?;
@@ -186,6 +195,11 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         height,
         threads: case.threads,
+        offset_mm: display.offset_m() * 1e3,
+        encoder: match case.prefilter {
+            Some(_) => "deep",
+            None => "anti-alias",
+        },
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],
         table_percent: (!table_encode.is_empty())

@@ -10,8 +10,10 @@ use phasefront::{Display, Method, Network, Sweep};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
-use phasefront_lab::{Error, Result, gpu};
+use phasefront_lab::plot::{self, Bar};
+use phasefront_lab::{Error, Result, files, gpu};
 use serde_json::json;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -35,6 +37,12 @@ pub(crate) struct Bench {
     /// Seconds to spend on each combination; five frames at least
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
+    /// ONNX file of a pre-filter, for the deep encoding instead of AA-DPM
+    #[arg(long, value_name = "FILE")]
+    prefilter: Option<String>,
+    /// Draw the stages' times there
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendFlags,
     /// How the network is computed on the GPU, both ways if not given
@@ -58,8 +66,17 @@ enum FusionName {
 
 impl Bench {
     pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
+        if let Some(path) = &self.plot
+            && !files::has_extension(path, "svg")
+        {
+            return Err(Error::file(path, "the name must end in .svg"));
+        }
         let file = self.display.read()?;
         let (display, table) = (file.display, file.per_pixel);
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
         let wanted = |built: &&Built| {
@@ -99,6 +116,11 @@ impl Bench {
                 vec![size]
             });
         if let Some(options) = device {
+            if self.plot.is_some() || self.prefilter.is_some() {
+                return Err(Error::Input(
+                    "--plot and --prefilter go with --backend cpu".into(),
+                ));
+            }
             let networks: Vec<_> = (methods.into_iter())
                 .filter_map(|method| match method {
                     Method::Network(network) => Some(network),
@@ -123,6 +145,7 @@ impl Bench {
                     size,
                     threads,
                     table: table.as_ref(),
+                    prefilter: prefilter.as_ref(),
                 }));
             }
         }
@@ -133,6 +156,9 @@ impl Bench {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        if let Some(path) = &self.plot {
+            plot::write_bars(path, &title(&machine, &rows[0]), &bars(&rows))?;
+        }
         super::print(
             json,
             &json!({"machine": machine, "rows": rows}),
@@ -249,6 +275,37 @@ fn as_table(machine: &Machine, rows: &[Row]) -> String {
 
 fn tenths(value: Option<f64>) -> String {
     value.map_or("–".into(), |value| format!("{value:.1}"))
+}
+
+fn title(machine: &Machine, row: &Row) -> String {
+    format!(
+        "{}, {} cores: ms a frame, offset {} mm, {}",
+        machine.cpu, machine.cores, row.offset_mm, row.encoder
+    )
+}
+
+fn bars(rows: &[Row]) -> Vec<Bar> {
+    let bar = |row: &Row| Bar {
+        label: format!(
+            "{} {}×{}, {} thr.",
+            match row.layers {
+                0 => row.method.to_owned(),
+                layers => format!("{layers} layers {}", row.precision),
+            },
+            row.width,
+            row.height,
+            row.threads
+        ),
+        // Bars of one picture name their parts alike, whatever makes the hologram.
+        parts: [
+            ("hologram", row.method),
+            ("propagate", "propagate"),
+            ("encode", "encode"),
+        ]
+        .map(|(part, stage)| (part, row.stage_ms.get(stage).copied().unwrap_or(0.0)))
+        .to_vec(),
+    };
+    rows.iter().map(bar).collect()
 }
 
 fn whole(value: Option<f64>) -> String {

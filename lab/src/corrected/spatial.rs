@@ -19,7 +19,7 @@ use ndarray::{Array2, Array3, ArrayView1, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::wave::asm::Transfer;
-use phasefront::wave::fft::{Fft2, Scratch, smooth_size};
+use phasefront::wave::fft::{ConvolveScratch, Fft2, Scratch, fast_size};
 use phasefront::wave::zernike::{Aberration, Aberrations};
 use rayon::prelude::*;
 
@@ -147,7 +147,7 @@ impl Place<'_> {
 
     /// The side of the plane of a node's convolution: its pixels and their light.
     fn side(&self) -> usize {
-        smooth_size(2 * NODE + 2 * self.reach())
+        fast_size(2 * NODE + 2 * self.reach())
     }
 
     /// Whether light of pixel 0 reaches pixel `at` of a periodic axis of [`Self::side`].
@@ -179,7 +179,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
     let fft = Fft2::new(side, side, side, side);
     let scale = 1.0 / (side * side) as f32;
     // The spectrum of a node's point spread function, cut, and over side² as unnormalized transforms need it.
-    let spectrum = |i: usize, j: usize, scratch: &mut Scratch| {
+    let spectrum = |i: usize, j: usize, convolve: &mut ConvolveScratch, scratch: &mut Scratch| {
         let aberration = place.node(i, j);
         let mut point = vec![Complex32::ZERO; side * side];
         point[0] = scale.into();
@@ -188,7 +188,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
                 *value *= place.kernel(&aberration, side, kx, ky);
             }
         };
-        fft.convolve(&mut point, kernel, scratch);
+        fft.convolve(&mut point, kernel, convolve);
         for (at, value) in point.iter_mut().enumerate() {
             let inside = place.reaches(at / side) && place.reaches(at % side);
             *value *= if inside { scale } else { 0.0 };
@@ -208,8 +208,8 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
         let spread: Vec<Option<Vec<Complex32>>> = some
             .par_iter()
             .map_init(
-                || fft.scratch(),
-                |scratch, (i, j)| {
+                || (fft.convolve_scratch(), fft.scratch()),
+                |(convolve, scratch), (i, j)| {
                     let mut plane = vec![Complex32::ZERO; side * side];
                     let mut lit = false;
                     for (y, wy) in hat(*i, height) {
@@ -224,14 +224,14 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
                     if !lit {
                         return None;
                     }
-                    let spectrum = spectrum(*i, *j, scratch);
+                    let spectrum = spectrum(*i, *j, convolve, scratch);
                     fft.convolve(
                         &mut plane,
                         |kx, column| {
                             let factors = &spectrum[kx * side..][..side];
                             (column.iter_mut().zip(factors)).for_each(|(v, f)| *v *= f);
                         },
-                        scratch,
+                        convolve,
                     );
                     Some(plane)
                 },

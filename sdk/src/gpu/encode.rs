@@ -500,6 +500,7 @@ mod tests {
             for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
                 plane.iter_mut().for_each(|value| *value *= turn);
             }
+            let mut given = expected.clone();
             let twin = crate::encode::Encoder::new(size.0, size.1, encoding.clone()).unwrap();
             let mut levels = vec![0; 3 * area];
             let used = twin.encode_levels(
@@ -510,7 +511,12 @@ mod tests {
                 &mut twin.scratch(),
             );
             let mut phase = vec![0.0; 3 * area];
-            crate::encode::double_phase::encode(&expected, size.1, area, used, &mut phase);
+            twin.encode(
+                &mut given,
+                Scale::Fixed(used),
+                &mut phase,
+                &mut twin.scratch(),
+            );
             let largest: Vec<u32> =
                 bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
             let found = encoder.scale(largest[0]);
