@@ -792,3 +792,39 @@ fn the_bench_measures_every_stage_and_draws_it() {
         &[".svg"],
     );
 }
+
+#[test]
+fn a_calibrated_display_is_packed_for_an_app() {
+    let folder = Folder::new();
+    let lut: Vec<u8> = (0..=255).map(|i| i / 2 + 30).collect();
+    let text: Vec<_> = lut.iter().map(u8::to_string).collect();
+    fs::write(folder.path("lut.txt"), text.join(" ")).unwrap();
+    let at = |z_mm: f64, a: f64| {
+        format!("[[at]]\nz_mm = {z_mm:?}\ngreen = [0.0, {a:?}, 0.0, 0.0, 0.0]\n")
+    };
+    fs::write(folder.path("same.toml"), at(-3.0, 0.5) + &at(3.0, 0.5)).unwrap();
+    fs::write(folder.path("other.toml"), at(-3.0, 0.5) + &at(3.0, 0.75)).unwrap();
+    for (name, aberration) in [("display.toml", "same.toml"), ("deep.toml", "other.toml")] {
+        let text = format!(
+            "width = 64\nheight = 48\noffset_mm = 2.0\nlut = \"lut.txt\"\naberration = \"{aberration}\"\n"
+        );
+        fs::write(folder.path(name), text).unwrap();
+    }
+    let pack = ["calibrate", "pack", "-o", "app.pfc", "--display"];
+    folder.succeeds(&[&pack[..], &["display.toml"]].concat());
+    let packed =
+        phasefront::Calibration::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
+    assert_eq!(
+        (packed.display.width(), packed.display.offset_m()),
+        (64, 2e-3)
+    );
+    assert_eq!(
+        packed.response,
+        phasefront::slm::Response::lut(lut.try_into().unwrap())
+    );
+    assert_eq!(packed.correction.unwrap().coefficients()[1][1], 0.5);
+    folder.refuses(&[&pack[..], &["display.toml"]].concat(), 1, &["--force"]);
+    let deep = ["--force", "deep.toml"];
+    let deep = [&pack[..4], &deep[..1], &pack[4..], &deep[1..]].concat();
+    folder.refuses(&deep, 1, &["changes over depth"]);
+}
