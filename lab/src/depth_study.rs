@@ -255,7 +255,7 @@ pub fn work(scenes: usize, methods: usize) -> usize {
 }
 
 /// Colour and depth of what is visible: black and farthest where nothing is.
-fn front(ldi: &Ldi) -> (Array3<f32>, Array2<f32>) {
+pub(crate) fn front(ldi: &Ldi) -> (Array3<f32>, Array2<f32>) {
     let layer = &ldi.layers[0];
     let seen = |y: usize, x: usize| !layer.depth[(y, x)].is_nan();
     let rgb = Array3::from_shape_fn(layer.rgb.dim(), |(c, y, x)| match seen(y, x) {

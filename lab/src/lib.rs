@@ -23,6 +23,7 @@ pub mod seeds;
 pub mod simulated_display;
 pub mod sm_lbm;
 pub mod study;
+pub mod sweep_study;
 pub mod video;
 
 pub use error::{Error, Result};

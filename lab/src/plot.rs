@@ -8,6 +8,8 @@ use std::path::Path;
 
 /// Width of a panel and height of the picture, pixels.
 const PANEL: (u32, u32) = (460, 360);
+/// Most numbers along x, so that they have room.
+const MOST_LABELS: usize = 12;
 const COLOUR: RGBColor = RGBColor(31, 95, 160);
 
 /// One curve and the words around it.
@@ -138,7 +140,7 @@ fn draw(
             .configure_mesh()
             .x_desc(panel.x)
             .y_desc(panel.y)
-            .x_labels((last - first + 3) as usize)
+            .x_labels(((last - first + 3) as usize).min(MOST_LABELS))
             .label_style(("sans-serif", 14))
             .axis_desc_style(("sans-serif", 15))
             .light_line_style(TRANSPARENT)

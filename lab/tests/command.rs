@@ -702,6 +702,37 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
 }
 
 #[test]
+fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
+    let folder = Folder::new();
+    let square = |y: usize, x: usize| (20..60).contains(&y) && (24..70).contains(&x);
+    let rgb = Array3::from_shape_fn((3, 80, 96), |(c, y, x)| match square(y, x) {
+        true => 0.9 - 0.1 * c as f32,
+        false => 0.2,
+    });
+    files::write_amplitude(&folder.path("rgb.png"), rgb.view()).unwrap();
+    for (name, ramp, stage) in [("sharp.npy", 1, "sweep"), ("ragged.npy", 5, "network")] {
+        let depth = Array2::from_shape_fn((80, 96), |(y, x)| {
+            let inside = (0..ramp).filter(|i| square(y, x + i)).count();
+            0.8 - 0.5 * inside as f32 / ramp as f32
+        });
+        folder.depth_npy(name, &depth);
+        let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&[
+            "hologram", "--rgb", "rgb.png", "--depth", name, "--method", "auto", "--json", "-o",
+            "h.png",
+        ]))
+        .unwrap();
+        assert!(made["stage_ms"][stage].is_number(), "{name}: {made}");
+    }
+    folder.refuses(
+        &[
+            "hologram", "--ldi", "scene", "--method", "auto", "-o", "a.png",
+        ],
+        1,
+        &["take --rgb and --depth"],
+    );
+}
+
+#[test]
 fn a_pre_filter_belongs_to_the_deep_encoder() {
     let folder = Folder::new().with_frame();
     let hologram_network = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/rgbd-8.onnx");

@@ -1,11 +1,14 @@
 //! The studies of layers and planes: what they compare, and what the command writes.
 #![allow(clippy::unwrap_used)]
 
-use phasefront::Display;
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::sweep::SweepPlan;
+use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Scenes};
-use phasefront_lab::{metrics, scene, sm_lbm};
+use phasefront_lab::{evaluate, metrics, scene, sm_lbm, sweep_study};
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -86,7 +89,7 @@ fn planes_are_compared_with_the_finest() {
 #[test]
 fn the_command_writes_figures_and_a_plot() {
     let folder = tempfile::tempdir().unwrap();
-    for what in ["layers", "planes"] {
+    for what in ["layers", "planes", "sweep", "displays"] {
         let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
             .args([
                 "study", what, "--scenes", "1", "--size", "24", "--planes", "40", "-o",
@@ -102,6 +105,18 @@ fn the_command_writes_figures_and_a_plot() {
         let text = std::fs::read_to_string(folder.path().join(format!("out/{what}.json"))).unwrap();
         let result: serde_json::Value = serde_json::from_str(&text).unwrap();
         let rows = result["rows"].as_array().unwrap();
+        match what {
+            "sweep" => assert_eq!(rows.len(), 27),
+            "displays" => assert_eq!(rows.len(), sweep_study::DISPLAYS.len()),
+            _ => {}
+        }
+        if what == "sweep" {
+            let svg = std::fs::read_to_string(folder.path().join("out/sweep.svg")).unwrap();
+            assert_eq!(svg.matches("<circle").count(), 8 + 8 + 6 + 3);
+        }
+        if matches!(what, "sweep" | "displays") {
+            continue;
+        }
         assert_eq!(rows.len(), if what == "layers" { 9 } else { 1 });
         assert_eq!(result["finest"], if what == "layers" { 10 } else { 40 });
         let svg = std::fs::read_to_string(folder.path().join(format!("out/{what}.svg"))).unwrap();
@@ -131,4 +146,66 @@ fn what_cannot_be_plotted_is_refused_and_leaves_no_file() {
     }
     plot::write_svg(&path, &[panel(vec![(3, 1.0)])]).unwrap();
     assert!(path.exists());
+}
+
+#[test]
+fn the_sweep_is_studied_beside_exact_waves() {
+    let scenes = Scenes {
+        scenes: 2,
+        ..scenes(64)
+    };
+    let work = AtomicUsize::new(0);
+    let done = || {
+        work.fetch_add(1, Ordering::Relaxed);
+    };
+    let rows = sweep_study::ablation(&scenes, 48, &done).unwrap();
+    assert_eq!(work.into_inner(), sweep_study::ablation_work(&scenes, 48));
+    let of = |part: &str, value: usize| {
+        let found = rows.iter().find(|r| r.part == part && r.value == value);
+        found.unwrap_or_else(|| panic!("no {part} {value}: {rows:?}"))
+    };
+    let usual = of("usual", 40);
+    // Merged steps and tiles change nothing but the time.
+    for same in [of("merge", 0), of("tile", 128)] {
+        assert!(
+            (same.clean.psnr - usual.clean.psnr).abs() < 0.02,
+            "{same:?}"
+        );
+        assert!(same.ns_per_pixel.unwrap() > 0.0);
+    }
+    assert!(
+        usual.clean.psnr > of("hidden", 0).clean.psnr + 0.5,
+        "{rows:?}"
+    );
+    assert!(usual.clean.psnr > of("between", 0).clean.psnr + 0.3);
+    assert!(of("planes", 64).clean.psnr > of("planes", 16).clean.psnr + 1.0);
+    assert!(usual.clean.psnr > usual.degraded.psnr, "{usual:?}");
+    assert!(of("exact", 2).clean.psnr > usual.clean.psnr, "{rows:?}");
+
+    // What is measured is what it says: one row by hand.
+    let display = &scenes.display;
+    let sweep = Sweep {
+        hidden_layers: 0,
+        ..Sweep::for_display(display)
+    };
+    let by_hand: f64 = [11, 12]
+        .map(|seed| {
+            let ldi = ldi(seed, 64, 5);
+            let rgb = evaluate::visible_rgb(&ldi);
+            let depth = ldi.layers[0]
+                .depth
+                .mapv(|d| if d.is_nan() { 1.0 } else { d });
+            let frame = RgbdFrame::new(rgb, depth).unwrap();
+            let plan = SweepPlan::new(64, 64, display, sweep, 0.0).unwrap();
+            let mut field = Array3::zeros((3, 64, 64));
+            plan.field(&frame, field.as_slice_mut().unwrap(), &mut plan.scratch())
+                .unwrap();
+            let truth = sm_lbm::hologram(&ldi, display, 48, &|_, _| {}).unwrap();
+            let [a, b] = [field, truth].map(|u| u.mapv(|u: Complex32| u.norm()));
+            metrics::compare(a.view(), b.view()).unwrap().psnr_overall / 2.0
+        })
+        .iter()
+        .sum();
+    assert!((of("hidden", 0).clean.psnr - by_hand).abs() < 1e-6);
+    assert!(sweep_study::ablation(&Scenes { size: 66, ..scenes }, 48, &|| ()).is_err());
 }

@@ -1,15 +1,20 @@
 //! The plane sweep on displays that no network was trained for: beside exact waves on the same surfaces, and both beside
-//! the truth.
+//! the truth. And on a frame that a camera took: no seams between tiles.
 #![allow(clippy::unwrap_used)]
 
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::depth::DepthUnit;
+use phasefront::depth::refine::Refiner;
+use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
+use phasefront::refocus::Refocus;
 use phasefront::sweep::{self, SweepPlan};
 use phasefront::wave::asm::{Padding, Propagator};
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_lab::evaluate::filled;
 use phasefront_lab::ldi::Ldi;
-use phasefront_lab::{metrics, scene, sm_lbm};
+use phasefront_lab::{files, metrics, scene, sm_lbm};
+use std::path::Path;
 
 const SIZE: usize = 96;
 /// Planes of the truth.
@@ -103,5 +108,93 @@ fn other_displays_need_no_training() {
             swept > exact - 1.5,
             "{toml:?}: {swept} dB beside {exact} dB"
         );
+    }
+}
+
+/// A captured frame of 640×480 as a session brings it to 1080p.
+fn captured(folder: &Path) -> RgbdFrame {
+    const OUT: (usize, usize) = (1080, 1920);
+    let ((height, width), bytes) = files::read_rgb_bytes(&folder.join("color_0.jpg")).unwrap();
+    let plane = Plane::new(&bytes, 3 * width, 3);
+    let image = ColourImage::new(ColourFormat::Rgb, width, height, &[plane]).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), OUT.0, OUT.1).unwrap();
+    let mut rgb = Array3::zeros((3, OUT.0, OUT.1));
+    let amplitudes = rgb.as_slice_mut().unwrap();
+    plan.convert(&image, amplitudes, &mut plan.scratch())
+        .unwrap();
+    let millimetres = files::read_depth(&folder.join("depth_0.png"), false).unwrap();
+    let shape = millimetres.dim();
+    let holes = millimetres.mapv(|mm| f32::from(mm > 0.0));
+    let depth =
+        phasefront::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
+            .unwrap()
+            .depth;
+    let refiner = Refiner::new(shape, Crop::cover(shape, OUT), OUT).unwrap();
+    let mut refined = ndarray::Array2::zeros(OUT);
+    refiner
+        .refine(
+            depth.as_slice().unwrap(),
+            holes.as_slice().unwrap(),
+            amplitudes,
+            refined.as_slice_mut().unwrap(),
+            &mut refiner.scratch(),
+        )
+        .unwrap();
+    RgbdFrame::new(rgb, refined).unwrap()
+}
+
+#[test]
+fn a_captured_frame_has_no_seams_between_tiles() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/redwood");
+    if !folder.exists() {
+        eprintln!("skipped: {} is not there", folder.display());
+        return;
+    }
+    let frame = captured(&folder);
+    let (height, width) = frame.shape();
+    let display = Display::default();
+    let usual = Sweep::for_display(&display);
+    // One tile of 1920 pixels is the whole frame.
+    let [tiles, whole] = [usual.tile, 1920].map(|tile| {
+        let sweep = Sweep { tile, ..usual };
+        let plan = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
+        let mut field = vec![Complex32::ZERO; 3 * height * width];
+        plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
+        field
+    });
+    let worst = |a: &[f32], b: &[f32]| {
+        (a.iter().zip(b))
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f32::max)
+    };
+    let difference = (tiles.iter().zip(&whole))
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, f32::max);
+    println!("tiles and whole frame differ by {difference:.1e}");
+    assert!(difference < 1e-4, "{difference}");
+    let z_m = [2.4e-3, -2.4e-3];
+    let refocus = Refocus::new(height, width, &display, &z_m, None).unwrap();
+    let views = [&tiles, &whole].map(|field| refocus.focal_stack(field, &z_m).unwrap());
+    for (z_m, (tiled, whole)) in z_m.iter().zip(views[0].iter().zip(&views[1])) {
+        assert!(worst(tiled, whole) < 2e-4, "{z_m}: {}", worst(tiled, whole));
+        // Steps from column to column are no larger over the tiles' edges than elsewhere.
+        let step = |x: usize| {
+            let rows = tiled.chunks_exact(width);
+            let steps: f32 = rows.map(|row| (row[x] - row[x - 1]).abs()).sum();
+            f64::from(steps) / (3 * height) as f64
+        };
+        let seams = (1..width / usual.tile + 1).map(|i| i * usual.tile);
+        let seams: Vec<f64> = seams.filter(|x| *x < width).map(step).collect();
+        let others: Vec<f64> = (1..width)
+            .filter(|x| x % usual.tile != 0)
+            .map(step)
+            .collect();
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        println!(
+            "z {z_m}: steps {:.5} over edges, {:.5} elsewhere",
+            mean(&seams),
+            mean(&others)
+        );
+        assert!(mean(&seams) < 1.5 * mean(&others), "{seams:?}");
     }
 }

@@ -8,6 +8,7 @@ pub mod image;
 pub mod range;
 pub mod refine;
 pub mod refine_reference;
+pub mod sharpness;
 pub mod steady;
 pub mod stream;
 

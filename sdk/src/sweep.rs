@@ -6,11 +6,14 @@
 //!
 //! - [`hidden`] adds the surfaces that an RGB-D frame does not show, so that edges are lit from behind;
 //! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)), not a Fourier transform;
+//! - a point that lies between planes is not moved to one: its light is carried there, to first order;
 //! - a tile of the frame does the planes that hold points in it and its halo, and crosses the others in one step;
 //! - the last step goes from the front straight to the midpoint, or on to the display.
 //!
-//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). [`reference`]
-//! is the naive oracle.
+//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance
+//! s from its point to the plane light u becomes u + i·λs/4π·∇²u to first order. Of that [`CARRIED`] is added: on a
+//! slope, what spreads to farther neighbours would be blocked by points nearer to the plane. [`reference`] is the naive
+//! oracle.
 
 mod filters;
 mod fit;
@@ -36,6 +39,8 @@ use workers::Workers;
 pub const MAX_PLANES: usize = 1024;
 /// Most taps of a step.
 pub const MAX_TAPS: usize = 63;
+/// The part of a point's first-order spread to its plane that is carried there.
+pub const CARRIED: f64 = 0.5;
 /// Most hidden layers.
 pub const MAX_HIDDEN_LAYERS: usize = 2;
 /// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
@@ -51,6 +56,9 @@ pub struct Sweep {
     pub taps: usize,
     /// Hidden layers that are added, 0 to [`MAX_HIDDEN_LAYERS`].
     pub hidden_layers: usize,
+    /// Whether points may lie between planes, their light being carried to the plane by a first-order step; otherwise
+    /// each is moved to its plane, as in SM-LBM.
+    pub between_planes: bool,
     /// Pixels along each side of a tile, a multiple of 16.
     pub tile: usize,
 }
@@ -66,6 +74,7 @@ impl Sweep {
             planes,
             taps: Self::taps_for(display, planes),
             hidden_layers: MAX_HIDDEN_LAYERS,
+            between_planes: true,
             tile: Self::TILE,
         }
     }
@@ -213,6 +222,12 @@ impl SweepPlan {
         Fir::new(isa).map(|fir| SweepPlan { fir, ..self })
     }
 
+    /// The same plan with every step between planes by itself, however many are empty: what merging them is worth.
+    pub fn unmerged(mut self) -> Self {
+        self.filters.iter_mut().for_each(Filters::unmerge);
+        self
+    }
+
     /// The instruction set that the filters run on.
     pub fn isa(&self) -> Isa {
         self.fir.isa()
@@ -297,6 +312,7 @@ impl SweepPlan {
         }
         let surfaces = Surfaces {
             rgb,
+            depth,
             planes: &scratch.planes,
             hidden: &scratch.sources[..layers * size],
             height: self.height,
@@ -362,5 +378,6 @@ fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
         step_m,
         planes: sweep.planes,
         home_m,
+        between_planes: sweep.between_planes,
     }))
 }

@@ -22,6 +22,7 @@ fn sweep() -> Sweep {
         planes: 9,
         taps: 9,
         hidden_layers: 2,
+        between_planes: true,
         tile: 16,
     }
 }
@@ -99,6 +100,15 @@ fn the_sweep_is_its_oracle() {
             Sweep {
                 planes: 2,
                 taps: 13,
+                ..sweep()
+            },
+            0.0,
+        ),
+        (
+            29,
+            31,
+            Sweep {
+                between_planes: false,
                 ..sweep()
             },
             0.0,

@@ -17,6 +17,8 @@ def command(last, init):
     parts = ["python", "-m", "phasefront_training", last.kind, "--data", "DATA", "-o", "OUT"]
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
+    if architecture.input == "seeded":
+        parts += ["--seeds", "SEEDS"]
     if last.kind == "stage2":
         parts += ["--offset-mm", f"{last.extra['offset_m'] * 1e3:g}", "--identity-steps", last.options["identity_steps"]]
     if init:
@@ -61,9 +63,12 @@ def describe(name, last, figures):
             lines.append(table(methods))
         lines.append("")
     seed = f"--seed {data['seed']} --size {data['size']} --planes {data['planes']}"
+    seeds = ""
+    if any(a.input == "seeded" for a, _ in last.networks.values()):
+        seeds = " and its seeds: `python -m phasefront_training seeds --data DATA -o SEEDS`,"
     lines += [
         "## To make it again", "",
-        f"The data set: `python -m phasefront_training data -o DATA -- {seed} --scenes …`, then", "",
+        f"The data set: `python -m phasefront_training data -o DATA -- {seed} --scenes …`,{seeds} then", "",
         f"    {command(last, last.options.get('init'))}", "",
     ]
     return "\n".join(lines)

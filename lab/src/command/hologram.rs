@@ -4,6 +4,7 @@ use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progres
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::depth::sharpness;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::{Pipeline, RgbdFrame, Sweep};
@@ -69,6 +70,8 @@ enum Method {
     Sweep,
     /// The plane sweep corrected by a network that was trained on it
     Seeded,
+    /// The plane sweep where depth is sharp, a network where it is ragged
+    Auto,
     /// Silhouette-mask layers: exact waves, slow
     Layers,
     /// A sub-hologram for each point (Maimone et al.)
@@ -162,6 +165,13 @@ impl Hologram {
                     .into(),
             ));
         }
+        let method = match (method, &self.ldi) {
+            (Method::Auto, None) => match sharpness::measure(&self.frame.read()?).is_sharp() {
+                true => Method::Sweep,
+                false => Method::Network,
+            },
+            (method, _) => method,
+        };
         let made = match (method, &self.ldi) {
             (Method::Network | Method::Seeded, None) => {
                 let (stage, usual) = match method {
@@ -184,10 +194,10 @@ impl Hologram {
                 let method = phasefront::Method::Sweep(sweep);
                 self.by_pipeline("sweep", method, &display, encoding)?
             }
-            (Method::Network | Method::Sweep | Method::Seeded, Some(dir)) => {
-                return Err(Error::file(
-                    dir,
-                    "--method network, sweep and seeded take --rgb and --depth; for a layered depth image use --method layers or points",
+            (Method::Auto, _) | (Method::Network | Method::Sweep | Method::Seeded, Some(_)) => {
+                return Err(Error::Input(
+                    "--method network, sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points"
+                        .into(),
                 ));
             }
             (Method::Layers | Method::Points, source) => {

@@ -1,5 +1,5 @@
 //! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
-//! video are worth, as a table and JSON.
+//! video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
 
 use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
@@ -8,11 +8,13 @@ use phasefront::sweep::Sweep;
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
+use phasefront_lab::sweep_study::{self, DisplayRow};
 use phasefront_lab::{Error, Result, files, flicker, models};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Study how many layers or planes a hologram needs, what refined depth is worth, and how much video flickers
+/// Study how many layers or planes a hologram needs, what the plane sweep's parts and refined depth are worth, and how
+/// much video flickers
 #[derive(Args)]
 pub(crate) struct Study {
     /// What to study
@@ -24,7 +26,7 @@ pub(crate) struct Study {
     /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768
     #[arg(long, value_name = "PX", default_value_t = 384, value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: u16,
-    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192]
+    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays 200]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
     /// Layers of a layered depth image in the study of planes
@@ -35,10 +37,13 @@ pub(crate) struct Study {
     seed: u64,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Folder of what comes out: layers.json and layers.svg, or planes.json and planes.svg
+    /// Folder of what comes out: NAME.json, and NAME.svg of layers, planes and sweep
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
 }
+
+/// Planes of the truth in the studies of the sweep.
+const SWEEP_PLANES: u32 = 200;
 
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum What {
@@ -46,6 +51,10 @@ enum What {
     Layers,
     /// Planes of the volume: 32, 128, 512 and 2048 against 8192 (Fig. 2b)
     Planes,
+    /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, beside exact waves
+    Sweep,
+    /// The plane sweep beside exact waves on other displays
+    Displays,
     /// Holograms of depth that a sensor of 256×192 gave, refined and not, against the truth
     Depth,
     /// How much the picture of a scene that stands still changes from frame to frame, 30 of each scene
@@ -59,13 +68,10 @@ impl Study {
             What::Layers | What::Planes => {}
             What::Depth => return self.depth(json),
             What::Flicker => return self.flicker(json),
+            What::Sweep => return self.sweep(json),
+            What::Displays => return self.displays(json),
         }
-        let scenes = Scenes {
-            scenes: self.scenes.into(),
-            size: self.size.into(),
-            seed: self.seed,
-            display: self.display.read()?.display,
-        };
+        let scenes = self.scenes()?;
         let of_layers = self.what == What::Layers;
         let planes = self.planes.unwrap_or(if of_layers { 256 } else { 8192 }) as usize;
         let work = match of_layers {
@@ -106,6 +112,137 @@ impl Study {
         Ok(())
     }
 
+    fn scenes(&self) -> Result<Scenes> {
+        Ok(Scenes {
+            scenes: self.scenes.into(),
+            size: self.size.into(),
+            seed: self.seed,
+            display: self.display.read()?.display,
+        })
+    }
+
+    fn sweep(&self, json: bool) -> Result<()> {
+        let scenes = self.scenes()?;
+        let planes = self.planes.unwrap_or(SWEEP_PLANES) as usize;
+        let bar = progress_bar(
+            sweep_study::ablation_work(&scenes, planes) as u64,
+            "holograms",
+        );
+        let rows = sweep_study::ablation(&scenes, planes, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "sweep", "planes": planes, "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed,
+            "display": scenes.display, "rows": rows,
+        });
+        self.write_json("sweep", &result)?;
+        self.plot_sweep(&Sweep::for_display(&scenes.display), &rows)?;
+        let mut text = format!(
+            "{:8} {:48}  clean PSNR dB    SSIM  degraded PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
+            "part", "setting", scenes.scenes
+        );
+        for row in &rows {
+            let time = row.ns_per_pixel.map_or("–".into(), |ns| format!("{ns:.1}"));
+            text += &format!(
+                "\n{:8} {:48}  {:13.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
+                row.part,
+                row.setting,
+                row.clean.psnr,
+                row.clean.ssim,
+                row.degraded.psnr,
+                row.degraded.ssim
+            );
+        }
+        super::print(json, &result, text);
+        Ok(())
+    }
+
+    fn plot_sweep(&self, usual: &Sweep, rows: &[sweep_study::Row]) -> Result<()> {
+        type Figure = fn(&sweep_study::Row) -> f64;
+        let curve = |part: &str, here: usize, figure: Figure| {
+            let mut points: Vec<_> = (rows.iter())
+                .filter_map(|row| match row.part {
+                    "usual" => Some((here as i32, figure(row))),
+                    other if other == part => Some((row.value as i32, figure(row))),
+                    _ => None,
+                })
+                .collect();
+            points.sort_unstable_by_key(|(x, _)| *x);
+            points
+        };
+        let clean: Figure = |row| row.clean.psnr;
+        let panel = |title, x, y, points| Panel {
+            title,
+            x,
+            y,
+            points,
+        };
+        plot::write_svg(
+            &self.output.join("sweep.svg"),
+            &[
+                panel(
+                    "planes, clean depth",
+                    "planes",
+                    "PSNR (dB)",
+                    curve("planes", usual.planes, clean),
+                ),
+                panel(
+                    "planes, refined phone depth",
+                    "planes",
+                    "PSNR (dB)",
+                    curve("planes", usual.planes, |row| row.degraded.psnr),
+                ),
+                panel(
+                    "taps, clean depth",
+                    "taps",
+                    "PSNR (dB)",
+                    curve("taps", usual.taps, clean),
+                ),
+                panel(
+                    "hidden layers, clean depth",
+                    "hidden layers",
+                    "PSNR (dB)",
+                    curve("hidden", usual.hidden_layers, clean),
+                ),
+            ],
+        )
+    }
+
+    fn displays(&self, json: bool) -> Result<()> {
+        let scenes = self.scenes()?;
+        let planes = self.planes.unwrap_or(SWEEP_PLANES) as usize;
+        let bar = progress_bar(sweep_study::displays_work(&scenes) as u64, "holograms");
+        let rows = sweep_study::displays(&scenes, planes, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "displays", "planes": planes, "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed,
+            "rows": rows,
+        });
+        self.write_json("displays", &result)?;
+        let mut text = format!(
+            "{:34}  planes × taps  visible, exact  filled, exact  sweep PSNR dB / SSIM   (mean of {} scenes)",
+            "display", scenes.scenes
+        );
+        for row in &rows {
+            let DisplayRow {
+                display,
+                planes,
+                taps,
+                ..
+            } = row;
+            let name = if display.is_empty() { "usual" } else { display };
+            text += &format!(
+                "\n{name:34}  {:>13}  {:14.2}  {:13.2}  {:13.2} / {:.4}",
+                format!("{planes} × {taps}"),
+                row.visible.psnr,
+                row.filled.psnr,
+                row.sweep.psnr,
+                row.sweep.ssim
+            );
+        }
+        super::print(json, &result, text);
+        Ok(())
+    }
+
     fn write_json(&self, name: &str, result: &serde_json::Value) -> Result<()> {
         files::write_atomically(&self.output.join(format!("{name}.json")), |file| {
             serde_json::to_writer_pretty(&mut *file, result)?;
@@ -116,14 +253,12 @@ impl Study {
     fn depth(&self, json: bool) -> Result<()> {
         let display = self.display.read()?.display;
         let planes = self.planes.unwrap_or(256) as usize;
-        let network = models::network("8", true)?;
-        let methods = [
-            ("network".to_owned(), Method::Network(network)),
-            (
-                "sweep".to_owned(),
-                Method::Sweep(Sweep::for_display(&display)),
-            ),
-        ];
+        let sweep = Method::Sweep(Sweep::for_display(&display));
+        let mut methods = vec![("sweep".to_owned(), sweep)];
+        for built in models::BUILT_IN.iter().filter(|built| built.int8) {
+            let method = Method::trained(models::built_in(built)?);
+            methods.push((format!("network {}", built.name), method));
+        }
         let scenes = usize::from(self.scenes);
         let bar = progress_bar(depth_study::work(scenes, methods.len()) as u64, "holograms");
         let rows = depth_study::study(scenes, self.seed, planes, &display, &methods, &|| {
@@ -135,11 +270,12 @@ impl Study {
             "rows": rows,
         });
         self.write_json("depth", &result)?;
-        let mut text = "method    depth                PSNR dB    SSIM   wrong depth".to_owned();
+        let mut text =
+            "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
         for row in &rows {
             let depth = format!("{}, {}", row.degradation, row.depth);
             text += &format!(
-                "\n{:9} {depth:20} {:7.2}  {:.4}  {:9.2} %",
+                "\n{:17} {depth:20} {:7.2}  {:.4}  {:9.2} %",
                 row.method,
                 row.psnr,
                 row.ssim,

@@ -5,9 +5,11 @@
 //! from plane k the way home is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so it makes no
 //! difference to a result which planes were empty and merged.
 
+use super::CARRIED;
 use super::fit::{self, Coefficients};
 use num_complex::Complex64;
 use rustfft::FftPlanner;
+use std::f64::consts::PI;
 
 /// The sum of magnitudes that a merged filter may lose at its ends.
 const TAIL: f64 = 2e-5;
@@ -29,6 +31,8 @@ pub(super) struct Optics {
     pub(super) planes: usize,
     /// From plane 0, the nearest to the viewer, to the hologram.
     pub(super) home_m: f64,
+    /// Whether light of points between planes is carried to theirs.
+    pub(super) between_planes: bool,
 }
 
 impl Optics {
@@ -49,6 +53,9 @@ impl Optics {
 
 /// The filters of one colour.
 pub(super) struct Filters {
+    /// What light gains beside its point, over i, its amplitude and how much deeper in normalized depth the point lies
+    /// than its plane; the point itself loses four times that.
+    pub(super) carry: f32,
     /// H and B, for the oracle.
     pub(super) step: Taps,
     pub(super) home: Taps,
@@ -73,6 +80,7 @@ impl Filters {
             step_m,
             planes,
             home_m,
+            between_planes,
         } = optics;
         let free = |f: f64, distance_m: f64| fit::transfer(f, distance_m, wavelength_m, pitch_m);
         let steps = (planes - 1).max(1);
@@ -106,7 +114,13 @@ impl Filters {
                     .cut((spectrum.iter().zip(&home_spectrum)).map(|(h, b)| h.powu(k as u32) * b)),
             })
             .collect();
+        let per_m = wavelength_m / (4.0 * PI * pitch_m * pitch_m);
+        let volume_m = step_m * planes as f64;
         let mut filters = Filters {
+            carry: match between_planes {
+                true => (CARRIED * per_m * volume_m) as f32,
+                false => 0.0,
+            },
             step: taps(&step),
             home: taps(&home),
             errors,
@@ -137,6 +151,14 @@ impl Filters {
                 .min_by_key(|(_, cost)| *cost)
                 .unwrap_or((0, 0));
             self.before_end.push(before);
+        }
+    }
+
+    /// One step after the other, over gaps and home.
+    pub(super) fn unmerge(&mut self) {
+        self.parts.fill(1);
+        for (k, before) in self.before_end.iter_mut().enumerate() {
+            *before = k;
         }
     }
 
@@ -231,6 +253,7 @@ mod tests {
             step_m: 6e-3 / 24.0,
             planes: 24,
             home_m: -2.9e-3,
+            between_planes: true,
         }
     }
 

@@ -30,6 +30,8 @@ pub fn field(
         let mut plane = Plane::new(height + 2 * border, width + 2 * border);
         for k in (0..sweep.planes).rev() {
             plane.convolve(&filters.step);
+            let middle = (k as f64 + 0.5) / sweep.planes as f64;
+            let mut carried = Vec::new();
             for layer in (0..=sweep.hidden_layers).rev() {
                 for pixel in 0..size {
                     let source = match layer {
@@ -41,9 +43,17 @@ pub fn field(
                     };
                     if plane_of_depth(depth[source], sweep.planes) == k {
                         let (y, x) = (pixel / width + border, pixel % width + border);
-                        plane.values[y * plane.width + x] =
-                            f64::from(rgb[colour * size + source]).into();
+                        let value = f64::from(rgb[colour * size + source]);
+                        plane.values[y * plane.width + x] = value.into();
+                        let behind = f64::from(depth[source]) - middle;
+                        carried.push((y, x, f64::from(filters.carry) * value * behind));
                     }
+                }
+            }
+            for (y, x, light) in carried {
+                plane.values[y * plane.width + x].im -= 4.0 * light;
+                for (y, x) in [(y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)] {
+                    plane.values[y * plane.width + x].im += light;
                 }
             }
         }

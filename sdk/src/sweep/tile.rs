@@ -27,6 +27,8 @@ fn join(a: Span, b: Span) -> Span {
 pub(super) struct Surfaces<'a> {
     /// (3, H, W).
     pub(super) rgb: &'a [f32],
+    /// Normalized, (H, W).
+    pub(super) depth: &'a [f32],
     /// The plane of each pixel, (H, W).
     pub(super) planes: &'a [u16],
     /// Pixels that the hidden layers continue, (layers, H, W).
@@ -103,6 +105,7 @@ impl Layout {
             starts: vec![0; self.halos.len() + 1],
             found: Vec::new(),
             points: Vec::new(),
+            light: vec![0.0; self.stride + 4],
             point_spans: vec![NOWHERE; self.halos.len() * rows],
             lit: vec![NOWHERE; rows],
             wider: vec![NOWHERE; rows],
@@ -145,6 +148,8 @@ pub(super) struct TileScratch {
     starts: Vec<u32>,
     found: Vec<(u16, Points)>,
     points: Vec<Points>,
+    /// What neighbouring points carry to their plane, and two zeros on each side.
+    light: Vec<f32>,
     /// Of each plane, the span of its points in each row.
     point_spans: Vec<Span>,
     /// Where there can be light in each row of the field.
@@ -338,10 +343,10 @@ impl<'a> Tile<'a> {
         else {
             return;
         };
-        self.scatter(colour, at, scratch);
+        self.scatter(colour, at, filters.carry, scratch);
         while let Some(next) = (0..at).rev().find(|k| occupied(&scratch.starts, *k)) {
             at = self.cross(at, next, filters, scratch);
-            self.scatter(colour, at, scratch);
+            self.scatter(colour, at, filters.carry, scratch);
         }
         at = self.cross(at, at - filters.before_end(at), filters, scratch);
         // All of the tile: what is not lit must be filled as well.
@@ -372,8 +377,8 @@ impl<'a> Tile<'a> {
     }
 
     /// Plane `k`'s points replace the field where they are (Eq. 3 and 4): they shine with phase 0 and block what comes
-    /// from behind.
-    fn scatter(&self, colour: usize, k: usize, scratch: &mut TileScratch) {
+    /// from behind. Then the light of those that lie before or behind the plane is carried to it.
+    fn scatter(&self, colour: usize, k: usize, carry: f32, scratch: &mut TileScratch) {
         let size = self.surfaces.planes.len();
         let rgb = &self.surfaces.rgb[colour * size..][..size];
         let points = scratch.starts[k] as usize..scratch.starts[k + 1] as usize;
@@ -390,11 +395,35 @@ impl<'a> Tile<'a> {
             }
         }
         let [re, im] = scratch.field.each_mut().map(Aligned::values);
-        for points in &scratch.points[points] {
+        for points in &scratch.points[points.clone()] {
             let (at, from) = (points.at as usize, points.from as usize);
             let count = usize::from(points.count);
             re[at..at + count].copy_from_slice(&rgb[from..from + count]);
             im[at..at + count].fill(0.0);
+        }
+        if carry == 0.0 {
+            return;
+        }
+        let stride = self.layout.stride;
+        let middle = (k as f32 + 0.5) / self.layout.halos.len() as f32;
+        for points in &scratch.points[points] {
+            let (at, from) = (points.at as usize, points.from as usize);
+            let count = usize::from(points.count);
+            let light = &mut scratch.light[..count + 4];
+            let own = &mut light[2..count + 2];
+            let values = rgb[from..].iter().zip(&self.surfaces.depth[from..]);
+            for (own, (value, depth)) in own.iter_mut().zip(values) {
+                *own = carry * value * (depth - middle);
+            }
+            for row in [at - stride, at + stride] {
+                for (im, own) in im[row..].iter_mut().zip(&*own) {
+                    *im += own;
+                }
+            }
+            light[count + 2..].fill(0.0);
+            for (im, light) in im[at - 1..].iter_mut().zip(light.windows(3)) {
+                *im += light[0] - 4.0 * light[1] + light[2];
+            }
         }
     }
 

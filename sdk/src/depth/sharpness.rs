@@ -1,0 +1,149 @@
+//! How sharp a frame's depth is: what tells whether the plane sweep, which takes every depth at its word, or a network
+//! makes the better hologram of it.
+//!
+//! Rendered depth changes from surface to surface within one pixel, and where the colour does; and on surfaces it is
+//! smooth. Depth that was enlarged ramps over several pixels, that of a camera beside the colour's changes elsewhere,
+//! and sensors have noise.
+
+use crate::frame::RgbdFrame;
+
+/// Depths at the ends of [`WINDOW`] that differ by more are of two surfaces; of the volume.
+const EDGE: f32 = 0.06;
+/// Steps of a window in which an edge is looked for, an odd number.
+const WINDOW: usize = 5;
+/// The part of the window's change that a sharp edge makes in one step.
+const ONE_STEP: f32 = 0.75;
+/// The least share of sharp edges of sharp depth.
+pub const SHARP_EDGES: f32 = 0.6;
+/// The most noise of sharp depth, of the volume.
+pub const SMOOTH: f32 = 1.5e-3;
+
+/// What [`measure`] finds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sharpness {
+    /// Of the edges between surfaces along rows and columns, the share that is one step wide and lies where the colour
+    /// changes most among the five steps around; 1 in a frame without edges.
+    pub edges: f32,
+    /// The noise's standard deviation, of the volume, as the median of second differences along rows tells it.
+    pub noise: f32,
+}
+
+impl Sharpness {
+    /// Whether the depth is so sharp that the plane sweep makes the better hologram: at least [`SHARP_EDGES`], at most
+    /// [`SMOOTH`].
+    pub fn is_sharp(&self) -> bool {
+        self.edges >= SHARP_EDGES && self.noise <= SMOOTH
+    }
+}
+
+/// Measures the depth of `frame`. A frame narrower and lower than six pixels has no edges, one narrower than three no
+/// noise.
+pub fn measure(frame: &RgbdFrame) -> Sharpness {
+    let (height, width) = frame.shape();
+    let (rgb, depth) = frame.values();
+    let size = depth.len();
+    let (mut sharp, mut all) = (0u32, 0u32);
+    for (step, along, across, next) in [(1, width, height, width), (width, height, width, 1)] {
+        for line in 0..across {
+            for i in 0..along.saturating_sub(WINDOW) {
+                let at = line * next + i * step;
+                let whole = (depth[at + WINDOW * step] - depth[at]).abs();
+                if whole <= EDGE {
+                    continue;
+                }
+                let change = |j: usize| {
+                    let (a, b) = (at + j * step, at + (j + 1) * step);
+                    (depth[b] - depth[a]).abs()
+                };
+                let colour = |j: usize| {
+                    let (a, b) = (at + j * step, at + (j + 1) * step);
+                    let planes = (0..3).map(|c| c * size);
+                    planes.map(|c| (rgb[c + b] - rgb[c + a]).abs()).sum::<f32>()
+                };
+                // Each edge is looked at once, where its largest step is in the middle.
+                let middle = change(WINDOW / 2);
+                if (0..WINDOW).any(|j| change(j) > middle) {
+                    continue;
+                }
+                all += 1;
+                if middle >= ONE_STEP * whole {
+                    let here = colour(WINDOW / 2);
+                    sharp += u32::from((0..WINDOW).all(|j| colour(j) <= here));
+                }
+            }
+        }
+    }
+    let edges = match all {
+        0 => 1.0,
+        all => sharp as f32 / all as f32,
+    };
+    Sharpness {
+        edges,
+        noise: noise(depth, width),
+    }
+}
+
+/// The median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the standard deviation of independent normal noise.
+fn noise(depth: &[f32], width: usize) -> f32 {
+    let rows = depth.chunks_exact(width).flat_map(|row| row.windows(3));
+    let mut differences: Vec<f32> = rows.map(|d| (d[0] - 2.0 * d[1] + d[2]).abs()).collect();
+    if differences.is_empty() {
+        return 0.0;
+    }
+    let middle = differences.len() / 2;
+    let (_, median, _) = differences.select_nth_unstable_by(middle, f32::total_cmp);
+    *median / (0.6745 * 6f32.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use ndarray::{Array2, Array3};
+
+    const SIZE: usize = 60;
+
+    /// A square before a wall; its depth is shifted against its colour to the right, ramps over `ramp` pixels, and is
+    /// noisy.
+    fn square(shift: usize, ramp: usize, noise: f32) -> Sharpness {
+        let inside = |y: usize, x: usize| (20..40).contains(&y) && (20..40).contains(&x);
+        let rgb = Array3::from_shape_fn((3, SIZE, SIZE), |(_, y, x)| {
+            // A texture fainter than the edge.
+            0.2 + 0.5 * f32::from(inside(y, x)) + 0.02 * ((x * 7 + y * 3) % 5) as f32
+        });
+        let depth = Array2::from_shape_fn((SIZE, SIZE), |(y, x)| {
+            let around = |at: usize, i: usize| (at + i).saturating_sub(ramp / 2);
+            let places = (0..ramp * ramp).map(|i| (around(y, i / ramp), around(x, i % ramp)));
+            let hits = places.filter(|(y, x)| inside(*y, x.saturating_sub(shift)));
+            let random = ((y * 31 + x * 17 + x * y * 5) % 101) as f32 / 50.0 - 1.0;
+            0.8 - 0.5 * hits.count() as f32 / (ramp * ramp) as f32 + noise * random
+        });
+        measure(&RgbdFrame::new(rgb, depth).unwrap())
+    }
+
+    #[test]
+    fn sharp_depth_is_told_from_ragged_depth() {
+        let sharp = square(0, 1, 0.0);
+        assert!(sharp.edges > 0.9 && sharp.noise == 0.0, "{sharp:?}");
+        assert!(sharp.is_sharp());
+        let [shifted, ramps, noisy] = [square(2, 1, 0.0), square(0, 4, 0.0), square(0, 1, 0.01)];
+        assert!(shifted.edges < 0.6, "{shifted:?}");
+        assert!(ramps.edges < 0.1, "{ramps:?}");
+        // Uniform noise of ±0.01.
+        assert!((0.003..0.01).contains(&noisy.noise), "{noisy:?}");
+        for ragged in [shifted, ramps, noisy] {
+            assert!(!ragged.is_sharp(), "{ragged:?}");
+        }
+    }
+
+    #[test]
+    fn frames_without_edges_are_sharp() {
+        for (height, width) in [(1, 1), (2, 9), (40, 40)] {
+            let depth = Array2::from_elem((height, width), 0.4);
+            let rgb = Array3::from_elem((3, height, width), 0.5);
+            let flat = measure(&RgbdFrame::new(rgb, depth).unwrap());
+            assert_eq!((flat.edges, flat.noise), (1.0, 0.0));
+            assert!(flat.is_sharp());
+        }
+    }
+}
