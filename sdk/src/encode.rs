@@ -18,7 +18,6 @@ use anti_alias::{AntiAlias, AntiAliasScratch};
 use band_limit::BandLimit;
 use deep::{Deep, DeepScratch};
 use num_complex::Complex32;
-use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -221,7 +220,7 @@ impl Encoder {
     }
 
     /// Hands each row of `field`, filtered by what needs some rows alone, and divided by the light, to `then`: its index in
-    /// the stack, its values, and its part of `out`. In the widest vectors that the processor has.
+    /// the stack, its values, and its part of `out`.
     fn rows<T: Send>(
         &self,
         field: &[Complex32],
@@ -252,6 +251,6 @@ impl Encoder {
             .par_chunks_exact(width)
             .zip(out.par_chunks_exact_mut(per_row))
             .enumerate()
-            .for_each(|(row, (values, out))| wide(|| then(row, values, out)));
+            .for_each(|(row, (values, out))| then(row, values, out));
     }
 }

@@ -108,7 +108,6 @@ impl Illumination {
     }
 
     /// [`Self::divide`] for row `row` of a stack of planes of `height` rows.
-    #[inline(always)]
     pub fn divide_row(
         &self,
         values: &mut [Complex32],
@@ -116,7 +115,7 @@ impl Illumination {
         height: usize,
         modulator: (usize, usize),
     ) {
-        self.change_row(values, row, height, modulator, |value, gain| *value *= gain);
+        wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 
     fn each_row(
@@ -129,7 +128,7 @@ impl Illumination {
         assert_eq!(field.len(), 3 * height * width);
         let lines = field.par_chunks_exact_mut(width).enumerate();
         lines.for_each(|(row, values)| {
-            wide(|| self.change_row(values, row, height, modulator, &change));
+            wide!(self.change_row(values, row, height, modulator, &change));
         });
     }
 

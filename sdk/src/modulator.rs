@@ -224,7 +224,7 @@ pub fn remove_mean_phase(field: &mut [Complex32]) {
         let turn = Complex64::from_polar(1.0, -sum(plane).arg());
         let turn = Complex32::new(turn.re as f32, turn.im as f32);
         plane.par_chunks_mut(PART).for_each(|part| {
-            wide(|| {
+            wide!({
                 for value in part {
                     *value *= turn;
                 }
@@ -244,7 +244,7 @@ fn sum(values: &[Complex32]) -> Complex64 {
         return first + second;
     }
     const LANES: usize = 16;
-    wide(|| {
+    wide!({
         let (runs, rest) = values.as_chunks::<LANES>();
         let mut sums = [Complex32::ZERO; LANES];
         for run in runs {

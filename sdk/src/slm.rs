@@ -5,6 +5,7 @@ pub mod per_pixel;
 
 use crate::error::{Error, Result};
 use per_pixel::PerPixel;
+use phasefront_kernels::wide;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
@@ -147,16 +148,17 @@ impl Response {
 /// If the lengths differ.
 pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {
     assert_eq!(phases.len(), words.len());
-    for (word, phase) in words.iter_mut().zip(phases) {
+    wide!(for (word, phase) in words.iter_mut().zip(phases) {
         *word = step(*phase, 1 << bits) as u16;
-    }
+    });
 }
 
 /// round(φ/2π·n) mod n, for n a power of two up to 65536.
 #[inline(always)]
 fn step(phase: f32, n: i32) -> usize {
-    // Phases are not negative, so the conversion's truncation is the floor.
-    ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize
+    // From 2²³ on a number's low bits are the integer that it is; a conversion that saturates would not vectorise.
+    let rounded = (phase * (n as f32 / TAU) + 0.5).floor();
+    ((rounded + 8_388_608.0).to_bits() & (n as u32 - 1)) as usize
 }
 
 #[cfg(test)]

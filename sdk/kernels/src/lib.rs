@@ -6,7 +6,7 @@
 //!
 //! [`int8`] defines the quantised chain's arithmetic so that every instruction set gives the same bits; [`f32`](mod@f32)
 //! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
-//! against. `unsafe` lives in those files, and in two that serve the optics: [`wide`] runs plain loops in the widest
+//! against. `unsafe` lives in those files, and in two that serve the optics: [`wide!`] runs plain loops in the widest
 //! vectors, [`each_tile_rows`] lets threads fill a plane whose tiles lie column by column.
 //!
 //! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
@@ -46,7 +46,7 @@ pub use isa::Isa;
 pub use peak::{f32_peak, int8_peak};
 pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
 pub use wavefront::{Band, Rows, Scratch, Tiling};
-pub use wide::wide;
+pub use wide::{has_avx2, has_avx512, in_avx2, in_avx512};
 
 /// Planes of a hologram network's output: two a colour.
 pub const OUTPUTS: usize = 6;

@@ -75,18 +75,20 @@ impl AntiAlias {
                 let mut next = first.saturating_sub(half);
                 for (i, out) in out.chunks_exact_mut(per_row).enumerate() {
                     let y = first + i;
-                    wide(|| {
+                    wide!({
                         while next <= (y + half).min(height - 1) {
                             let ring = &mut ring[next % count * width..][..width];
                             self.blur_row(&plane[next * width..][..width], ring);
                             next += 1;
                         }
                         let row = |y: usize| &ring[y % count * width..][..width];
+                        // Here, for a store to the row could change what is read anew in each turn.
+                        let tap = self.taps[0];
                         let centre = values(row(y));
                         for (to, from) in values_mut(blurred).iter_mut().zip(centre) {
-                            *to = from * self.taps[0];
+                            *to = from * tap;
                         }
-                        for (i, tap) in self.taps.iter().enumerate().skip(1) {
+                        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
                             let up = values(row(y.saturating_sub(i)));
                             let down = values(row((y + i).min(height - 1)));
                             let sums = values_mut(blurred).iter_mut();
@@ -94,8 +96,8 @@ impl AntiAlias {
                                 *to += (up + down) * tap;
                             }
                         }
-                        then(y, blurred, out);
                     });
+                    then(y, blurred, out);
                 }
             });
     }
@@ -136,10 +138,11 @@ impl AntiAlias {
         }
         let part = |from: usize| values(&row[from..][..inner.len()]);
         let out = values_mut(&mut out[inner.clone()]);
+        let tap = self.taps[0];
         for (to, from) in out.iter_mut().zip(part(half)) {
-            *to = from * self.taps[0];
+            *to = from * tap;
         }
-        for (i, tap) in self.taps.iter().enumerate().skip(1) {
+        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
             let sums = out.iter_mut().zip(part(half - i)).zip(part(half + i));
             for ((to, left), right) in sums {
                 *to += (left + right) * tap;

@@ -3,6 +3,7 @@
 
 use crate::slm::Response;
 use num_complex::Complex32;
+use phasefront_kernels::wide;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// The two phases of one value at pixel (x, y): φ + acos A where x + y is even, φ − acos A where it is
@@ -31,8 +32,12 @@ pub fn wrap(phase: f32) -> f32 {
 }
 
 /// The largest |u|² of a row, 0 for an empty one.
-#[inline(always)]
 pub fn max_norm_sqr(row: &[Complex32]) -> f32 {
+    wide!(largest(row))
+}
+
+#[inline(always)]
+fn largest(row: &[Complex32]) -> f32 {
     // Several maxima side by side, so that it vectorises.
     let (runs, rest) = row.as_chunks::<16>();
     let mut most = [0.0f32; 16];
@@ -46,8 +51,13 @@ pub fn max_norm_sqr(row: &[Complex32]) -> f32 {
 }
 
 /// [`encode_value`] on row `y` of a plane, to 1e-5 rad.
-#[inline(always)]
 pub fn encode_row(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
+    wide!(encode_run(values, y, scale, phases));
+}
+
+/// A run of row `y` that begins in an even column.
+#[inline(always)]
+fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
     let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
     // The sign of acos, on the two colours of the checkerboard.
     let sign = if y.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -66,7 +76,6 @@ pub fn encode_row(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]
 
 /// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first` of
 /// the stack (3, H, W).
-#[inline(always)]
 pub fn encode_row_levels(
     values: &[Complex32],
     y: usize,
@@ -77,13 +86,15 @@ pub fn encode_row_levels(
 ) {
     /// Even, so that each run starts on the colour of the checkerboard that its row starts on.
     const RUN: usize = 256;
-    let mut phases = [0.0; RUN];
-    let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
-    for (run, (values, levels)) in runs.enumerate() {
-        let phases = &mut phases[..values.len()];
-        encode_row(values, y, scale, phases);
-        response.levels(phases, first + run * RUN, levels);
-    }
+    wide!({
+        let mut phases = [0.0; RUN];
+        let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
+        for (run, (values, levels)) in runs.enumerate() {
+            let phases = &mut phases[..values.len()];
+            encode_run(values, y, scale, phases);
+            response.levels(phases, first + run * RUN, levels);
+        }
+    });
 }
 
 /// One value's phase; without branches, so that loops over it vectorise.

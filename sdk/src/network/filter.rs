@@ -99,7 +99,7 @@ impl Rows<3> for InPlace<'_> {
                     &self.borders[rows * self.width + from..][..count]
                 }
             };
-            wide(|| {
+            wide!({
                 for ((re, im), value) in re.iter_mut().zip(im).zip(values) {
                     (*re, *im) = (value.re, value.im);
                 }
@@ -115,7 +115,7 @@ impl Rows<3> for InPlace<'_> {
         band: &mut Band<'_, Complex32, 3>,
     ) {
         let field = band.rows_mut(row, from, values[0].len());
-        wide(|| {
+        wide!({
             if self.tanh {
                 tanh(&mut values);
             }

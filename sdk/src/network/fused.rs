@@ -73,7 +73,7 @@ impl FusedChain {
             const CHUNK: usize = 1 << 14;
             output
                 .par_chunks_mut(CHUNK)
-                .for_each(|chunk| wide(|| tanh(&mut [chunk])));
+                .for_each(|chunk| wide!(tanh(&mut [chunk])));
         }
     }
 
@@ -147,7 +147,7 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
 
     fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, 3>, into: &mut [f32]) {
         let count = into.len() / self.kind.channels();
-        wide(|| {
+        wide!({
             for (plane, into) in into.chunks_exact_mut(count).enumerate() {
                 self.source.read(plane, row, from, into);
             }
@@ -165,7 +165,7 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
         let base = |plane: usize, at: usize, into: &mut [f32]| {
             self.source.read(plane, row, from + at, into);
         };
-        wide(|| {
+        wide!({
             if self.tanh {
                 tanh(&mut values);
             }

@@ -71,7 +71,7 @@ impl Head {
             let base = |plane: usize, from: usize, into: &mut [f32]| {
                 into.copy_from_slice(&input[plane * area + at + from..][..into.len()]);
             };
-            wide(|| self.row(kind, values, base, [red, green, blue]));
+            wide!(self.row(kind, values, base, [red, green, blue]));
         });
         Ok(())
     }

@@ -14,6 +14,7 @@ use super::fft::{ConvolveScratch, Fft2, fast_size};
 use super::zernike::Aberration;
 use crate::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -186,8 +187,12 @@ impl Transfer {
     }
 
     /// Multiplies column `x` of a spectrum by the transfer function.
-    #[inline(always)]
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
+        wide!(self.multiply(x, column));
+    }
+
+    #[inline(always)]
+    fn multiply(&self, x: usize, column: &mut [Complex32]) {
         if !self.even {
             let factors = &self.factors[x * self.padded_height..][..self.padded_height];
             for (value, factor) in column.iter_mut().zip(factors) {

@@ -198,7 +198,7 @@ impl Fft2 {
                     row[width..].fill(zero);
                     forward.process_with_scratch(row, work);
                 }
-                wide(|| {
+                wide!({
                     for column in 0..tile_columns {
                         let tile = tiles.tile(tile_row, column);
                         turn(rows, padded_width, column * TILE, tile);
@@ -223,15 +223,17 @@ impl Fft2 {
                         }
                         let (frame, padding) = column.split_at_mut(height);
                         let tiles = tiles.chunks_exact(TILE_VALUES);
-                        for (run, tile) in frame.chunks_mut(TILE).zip(tiles) {
-                            run.copy_from_slice(&tile[k * TILE..][..run.len()]);
-                        }
+                        wide!(
+                            for (run, tile) in frame.chunks_mut(TILE).zip(tiles.clone()) {
+                                copy_run(&tile[k * TILE..], run);
+                            }
+                        );
                         padding.fill(zero);
                         column_forward.process_with_scratch(column, work);
-                        wide(|| filter(first + k, column));
+                        filter(first + k, column);
                         column_inverse.process_with_scratch(column, work);
                     }
-                    wide(|| {
+                    wide!({
                         for (tile_row, tile) in tiles.chunks_exact_mut(TILE_VALUES).enumerate() {
                             turn(columns, padded_height, tile_row * TILE, tile);
                         }
@@ -250,10 +252,11 @@ impl Fft2 {
                     let tile_row = part * part_rows + i;
                     for (k, out) in plane.chunks_exact_mut(width).enumerate() {
                         let row = &mut rows[k * padded_width..][..padded_width];
-                        for (column, run) in row.chunks_mut(TILE).enumerate() {
-                            let at = (column * tile_rows + tile_row) * TILE_VALUES + k * TILE;
-                            run.copy_from_slice(&tiles[at..][..run.len()]);
-                        }
+                        let tiles = tiles.chunks_exact(TILE_VALUES).skip(tile_row);
+                        let tiles = tiles.step_by(tile_rows);
+                        wide!(for (run, tile) in row.chunks_mut(TILE).zip(tiles.clone()) {
+                            copy_run(&tile[k * TILE..], run);
+                        });
                         inverse.process_with_scratch(row, work);
                         out.copy_from_slice(&row[..width]);
                     }
@@ -425,6 +428,15 @@ impl Fft2 {
                     }
                 }
             });
+    }
+}
+
+/// Copies the first values of `from`: a whole run of a tile without a call.
+#[inline(always)]
+fn copy_run(from: &[Complex32], to: &mut [Complex32]) {
+    match (from.first_chunk::<TILE>(), to.first_chunk_mut::<TILE>()) {
+        (Some(from), Some(to)) => *to = *from,
+        _ => to.copy_from_slice(&from[..to.len()]),
     }
 }
 
