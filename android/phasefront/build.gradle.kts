@@ -76,6 +76,8 @@ tasks.named("preBuild") { dependsOn(generateKotlin) }
 dependencies {
     api(libs.coroutines)
     implementation("${libs.jna.get()}@aar")
+    // Of the generated Kotlin.
+    compileOnly(libs.annotation)
 }
 
 mavenPublishing {

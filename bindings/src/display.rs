@@ -77,11 +77,13 @@ impl TryFrom<&Display> for phasefront::Display {
             offset_mm,
             bits,
         } = display;
-        // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same.
-        Ok(phasefront::Display::from_toml(&format!(
+        // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same, all but the
+        // case of NaN.
+        let toml = format!(
             "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = [{red_nm:?}, {green_nm:?}, {blue_nm:?}]\n\
              volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}"
-        ))?)
+        );
+        Ok(phasefront::Display::from_toml(&toml.to_lowercase())?)
     }
 }
 
@@ -100,7 +102,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "NaN is refused by the TOML reader before the display sees it"]
     fn impossible_displays_are_named() {
         let good = display_from_toml(String::new()).unwrap();
         for (bad, word) in [

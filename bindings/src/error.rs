@@ -41,7 +41,7 @@ impl From<phasefront::Error> for PhasefrontError {
             Error::Timestamp { .. } => PhasefrontError::Timestamp,
             Error::Plan(_) => PhasefrontError::Setting,
             Error::Network(_) => PhasefrontError::Network,
-            Error::Session(_) => PhasefrontError::Session,
+            Error::Session(_) | Error::Lost(_) => PhasefrontError::Session,
             _ => PhasefrontError::Internal,
         };
         kind(error.to_string())

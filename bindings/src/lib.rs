@@ -8,6 +8,7 @@
 //! - Every call gives a result; a panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
+mod calibration;
 mod display;
 mod error;
 mod frame;
@@ -18,6 +19,7 @@ mod options;
 mod session;
 mod statistics;
 
+pub use calibration::CalibratedDisplay;
 pub use display::{Display, display_from_toml};
 pub use error::PhasefrontError;
 pub use frame::{
@@ -28,7 +30,7 @@ pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{Network, NetworkInfo};
 pub use options::{
-    Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
+    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
     RunningMode, SessionOptions, Thermal,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};

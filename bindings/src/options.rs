@@ -1,5 +1,6 @@
 //! What a session makes, and how.
 
+use crate::calibration::CalibratedDisplay;
 use crate::display::Display;
 use crate::error::PhasefrontError;
 use crate::network::Network;
@@ -22,7 +23,7 @@ pub enum RunningMode {
 }
 
 /// How the field becomes phases.
-#[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
+#[derive(Debug, Clone, uniffi::Enum)]
 pub enum Encoding {
     /// Double phase on the field as it is.
     DoublePhase,
@@ -37,6 +38,11 @@ pub enum Encoding {
     BandLimit {
         /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel; 1 as published.
         k: f32,
+    },
+    /// A pre-filter network first (DDPM), trained for the display's offset together with the hologram network.
+    Deep {
+        /// The pre-filter.
+        prefilter: Arc<Network>,
     },
 }
 
@@ -129,6 +135,16 @@ pub enum Thermal {
     Critical,
 }
 
+/// Where frames are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
+pub enum Backend {
+    /// On the CPU.
+    Cpu,
+    /// On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
+    /// The statistics' `backend` and `backend_why` say which it is, and why.
+    Gpu,
+}
+
 /// What a session makes, and how.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
@@ -152,6 +168,12 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with; none for as many as the device has.
     pub threads: Option<u32>,
+    /// The display's calibration, which brings its own response.
+    #[uniffi(default = None)]
+    pub calibration: Option<Arc<CalibratedDisplay>>,
+    /// Where frames are computed; none for the CPU.
+    #[uniffi(default = None)]
+    pub backend: Option<Backend>,
 }
 
 /// How the levels of the colours lie in images for a modulator's driver.
@@ -224,18 +246,36 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
                 method: method(rung),
                 height: rung.height as usize,
                 width: rung.width as usize,
+                backend: None,
             })
             .collect();
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
-        to.encoding = match options.encoding {
+        to.encoding = match &options.encoding {
             Encoding::DoublePhase => encode::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => encode::Encoding::AntiAlias {
-                sigma,
-                width: width as usize,
+                sigma: *sigma,
+                width: *width as usize,
             },
-            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k },
+            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k: *k },
+            Encoding::Deep { prefilter } => encode::Encoding::Deep(prefilter.core.clone()),
         };
+        if let Some(calibrated) = &options.calibration {
+            let core = &calibrated.core;
+            if Display::from(core.display.clone()) != options.display {
+                return Err(PhasefrontError::Setting(
+                    "the calibration is another display's; give the session the one that the calibration holds".into(),
+                ));
+            }
+            if options.response != Response::Linear {
+                return Err(PhasefrontError::Setting(
+                    "the calibration brings its own response; leave the other linear".into(),
+                ));
+            }
+            to.response = core.response.clone();
+            to.illumination = core.illumination.clone();
+            to.correction = core.correction;
+        }
         if let Response::Lut { levels } = &options.response {
             let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {
                 PhasefrontError::Setting(format!(
@@ -255,6 +295,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             DepthRange::Fixed { near_m, far_m } => range::DepthRange::Fixed { near_m, far_m },
         };
         to.depth.least_confidence = options.least_confidence;
+        to.backend = match options.backend {
+            None | Some(Backend::Cpu) => session::Backend::Cpu,
+            Some(Backend::Gpu) => session::Backend::Gpu,
+        };
         to.threads = match options.threads {
             None => None,
             Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {

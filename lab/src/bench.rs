@@ -2,6 +2,7 @@
 //! machine's own peak measured in the same run.
 
 pub mod gpu;
+pub mod random;
 
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3};
@@ -9,9 +10,11 @@ use num_complex::Complex32;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::network::{Precision, f32_peak, int8_peak};
 use phasefront::slm::Response;
-use phasefront::{Display, Method, Pipeline, RgbdFrame};
+use phasefront::slm::per_pixel::PerPixel;
+use phasefront::{Display, Method, Modulator, Network, Pipeline, RgbdFrame};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How long the peak is measured.
@@ -26,6 +29,10 @@ pub struct Case<'a> {
     pub size: (usize, usize),
     /// Threads of the pool.
     pub threads: usize,
+    /// A per-pixel table, if what it costs shall be measured: each frame is encoded once more, through it.
+    pub table: Option<&'a Arc<PerPixel>>,
+    /// The pre-filter of the deep encoding; AA-DPM without.
+    pub prefilter: Option<&'a Arc<Network>>,
 }
 
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
@@ -47,12 +54,18 @@ pub struct Row {
     pub height: usize,
     /// Threads of the pool.
     pub threads: usize,
+    /// z of the modulator against the midpoint, mm.
+    pub offset_mm: f64,
+    /// `anti-alias` or `deep`.
+    pub encoder: &'static str,
     /// Each stage's median.
     pub stage_ms: BTreeMap<&'static str, f64>,
     /// The median of whole frames.
     pub total_ms: f64,
     /// The fastest and the slowest frame.
     pub spread_ms: [f64; 2],
+    /// What encoding through the per-pixel table takes longer than through none, of the whole frame, where there is one.
+    pub table_percent: Option<f64>,
     /// Frames that were measured.
     pub frames: usize,
     /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
@@ -116,31 +129,45 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         case.method.clone(),
         display,
-        Encoding::ANTI_ALIAS,
+        match case.prefilter {
+            Some(network) => Encoding::Deep(network.clone()),
+            None => Encoding::ANTI_ALIAS,
+        },
         Scale::Fixed(1.0),
         Response::linear(display.bits())?,
     )?;
+    let by_table = (case.table)
+        .map(|table| {
+            let response = Response::PerPixel(table.clone());
+            let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Fixed(1.0));
+            Modulator::new(height, width, display, encoding, scale, response)
+        })
+        .transpose()?;
+    let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
     let frame = test_frame(height, width)?;
     let mut scratch = pipeline.scratch();
     let mut field = vec![Complex32::ZERO; 3 * height * width];
     let mut levels = vec![0; 3 * height * width];
     let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    let mut totals = Vec::new();
+    let (mut totals, mut table_encode) = (Vec::new(), Vec::new());
     pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
     let start = Instant::now();
     while totals.len() < 5 || start.elapsed() < budget {
-        let times = pipeline
-            .process(&frame, &mut field, &mut levels, &mut scratch)?
-            .times;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
-        for (stage, time) in [
-            (name, times.method),
-            ("propagate", times.propagate),
-            ("encode", times.encode),
-        ] {
+        let (method, propagate) = pipeline.field(&frame, &mut field, &mut scratch)?;
+        if let Some((scratch, plan)) = &mut by_table {
+            // The encoder's filter changes the field.
+            let mut field = field.clone();
+            let modulation = plan.modulate(&mut field, &mut levels, scratch);
+            table_encode.push(ms(modulation.encode));
+        }
+        let encode = pipeline
+            .modulate(&mut field, &mut levels, &mut scratch)
+            .encode;
+        for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
             stages.entry(stage).or_default().push(ms(time));
         }
-        totals.push(ms(times.total()));
+        totals.push(ms(method + propagate + encode));
     }
     let stage_ms: BTreeMap<_, _> = (stages.into_iter())
         .map(|(stage, mut times)| (stage, median(&mut times)))
@@ -168,9 +195,16 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         height,
         threads: case.threads,
-        stage_ms,
+        offset_mm: display.offset_m() * 1e3,
+        encoder: match case.prefilter {
+            Some(_) => "deep",
+            None => "anti-alias",
+        },
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],
+        table_percent: (!table_encode.is_empty())
+            .then(|| 100.0 * (median(&mut table_encode) - stage_ms["encode"]) / total_ms),
+        stage_ms,
         frames: totals.len(),
         gmac_per_s,
         peak_percent: peak

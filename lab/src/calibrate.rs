@@ -19,6 +19,7 @@ pub mod photograph;
 pub mod rehearse;
 pub mod report;
 pub mod spot;
+pub mod surface;
 pub mod table;
 
 /// The names of the three colours, in their order: the folders of their photographs.

@@ -731,3 +731,64 @@ fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
         &["take --rgb and --depth"],
     );
 }
+
+#[test]
+fn a_pre_filter_belongs_to_the_deep_encoder() {
+    let folder = Folder::new().with_frame();
+    let hologram_network = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/rgbd-8.onnx");
+    let deep = with(&["-o", "h.png", "--encoder", "deep"]);
+    folder.refuses(&deep, 1, &["--prefilter"]);
+    let pair = ["--prefilter", hologram_network];
+    folder.refuses(&[&deep[..], &pair].concat(), 1, &["'field'", "'rgbd'"]);
+    let other = with(&["-o", "h.png", "--encoder", "double"]);
+    folder.refuses(&[&other[..], &pair].concat(), 1, &["--encoder deep"]);
+    assert!(!folder.path("h.png").exists());
+}
+
+#[test]
+fn the_bench_measures_every_stage_and_draws_it() {
+    let folder = Folder::new();
+    let bench = [
+        "bench",
+        "--layers",
+        "8",
+        "--precision",
+        "int8",
+        "--size",
+        "40x30",
+        "--threads",
+        "1",
+    ];
+    let more = [
+        "--seconds",
+        "0",
+        "--offset-mm",
+        "2",
+        "--plot",
+        "bars.svg",
+        "--json",
+    ];
+    let text = folder.succeeds(&[&bench[..], &more].concat());
+    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let row = &value["rows"][0];
+    assert_eq!(
+        (row["width"].as_u64(), row["height"].as_u64()),
+        (Some(40), Some(30))
+    );
+    assert_eq!(
+        (row["encoder"].as_str(), row["offset_mm"].as_f64()),
+        (Some("anti-alias"), Some(2.0))
+    );
+    assert!(
+        ["network", "propagate", "encode"]
+            .iter()
+            .all(|stage| row["stage_ms"][stage].as_f64() > Some(0.0))
+    );
+    let picture = std::fs::read_to_string(folder.path("bars.svg")).unwrap();
+    assert!(picture.starts_with("<svg") && picture.contains("8 layers int8 40×30, 1 thr."));
+    folder.refuses(
+        &[&bench[..], &["--plot", "bars.png"]].concat(),
+        1,
+        &[".svg"],
+    );
+}

@@ -13,11 +13,13 @@ use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::network::Network;
 use crate::slm::Response;
-use crate::wave::fft::Scratch;
+use crate::wave::fft::ConvolveScratch;
 use anti_alias::{AntiAlias, AntiAliasScratch};
 use band_limit::BandLimit;
 use deep::{Deep, DeepScratch};
 use num_complex::Complex32;
+use phasefront_kernels::wide;
+use rayon::prelude::*;
 use std::sync::Arc;
 
 /// A way from a field to phases.
@@ -78,11 +80,15 @@ enum Prefilter {
 }
 
 /// Working memory of an [`Encoder`] for one call at a time.
-pub struct EncoderScratch(Option<PrefilterScratch>);
+pub struct EncoderScratch {
+    prefilter: Option<PrefilterScratch>,
+    /// The largest |u|² of each row.
+    most: Vec<f32>,
+}
 
 enum PrefilterScratch {
     AntiAlias(AntiAliasScratch),
-    Spectrum(Scratch),
+    Spectrum(ConvolveScratch),
     Deep(DeepScratch),
 }
 
@@ -126,18 +132,23 @@ impl Encoder {
 
     /// Working memory for one call at a time.
     pub fn scratch(&self) -> EncoderScratch {
-        EncoderScratch(match &self.prefilter {
+        let prefilter = match &self.prefilter {
             Prefilter::None => None,
             Prefilter::AntiAlias(plan) => {
                 Some(PrefilterScratch::AntiAlias(plan.scratch(self.width)))
             }
             Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
             Prefilter::Deep(plan) => Some(PrefilterScratch::Deep(plan.scratch())),
-        })
+        };
+        EncoderScratch {
+            prefilter,
+            most: vec![0.0; 3 * self.height],
+        }
     }
 
     /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it
-    /// used: the amplitude that full light stands for. `field` is left filtered. Allocates nothing.
+    /// used: the amplitude that full light stands for. `field` is worked on: what it holds afterwards means nothing.
+    /// Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `phase` has not 3·H·W values.
@@ -148,9 +159,10 @@ impl Encoder {
         phase: &mut [f32],
         scratch: &mut EncoderScratch,
     ) -> f32 {
-        assert_eq!(phase.len(), 3 * self.height * self.width);
-        let scale = self.filter(field, scale, scratch);
-        double_phase::encode(field, self.width, self.height * self.width, scale, phase);
+        let scale = self.prepare(field, scale, scratch);
+        self.rows(field, phase, scratch, |row, values, phases| {
+            double_phase::encode_row(values, row % self.height, scale, phases);
+        });
         scale
     }
 
@@ -166,39 +178,80 @@ impl Encoder {
         levels: &mut [u8],
         scratch: &mut EncoderScratch,
     ) -> f32 {
-        let plane = self.height * self.width;
-        assert_eq!(levels.len(), 3 * plane);
-        let scale = self.filter(field, scale, scratch);
-        double_phase::encode_levels(field, self.width, plane, scale, response, levels);
+        let scale = self.prepare(field, scale, scratch);
+        self.rows(field, levels, scratch, |row, values, levels| {
+            let (y, first) = (row % self.height, row * self.width);
+            double_phase::encode_row_levels(values, y, scale, response, first, levels);
+        });
         scale
     }
 
-    /// What is done to the field before double phase; gives the scale.
-    fn filter(&self, field: &mut [Complex32], scale: Scale, scratch: &mut EncoderScratch) -> f32 {
+    /// The filters that need the whole field at once, the light where no filter by rows comes after it, and the scale.
+    fn prepare(&self, field: &mut [Complex32], scale: Scale, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), 3 * plane);
-        if let (Prefilter::Deep(plan), Some(PrefilterScratch::Deep(scratch))) =
-            (&self.prefilter, &mut scratch.0)
-        {
-            plan.filter(field, scratch);
-        }
-        for plane in field.chunks_exact_mut(plane) {
-            match (&self.prefilter, &mut scratch.0) {
-                (Prefilter::AntiAlias(plan), Some(PrefilterScratch::AntiAlias(rows))) => {
-                    plan.filter(plane, self.width, rows);
-                }
-                (Prefilter::BandLimit(plan), Some(PrefilterScratch::Spectrum(scratch))) => {
+        match (&self.prefilter, &mut scratch.prefilter) {
+            (Prefilter::BandLimit(plan), Some(PrefilterScratch::Spectrum(scratch))) => {
+                for plane in field.chunks_exact_mut(plane) {
                     plan.filter(plane, scratch);
                 }
-                _ => {}
             }
+            (Prefilter::Deep(plan), Some(PrefilterScratch::Deep(scratch))) => {
+                plan.filter(field, scratch);
+            }
+            _ => {}
         }
-        if let Some((illumination, modulator)) = &self.illumination {
+        if let Some((illumination, modulator)) = &self.illumination
+            && !matches!(self.prefilter, Prefilter::AntiAlias(_))
+        {
             illumination.divide(field, (self.height, self.width), *modulator);
         }
         match scale {
-            Scale::Max => double_phase::max_amplitude(field),
             Scale::Fixed(scale) => scale,
+            Scale::Max => {
+                let mut most = std::mem::take(&mut scratch.most);
+                self.rows(field, &mut most, scratch, |_, values, most| {
+                    most[0] = double_phase::max_norm_sqr(values);
+                });
+                let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
+                scratch.most = most;
+                scale
+            }
         }
+    }
+
+    /// Hands each row of `field`, filtered by what needs some rows alone, and divided by the light, to `then`: its index in
+    /// the stack, its values, and its part of `out`. In the widest vectors that the processor has.
+    fn rows<T: Send>(
+        &self,
+        field: &[Complex32],
+        out: &mut [T],
+        scratch: &mut EncoderScratch,
+        then: impl Fn(usize, &[Complex32], &mut [T]) + Sync,
+    ) {
+        let (height, width) = (self.height, self.width);
+        let per_row = out.len() / (3 * height);
+        assert!(out.len() == 3 * height * per_row && (per_row == 1 || per_row == width));
+        if let (Prefilter::AntiAlias(plan), Some(PrefilterScratch::AntiAlias(scratch))) =
+            (&self.prefilter, &mut scratch.prefilter)
+        {
+            let planes = field.chunks_exact(height * width);
+            let outs = out.chunks_exact_mut(height * per_row);
+            for (colour, (plane, out)) in planes.zip(outs).enumerate() {
+                plan.rows(plane, width, out, scratch, |y, values, out| {
+                    let row = colour * height + y;
+                    if let Some((illumination, modulator)) = &self.illumination {
+                        illumination.divide_row(values, row, height, *modulator);
+                    }
+                    then(row, values, out);
+                });
+            }
+            return;
+        }
+        field
+            .par_chunks_exact(width)
+            .zip(out.par_chunks_exact_mut(per_row))
+            .enumerate()
+            .for_each(|(row, (values, out))| wide(|| then(row, values, out)));
     }
 }

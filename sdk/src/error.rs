@@ -29,6 +29,9 @@ pub enum Error {
         /// The last one that was taken.
         last_ns: u64,
     },
+    /// A frame that went with the GPU that was computing it. What follows is not harmed.
+    #[error("{0}")]
+    Lost(String),
     /// A panic inside; a fault of this library. The frame is lost, the session goes on.
     #[error("internal error: {0}; please report it")]
     Internal(String),

@@ -133,6 +133,7 @@ impl RgbdFrame {
 /// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
 /// [`crate::network::InputKind::RgbdXy`], the place in the frame.
 impl Source for RgbdFrame {
+    #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let (height, width) = self.shape();
         let place = |at: usize, n: usize| (at as f32 + 0.5) / n as f32 - 0.5;

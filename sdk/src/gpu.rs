@@ -30,6 +30,7 @@
 //! }
 //! ```
 
+mod brightness;
 mod chain;
 mod device;
 mod encode;
@@ -40,7 +41,9 @@ mod pipeline;
 mod preview;
 mod probe;
 mod renderer;
+mod watch;
 
+pub use crate::brightness::{Brightness, Past};
 pub use chain::{ChainOptions, Float, Fusion, NetworkPlan};
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};

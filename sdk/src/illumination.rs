@@ -7,6 +7,7 @@
 use crate::error::{Error, Result};
 use ndarray::{ArrayView3, Axis};
 use num_complex::Complex32;
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// The most that a value is brightened: light below a tenth of the brightest is taken as that.
@@ -106,6 +107,18 @@ impl Illumination {
         self.each_row(field, shape, modulator, |value, gain| *value /= gain);
     }
 
+    /// [`Self::divide`] for row `row` of a stack of planes of `height` rows.
+    #[inline(always)]
+    pub fn divide_row(
+        &self,
+        values: &mut [Complex32],
+        row: usize,
+        height: usize,
+        modulator: (usize, usize),
+    ) {
+        self.change_row(values, row, height, modulator, |value, gain| *value *= gain);
+    }
+
     fn each_row(
         &self,
         field: &mut [Complex32],
@@ -114,30 +127,47 @@ impl Illumination {
         change: impl Fn(&mut Complex32, f32) + Sync,
     ) {
         assert_eq!(field.len(), 3 * height * width);
-        let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));
-        let (top, left) = ((rows - height) / 2, (columns - width) / 2);
         let lines = field.par_chunks_exact_mut(width).enumerate();
         lines.for_each(|(row, values)| {
-            let (colour, y) = (row / height, row % height + top);
-            let (i, fy) = split(y, rows, self.nodes.0);
-            let mut at = 0;
-            while at < width {
-                // All pixels that lie between the same two nodes.
-                let (j, _) = split(at + left, columns, self.nodes.1);
-                let (near, far) = (
-                    self.column(colour, i, j, fy),
-                    self.column(colour, i, j + 1, fy),
-                );
-                while at < width {
-                    let (k, fx) = split(at + left, columns, self.nodes.1);
-                    if k != j {
-                        break;
-                    }
-                    change(&mut values[at], near + (far - near) * fx);
-                    at += 1;
-                }
-            }
+            wide(|| self.change_row(values, row, height, modulator, &change));
         });
+    }
+
+    #[inline(always)]
+    fn change_row(
+        &self,
+        mut values: &mut [Complex32],
+        row: usize,
+        height: usize,
+        modulator: (usize, usize),
+        change: impl Fn(&mut Complex32, f32),
+    ) {
+        let width = values.len();
+        let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));
+        let (top, left) = ((rows - height) / 2, (columns - width) / 2);
+        let (i, fy) = split(row % height + top, rows, self.nodes.0);
+        let (colour, end) = (row / height, left + width);
+        let (spans, steps) = (self.nodes.1 - 1, (columns - 1).max(1));
+        let mut at = left;
+        while at < end {
+            // All pixels that lie between the same two nodes.
+            let (j, _) = split(at, columns, self.nodes.1);
+            let next = match j + 1 {
+                last if last == spans => end,
+                node => (node * steps).div_ceil(spans).min(end),
+            };
+            let (near, far) = (
+                self.column(colour, i, j, fy),
+                self.column(colour, i, j + 1, fy),
+            );
+            let (run, rest) = values.split_at_mut(next - at);
+            let (first, each) = ((at * spans - j * steps) as i32, spans as i32);
+            for (k, value) in run.iter_mut().enumerate() {
+                let fx = (first + k as i32 * each) as f32 / steps as f32;
+                change(value, near + (far - near) * fx);
+            }
+            (values, at) = (rest, next);
+        }
     }
 }
 

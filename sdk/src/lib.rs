@@ -7,6 +7,8 @@
 //! at z = 0. An image's value is the amplitude. Plans are immutable and shared between threads;
 //! their hot calls take scratch memory and allocate nothing.
 
+mod brightness;
+pub mod calibration;
 pub mod depth;
 pub mod display;
 pub mod encode;
@@ -28,6 +30,7 @@ pub mod slm;
 pub mod sweep;
 pub mod wave;
 
+pub use calibration::Calibration;
 pub use display::Display;
 pub use error::{Error, Result};
 pub use frame::RgbdFrame;

@@ -9,9 +9,10 @@ use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
-use crate::wave::fft::Scratch;
+use crate::wave::fft::ConvolveScratch;
 use crate::wave::zernike::Aberration;
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -30,7 +31,7 @@ pub struct Modulator {
 
 /// Working memory of a [`Modulator`] for one call at a time.
 pub struct ModulatorScratch {
-    propagation: Option<Scratch>,
+    propagation: Option<ConvolveScratch>,
     encoder: EncoderScratch,
 }
 
@@ -155,8 +156,8 @@ impl Modulator {
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W): `field` is left as the
-    /// encoder's filter made it, and divided by the light that falls there. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W). `field` is worked on:
+    /// what it holds afterwards means nothing. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -219,20 +220,41 @@ pub fn remove_mean_phase(field: &mut [Complex32]) {
     if size == 0 {
         return;
     }
-    const PART: usize = 1 << 14;
     for plane in field.chunks_exact_mut(size) {
-        // Sums of fixed parts in a fixed order: the same bits on any number of threads.
-        let mut sum = num_complex::Complex64::ZERO;
-        for part in plane.chunks(PART) {
-            let part: Complex32 = part.iter().sum();
-            sum += num_complex::Complex64::new(part.re.into(), part.im.into());
-        }
-        let turn = num_complex::Complex64::from_polar(1.0, -sum.arg());
+        let turn = Complex64::from_polar(1.0, -sum(plane).arg());
         let turn = Complex32::new(turn.re as f32, turn.im as f32);
-        plane
-            .par_chunks_mut(PART)
-            .for_each(|part| part.iter_mut().for_each(|value| *value *= turn));
+        plane.par_chunks_mut(PART).for_each(|part| {
+            wide(|| {
+                for value in part {
+                    *value *= turn;
+                }
+            });
+        });
     }
+}
+
+/// Values of a part that one thread takes.
+const PART: usize = 1 << 14;
+
+/// The sum of `values`, halved again and again at fixed places: the same bits on any number of threads.
+fn sum(values: &[Complex32]) -> Complex64 {
+    if values.len() > PART {
+        let (first, second) = values.split_at(values.len().div_ceil(PART).div_ceil(2) * PART);
+        let (first, second) = rayon::join(|| sum(first), || sum(second));
+        return first + second;
+    }
+    const LANES: usize = 16;
+    wide(|| {
+        let (runs, rest) = values.as_chunks::<LANES>();
+        let mut sums = [Complex32::ZERO; LANES];
+        for run in runs {
+            for (sum, value) in sums.iter_mut().zip(run) {
+                *sum += value;
+            }
+        }
+        let all = sums.iter().chain(rest);
+        all.map(|v| Complex64::new(v.re.into(), v.im.into())).sum()
+    })
 }
 
 #[cfg(test)]

@@ -12,8 +12,10 @@ mod fused;
 mod head;
 mod metadata;
 mod onnx;
+#[cfg(feature = "tract")]
 mod operator;
 pub mod reference;
+#[cfg(feature = "tract")]
 mod stock;
 mod tensor;
 
@@ -29,11 +31,13 @@ pub(crate) use fused::int8_layers;
 use fused::{FusedChain, FusedScratch};
 use num_complex::Complex32;
 pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
+use prost::Message;
+#[cfg(feature = "tract")]
 use stock::StockPlan;
 use tract_onnx::pb::ModelProto;
-use tract_onnx::prelude::Framework;
 
-/// Most pixels of a frame on stock tract, which holds several layers at once: some 500 bytes a pixel.
+/// Most pixels of a frame on tract, which holds several layers at once: some 500 bytes a pixel.
+#[cfg(feature = "tract")]
 const MAX_STOCK_PIXELS: usize = 1 << 24;
 /// Most pixels of a frame at all.
 pub(crate) const MAX_PIXELS: usize = 1 << 28;
@@ -51,6 +55,7 @@ pub struct Network {
     input: InputKind,
     head: Head,
     display: TrainedDisplay,
+    #[cfg(feature = "tract")]
     proto: ModelProto,
 }
 
@@ -72,14 +77,9 @@ impl Network {
     /// # Errors
     /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
-        let proto = tract_onnx::onnx()
-            .proto_model_for_read(&mut &*bytes)
-            .map_err(|why| {
-                Error::Network(format!(
-                    "not an ONNX file, or a truncated one: {}",
-                    format!("{why:#}").replace('\n', " ")
-                ))
-            })?;
+        let proto = ModelProto::decode(bytes).map_err(|why| {
+            Error::Network(format!("not an ONNX file, or a truncated one: {why}"))
+        })?;
         let graph = proto
             .graph
             .as_ref()
@@ -117,6 +117,7 @@ impl Network {
             input,
             head,
             display,
+            #[cfg(feature = "tract")]
             proto,
         })
     }
@@ -163,11 +164,16 @@ impl Network {
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         match FusedChain::new(&self.chain, None) {
             Ok(chain) => self.fused_plan(height, width, chain),
+            #[cfg(feature = "tract")]
             Err(why) => {
                 let mut plan = self.plan_on_stock_tract(height, width)?;
                 plan.engine.why = why;
                 Ok(plan)
             }
+            #[cfg(not(feature = "tract"))]
+            Err(why) => Err(Error::Network(format!(
+                "{why}; tract would run it, but this library was built without its feature 'tract'"
+            ))),
         }
     }
 
@@ -239,6 +245,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Network`] when the kernels do not take the chain, or tract refuses the graph.
+    #[cfg(feature = "tract")]
     pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
         let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
         operator::model(&self.proto, chain, self.chain.inputs)
@@ -248,6 +255,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Network::plan`].
+    #[cfg(feature = "tract")]
     pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         check_size(height, width, MAX_STOCK_PIXELS)?;
         let plan = StockPlan::new(&self.proto, [1, self.chain.inputs, height, width])?;
@@ -291,6 +299,7 @@ pub struct Engine {
 
 enum Path {
     Fused(FusedChain),
+    #[cfg(feature = "tract")]
     Stock(StockPlan),
 }
 
@@ -311,13 +320,17 @@ pub struct NetworkPlan {
 pub struct NetworkScratch {
     fused: FusedScratch,
     /// Input and output as planes, for stock tract.
+    #[cfg(feature = "tract")]
     planes: [Vec<f32>; 2],
 }
 
 impl NetworkScratch {
     /// Bytes held between frames.
     pub fn bytes(&self) -> usize {
+        #[cfg(feature = "tract")]
         let planes: usize = self.planes.iter().map(Vec::capacity).sum();
+        #[cfg(not(feature = "tract"))]
+        let planes = 0;
         self.fused.bytes() + planes * size_of::<f32>()
     }
 }
@@ -364,6 +377,7 @@ impl NetworkPlan {
                 chain.run(input, output, self.size(), &scratch.fused);
                 Ok(())
             }
+            #[cfg(feature = "tract")]
             Path::Stock(plan) => plan.run(input, output),
         }
     }
@@ -387,6 +401,7 @@ impl NetworkPlan {
                 chain.field(source, (self.input, self.head), field, size, &scratch.fused);
                 Ok(())
             }
+            #[cfg(feature = "tract")]
             Path::Stock(plan) => {
                 let area = size.0 * size.1;
                 let (inputs, outputs) = self.channels();

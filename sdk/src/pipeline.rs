@@ -174,8 +174,8 @@ impl Pipeline {
             .phases_at(field, scale, phases, &mut scratch.modulator)
     }
 
-    /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is left as
-    /// the encoder's filter made it.
+    /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked
+    /// on: what it holds afterwards means nothing.
     ///
     /// # Errors
     /// A frame of another shape.

@@ -11,7 +11,7 @@ use crate::frame::Axis;
 use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
-use crate::wave::fft::Scratch;
+use crate::wave::fft::ConvolveScratch;
 use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ pub struct Preview {
 pub struct PreviewScratch {
     field: Vec<Complex32>,
     amplitude: Vec<f32>,
-    propagation: Option<Scratch>,
+    propagation: Option<ConvolveScratch>,
 }
 
 impl Preview {

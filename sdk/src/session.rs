@@ -5,24 +5,30 @@
 //! ever waiting, works on one while the newest waits, and tells its listener of every result and every drop.
 //!
 //! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
-//! happens to a frame; `quality` is the ladder. One frame by itself, without a camera's formats, is
+//! happens to a frame; `engine` is where CPU and GPU meet; `quality` is the ladder. One frame by itself, without a camera's formats, is
 //! [`crate::Pipeline`]'s.
 
 mod brightness;
+mod engine;
 mod event;
 mod hologram;
 mod live;
+mod on_cpu;
+#[cfg(feature = "gpu")]
+mod on_gpu;
 mod owned_frame;
 mod quality;
 mod queue;
 mod stages;
 mod statistics;
 
+pub use crate::brightness::Brightness;
 pub use crate::depth::stream::DepthOptions;
-pub use brightness::Brightness;
 pub use event::{DropReason, Event};
 pub use hologram::Hologram;
-pub use quality::{Quality, QualityChange, QualityReason, Rung, Thermal};
+#[cfg(feature = "gpu")]
+pub use on_gpu::GpuOptions;
+pub use quality::{Backend, Quality, QualityChange, QualityReason, Rung, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
 use crate::display::Display;
@@ -67,6 +73,11 @@ pub struct SessionOptions {
     pub brightness: Brightness,
     /// What becomes of depth.
     pub depth: DepthOptions,
+    /// Where frames are computed, unless their rung says it.
+    pub backend: Backend,
+    /// Which GPU, and how.
+    #[cfg(feature = "gpu")]
+    pub gpu: GpuOptions,
     /// Threads to compute with; None for as many as the device has.
     pub threads: Option<NonZeroUsize>,
 }
@@ -82,6 +93,7 @@ impl SessionOptions {
             method,
             height: display.height(),
             width: display.width(),
+            backend: None,
         };
         Ok(SessionOptions {
             ladder: vec![rung],
@@ -94,6 +106,9 @@ impl SessionOptions {
             correction: None,
             brightness: Brightness::default(),
             depth: DepthOptions::default(),
+            backend: Backend::Cpu,
+            #[cfg(feature = "gpu")]
+            gpu: GpuOptions::default(),
             threads: None,
             display,
         })
@@ -223,9 +238,9 @@ impl Shared {
         let made = stages.process(frame, past, thermal, quality)?;
         let mut recent = lock(&self.recent);
         recent.push(Instant::now(), made.hologram.times());
-        if made.change.is_some() {
-            recent.backend = stages.backend();
-            recent.rung = stages.rung();
+        recent.rung = stages.rung();
+        if let Some(backend) = stages.news() {
+            recent.backend = backend;
         }
         Ok(made)
     }
@@ -244,8 +259,8 @@ impl Session {
             thermal: Thermal::Nominal,
         };
         let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
-        let stages = Stages::new(options)?;
-        let recent = Recent::new(stages.backend(), stages.rung());
+        let mut stages = Stages::new(options)?;
+        let recent = Recent::new(stages.news().unwrap_or_default(), stages.rung());
         let shared = Arc::new(Shared {
             stages: Mutex::new(stages),
             control: Mutex::new(control),
@@ -392,6 +407,13 @@ impl Session {
         quality.check(control.rungs)?;
         control.quality = quality;
         Ok(())
+    }
+
+    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed. Its
+    /// [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the next start, save compiling.
+    #[cfg(feature = "gpu")]
+    pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
+        lock(&self.shared.stages).gpu()
     }
 
     /// What the session has done so far. Never waits for a frame.

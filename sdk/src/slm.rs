@@ -122,6 +122,7 @@ impl Response {
     ///
     /// # Panics
     /// If the lengths differ, or the response is made for a shape whose row ends before.
+    #[inline(always)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         match self {
@@ -152,6 +153,7 @@ pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {
 }
 
 /// round(φ/2π·n) mod n, for n a power of two up to 65536.
+#[inline(always)]
 fn step(phase: f32, n: i32) -> usize {
     // Phases are not negative, so the conversion's truncation is the floor.
     ((phase * (n as f32 / TAU) + 0.5) as i32 & (n - 1)) as usize

@@ -124,6 +124,36 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
     }
 }
 
+/// The sizes of phones' frames, against the kernels of the CPU.
+#[test]
+fn chains_of_whole_frames_agree_with_the_cpu() {
+    let Some(device) = device() else { return };
+    for (model, float, tolerance) in [
+        (Model::new(5, 8), Float::F32, 1e-4),
+        (Model::new(5, 8), Float::F16, 0.02),
+        (Model::int8(5, 8), Float::F32, 0.0),
+    ] {
+        if float == Float::F16 && !device.has_half() {
+            println!("skipped: {device:?} has no 16-bit floating point");
+            continue;
+        }
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in [(61, 47), (384, 384), (540, 960)] {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let plan = network.plan(size.0, size.1).unwrap();
+            let mut expected = vec![0.0; 6 * size.0 * size.1];
+            plan.run(&input, &mut expected, &mut plan.scratch())
+                .unwrap();
+            let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+            for fusion in [Fusion::Layers, Fusion::Pairs] {
+                let output = run(&network, ChainOptions { float, fusion }, size, &input);
+                let worst = largest_difference(&output, &expected) / largest;
+                assert!(worst <= tolerance, "{size:?} {float:?} {fusion:?}: {worst}");
+            }
+        }
+    }
+}
+
 #[test]
 fn chains_in_int8_have_the_bits_of_the_cpu() {
     if device().is_none() {
@@ -531,6 +561,125 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
     let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
     assert!(refused.to_string().contains("shown"), "{refused}");
+}
+
+/// An app draws the levels from the texture that they were written to, on the device that computed them.
+#[test]
+fn an_app_shows_the_texture_itself() {
+    let Some(device) = device() else { return };
+    let (h, w) = (33, 45);
+    let display = Display::default();
+    let response = Response::linear(8).unwrap();
+    let method = Method::Network(int8_network());
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
+    let job = Job::new(h, w, method, &display, encoding, scale, response);
+    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let frame = rgbd(h, w);
+    let mut expected = vec![0; 3 * h * w];
+    plan.process(&Frame::of(&frame), &mut expected).unwrap();
+    let ticket = plan.submit(&Frame::of(&frame), Deliver::Shown).unwrap();
+    let (inner, queue) = device.wgpu();
+    let module = inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(
+            "@group(0) @binding(0) var hologram: texture_2d<f32>;
+            @vertex fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+                return vec4f(f32(i / 2u) * 4.0 - 1.0, f32(i % 2u) * 4.0 - 1.0, 0.0, 1.0);
+            }
+            @fragment fn show(@builtin(position) at: vec4f) -> @location(0) vec4f {
+                return textureLoad(hologram, vec2u(at.xy), 0);
+            }"
+            .into(),
+        ),
+    });
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let pipeline = inner.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: None,
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let view = plan.texture(&ticket).create_view(&Default::default());
+    let bound = inner.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: wgpu::BindingResource::TextureView(&view),
+        }],
+    });
+    // What stands for the app's screen.
+    let size = plan.texture(&ticket).size();
+    let screen = inner.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let mut encoder = inner.create_command_encoder(&Default::default());
+    {
+        let view = screen.create_view(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.draw(0..3, 0..1);
+    }
+    let buffer = inner.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: 256 * h as u64,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let to = wgpu::TexelCopyBufferInfo {
+        buffer: &buffer,
+        layout: wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(256),
+            rows_per_image: None,
+        },
+    };
+    encoder.copy_texture_to_buffer(screen.as_image_copy(), to, size);
+    queue.submit([encoder.finish()]);
+    buffer.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
+    inner
+        .poll(wgpu::PollType::Wait {
+            submission_index: None,
+            timeout: None,
+        })
+        .unwrap();
+    let shown = buffer.get_mapped_range(..).unwrap();
+    for (i, level) in expected.iter().enumerate() {
+        let (c, y, x) = (i / (h * w), i / w % h, i % w);
+        assert_eq!(shown[256 * y + 4 * x + c], *level, "{c} {x} {y}");
+    }
+    plan.finish(ticket).unwrap();
 }
 
 #[test]

@@ -7,13 +7,15 @@ mod reference;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;
-use phasefront::encode::{Encoder, Encoding, Scale};
+use phasefront::encode::anti_alias::AntiAlias;
+use phasefront::encode::{Encoder, Encoding, Scale, double_phase};
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::slm::Response;
+use phasefront::slm::per_pixel::{self, PerPixel};
 use phasefront::wave::aperture::Aperture;
 use phasefront::wave::asm::{self, Padding, Propagator};
 use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Modulator, Network, wave};
+use phasefront::{Display, Illumination, Method, Modulator, Network, Pipeline, RgbdFrame, wave};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -358,32 +360,44 @@ fn a_correction_is_part_of_the_offset() {
         let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
         let given = field.clone();
         plan.propagate(&mut field, &mut plan.scratch());
-        for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
-            let size = h * w;
-            // Room for all that moves, so that nothing comes back around.
-            let (ph, pw) = (4 * h, 4 * w);
-            let mut plane = Array2::zeros((ph, pw));
-            let source = widen(&given[c * size..][..size], shape);
-            plane.slice_mut(ndarray::s![..h, ..w]).assign(&source);
-            let mut spectrum = reference::fft2(&plane, false);
-            for ((ky, kx), value) in spectrum.indexed_iter_mut() {
-                let bin = |k: usize, n: usize| {
-                    (if 2 * k < n {
-                        k as f64
-                    } else {
-                        k as f64 - n as f64
-                    }) / (n as f64 * PITCH)
-                };
-                let (mu, nu) = (bin(kx, pw), bin(ky, ph));
-                let root = (lambda.powi(-2) - mu * mu - nu * nu).sqrt();
-                let phase = 2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
-                *value *= Complex64::from_polar(1.0, phase);
+        let plans = Propagator::for_colours_corrected(
+            h,
+            w,
+            PITCH,
+            display.wavelengths_m(),
+            offset_m,
+            &a,
+            PITCH,
+        )
+        .unwrap();
+        // In the plan's own periodic plane, and with room for all that moves, so that nothing comes back around: tails of
+        // the kernel at the corner frequencies reach beyond what rays do.
+        for ((ph, pw), most) in [(plans[0].padded_shape(), 1e-4), ((4 * h, 4 * w), 0.03)] {
+            for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
+                let size = h * w;
+                let mut plane = Array2::zeros((ph, pw));
+                let source = widen(&given[c * size..][..size], shape);
+                plane.slice_mut(ndarray::s![..h, ..w]).assign(&source);
+                let mut spectrum = reference::fft2(&plane, false);
+                for ((ky, kx), value) in spectrum.indexed_iter_mut() {
+                    let bin = |k: usize, n: usize| {
+                        (if 2 * k < n {
+                            k as f64
+                        } else {
+                            k as f64 - n as f64
+                        }) / (n as f64 * PITCH)
+                    };
+                    let (mu, nu) = (bin(kx, pw), bin(ky, ph));
+                    let root = (lambda.powi(-2) - mu * mu - nu * nu).sqrt();
+                    let phase =
+                        2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
+                    *value *= Complex64::from_polar(1.0, phase);
+                }
+                let expected = reference::fft2(&spectrum, true);
+                let expected = expected.slice(ndarray::s![..h, ..w]).to_owned();
+                let error = relative_error(&widen(&field[c * size..][..size], shape), &expected);
+                assert!(error < most, "{offset_m} {shape:?} {c}: {error}");
             }
-            let expected = reference::fft2(&spectrum, true);
-            let expected = expected.slice(ndarray::s![..h, ..w]).to_owned();
-            let error = relative_error(&widen(&field[c * size..][..size], shape), &expected);
-            // Tails of the kernel at the corner frequencies reach beyond what rays do.
-            assert!(error < 0.02, "{offset_m} {shape:?} {c}: {error}");
         }
     }
 }
@@ -406,9 +420,9 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     let mut filtered = field.clone();
     let mut levels = vec![0; 3 * h * w];
     plan.modulate(&mut field, &mut levels, &mut plan.scratch());
-    let filter = phasefront::encode::anti_alias::AntiAlias::new(0.7, 3).unwrap();
+    let filter = AntiAlias::new(0.7, 3).unwrap();
     for plane in filtered.chunks_exact_mut(h * w) {
-        filter.filter(plane, w, &mut filter.scratch(w));
+        filter.filter(plane, w);
     }
     laser.divide(&mut filtered, (h, w), (50, 60));
     let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
@@ -421,4 +435,158 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         &mut encoder.scratch(),
     );
     assert_eq!(levels, expected);
+}
+
+#[test]
+fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
+    let network = Arc::new(Network::from_onnx(&Model::int8(8, 24).bytes()).unwrap());
+    let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let pipeline = |height, width| {
+        let method = Method::trained(network.clone());
+        let encoding = Encoding::Deep(prefilter.clone());
+        let response = Response::linear(8).unwrap();
+        Pipeline::new(
+            height,
+            width,
+            method,
+            &display,
+            encoding,
+            Scale::Max,
+            response,
+        )
+    };
+    for (h, w) in [(1, 1), (7, 5000), (5000, 7)] {
+        let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
+        let rgb = Array3::from_shape_fn((3, h, w), |(c, y, x)| value(c, y, x));
+        let depth = Array2::from_shape_fn((h, w), |(y, x)| value(9, y, x));
+        let frame = RgbdFrame::new(rgb, depth).unwrap();
+        let levels = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let plan = pipeline(h, w).unwrap();
+                let mut field = vec![Complex32::new(f32::NAN, 0.0); 3 * h * w];
+                let mut levels = vec![0; 3 * h * w];
+                let report = plan.process(&frame, &mut field, &mut levels, &mut plan.scratch());
+                assert!(report.unwrap().scale.is_finite());
+                levels
+            })
+        });
+        assert!(
+            levels[0] == levels[1],
+            "{w}×{h}: other bits on other threads"
+        );
+        assert!(h * w == 1 || levels[0].iter().any(|level| *level != levels[0][0]));
+    }
+    for side in [0, 1 << 14, 1 << 15, 1 << 40] {
+        let why = pipeline(side, side).err().unwrap().to_string();
+        let named = ["empty", "too large", "over the"]
+            .iter()
+            .any(|word| why.contains(word));
+        assert!(!why.contains('\n') && named, "{why}");
+    }
+}
+
+/// Stage after stage on whole planes: filter, light, largest amplitude, double phase, levels. The encoder does them row by
+/// row; the bits are the same, whatever the threads.
+#[test]
+fn one_sweep_from_field_to_levels_is_stage_after_stage() {
+    for ((h, w), more) in [
+        ((61, 47), (0, 0)),
+        ((40, 300), (10, 13)),
+        ((7, 130), (1, 0)),
+        ((1, 1), (3, 2)),
+        ((33, 1), (0, 5)),
+        ((1, 40), (0, 0)),
+    ] {
+        let modulator = (h + more.0, w + more.1);
+        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| {
+            1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
+        });
+        let laser = Illumination::new(beam.view()).unwrap();
+        let (rows, columns) = per_pixel::nodes(h, w, 16);
+        let knots =
+            (0..3 * rows * columns * 9).map(|i| (i % 9) as f32 * (20.0 + (i / 9 % 11) as f32));
+        let turns = vec![6.0; 3 * rows * columns];
+        let table = PerPixel::new(h, w, 16, 8, &knots.collect::<Vec<_>>(), &turns).unwrap();
+        let given: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 70 + c)).collect();
+        for (encoding, blur) in [
+            (Encoding::DoublePhase, None),
+            (Encoding::ANTI_ALIAS, Some((0.7, 3))),
+            (
+                Encoding::AntiAlias {
+                    sigma: 2.0,
+                    width: 9,
+                },
+                Some((2.0, 9)),
+            ),
+        ] {
+            for (light, scale, response) in [
+                (None, Scale::Max, Response::linear(8).unwrap()),
+                (
+                    Some(&laser),
+                    Scale::Max,
+                    Response::PerPixel(table.clone().into()),
+                ),
+                (
+                    Some(&laser),
+                    Scale::Fixed(1.5),
+                    Response::linear(5).unwrap(),
+                ),
+            ] {
+                let mut field = given.clone();
+                if let Some((sigma, taps)) = blur {
+                    let filter = AntiAlias::new(sigma, taps).unwrap();
+                    for plane in field.chunks_exact_mut(h * w) {
+                        filter.filter(plane, w);
+                    }
+                }
+                if let Some(light) = light {
+                    for (i, value) in field.iter_mut().enumerate() {
+                        let (y, x) = (i / w % h + more.0 / 2, i % w + more.1 / 2);
+                        *value *= light.gain(i / (h * w), y, x, modulator);
+                    }
+                }
+                let largest = field.iter().map(Complex32::norm_sqr).fold(0.0, f32::max);
+                let used = match scale {
+                    Scale::Max => largest.sqrt(),
+                    Scale::Fixed(scale) => scale,
+                };
+                let mut phases = vec![0.0; field.len()];
+                for (row, out) in phases.chunks_exact_mut(w).enumerate() {
+                    double_phase::encode_row(&field[row * w..][..w], row % h, used, out);
+                }
+                let values = phases.iter().enumerate();
+                let levels: Vec<_> = values
+                    .map(|(at, phase)| response.level(*phase, at))
+                    .collect();
+
+                for threads in [1, 3] {
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+                    pool.build().unwrap().install(|| {
+                        let mut encoder = Encoder::new(h, w, encoding.clone()).unwrap();
+                        if let Some(light) = light {
+                            encoder = encoder.with_illumination(light.clone(), modulator);
+                        }
+                        let mut scratch = encoder.scratch();
+                        let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
+                        let scaled = encoder.encode_levels(
+                            &mut field,
+                            scale,
+                            &response,
+                            &mut got,
+                            &mut scratch,
+                        );
+                        assert!(
+                            (scaled, &got) == (used, &levels),
+                            "{w}×{h} {encoding:?} {scale:?}"
+                        );
+                        let (mut field, mut got) = (given.clone(), vec![0.0; 3 * h * w]);
+                        encoder.encode(&mut field, scale, &mut got, &mut scratch);
+                        assert!(got == phases, "{w}×{h} {encoding:?} {scale:?}");
+                    });
+                }
+            }
+        }
+    }
 }

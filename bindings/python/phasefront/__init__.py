@@ -22,6 +22,7 @@ import numpy
 from .ffi import phasefront_ffi as _ffi
 from .ffi.phasefront_ffi import (
     Brightness,
+    CalibratedDisplay,
     Cameras,
     ColourFormat,
     ConfidenceFormat,
@@ -59,7 +60,7 @@ from .ffi.phasefront_ffi import (
 )
 
 __all__ = [
-    "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
+    "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
     "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
     "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
     "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",

@@ -8,6 +8,7 @@ from conftest import SUITE
 
 from phasefront import (
     Brightness,
+    CalibratedDisplay,
     ColourFormat,
     ConfidenceFormat,
     DepthFormat,
@@ -15,6 +16,7 @@ from phasefront import (
     Encoding,
     Frame,
     Method,
+    Network,
     Orientation,
     Response,
     Rotation,
@@ -82,15 +84,23 @@ def frame_of(case, memory):
     )
 
 
+def model(file):
+    return Network.from_file(str(SUITE / "../../models" / file))
+
+
 def levels_of(case, memory, network):
-    changes = {"encoding": ENCODING[case["encoding"]]}
+    encoding = case["encoding"]
+    changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
+    if case["calibration"] is not None:
+        changes["calibration"] = CalibratedDisplay.from_file(str(SUITE / case["calibration"]))
     if case["lut"] is not None:
         changes["response"] = Response.LUT(levels=bytes(case["lut"]))
     if case["brightness"] is not None:
         changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
-    method = {"network": network, "sweep": Method.SWEEP()}[case["method"]]
+    methods = {"network": network, "sweep": Method.SWEEP()}
+    method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, display_from_toml(case["display"]), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]
     with Session(options, mode) as session:

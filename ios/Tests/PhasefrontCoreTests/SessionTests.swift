@@ -174,7 +174,8 @@ final class SessionTests: XCTestCase {
         let closed = DispatchSemaphore(value: 0)
         let box = Locked<Session?>(nil)
         let session = try Session(options(), mode: .liveStream) { _ in
-            XCTAssertNoThrow(try box.withLock { $0 }?.close())
+            let own = box.withLock { $0 }
+            do { try own?.close() } catch { XCTFail("\(error)") }
             closed.signal()
         }
         box.withLock { $0 = session }
@@ -239,7 +240,7 @@ final class SessionTests: XCTestCase {
     }
 
     func testSettingsThatCannotBeMeantAreNamed() throws {
-        func make(_ change: (inout SessionOptions) -> Void) -> () throws -> Session {
+        func make(_ change: @escaping (inout SessionOptions) -> Void) -> () throws -> Session {
             {
                 var changed = try options()
                 change(&changed)

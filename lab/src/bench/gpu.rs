@@ -10,6 +10,7 @@ use phasefront::gpu::{
     Pipeline, StageTimes, probe,
 };
 use phasefront::slm::Response;
+use phasefront::slm::per_pixel::PerPixel;
 use phasefront::{Display, Method, Network};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
@@ -39,6 +40,9 @@ pub struct GpuRow {
     pub spread_ms: [f64; 2],
     /// Time a frame with several in flight whose levels stay on the GPU.
     pub flying_ms: f64,
+    /// What encoding through the per-pixel table takes longer than through none, of all stages, where there is one and the device
+    /// has time stamps.
+    pub table_percent: Option<f64>,
     /// Frames that were measured one at a time.
     pub frames: usize,
     /// The network's multiply-adds in its median time, 10⁹ a second.
@@ -49,7 +53,8 @@ pub struct GpuRow {
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures `network` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not counted.
+/// Measures `network` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not
+/// counted; with `table` each frame once more through it.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
@@ -59,6 +64,7 @@ pub fn measure(
     device: &Arc<Device>,
     display: &Display,
     chain: ChainOptions,
+    table: Option<&Arc<PerPixel>>,
     budget: Duration,
 ) -> Result<GpuRow> {
     let mut job = Job::new(
@@ -82,6 +88,12 @@ pub fn measure(
     };
     job.depth = Depth::U16;
     let mut pipeline = Pipeline::new(device, &job)?;
+    let mut by_table = (table)
+        .map(|table| {
+            job.response = Response::PerPixel(table.clone());
+            Pipeline::new(device, &job)
+        })
+        .transpose()?;
     let byte = |i: usize| (i * 7 % 256) as u8;
     let luma: Vec<u8> = (0..height * width).map(byte).collect();
     let chroma: Vec<u8> = (0..2 * height.div_ceil(2) * width.div_ceil(2))
@@ -98,7 +110,7 @@ pub fn measure(
     };
     let mut levels = vec![0; 3 * height * width];
     let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    let mut totals = Vec::new();
+    let (mut totals, mut table_encode) = (Vec::new(), Vec::new());
     let ms = |time: Duration| time.as_secs_f64() * 1e3;
     pipeline.process(&frame, &mut levels)?;
     let start = Instant::now();
@@ -122,6 +134,11 @@ pub fn measure(
                 stages.entry(stage).or_default().push(ms(time));
             }
         }
+        if let Some(by_table) = &mut by_table
+            && let Some(times) = by_table.process(&frame, &mut levels)?.times
+        {
+            table_encode.push(ms(times.encode));
+        }
     }
     let start = Instant::now();
     let mut flying = VecDeque::new();
@@ -142,6 +159,10 @@ pub fn measure(
         .map(|(stage, mut times)| (stage, median(&mut times)))
         .collect();
     let total_ms = median(&mut totals);
+    let table_percent = (!table_encode.is_empty()).then(|| {
+        let all: f64 = stage_ms.values().sum();
+        100.0 * (median(&mut table_encode) - stage_ms["encode"]) / all
+    });
     let peak = pipeline.peak()?;
     let network_s = stage_ms.get("network").map(|ms| ms / 1e3);
     let mac_per_s =
@@ -157,6 +178,7 @@ pub fn measure(
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],
         flying_ms,
+        table_percent,
         frames: totals.len(),
         gmac_per_s: mac_per_s.map(|rate| rate / 1e9),
         peak_percent: mac_per_s.map(|rate| 100.0 * rate / peak.mac_per_s),

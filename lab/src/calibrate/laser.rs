@@ -37,25 +37,29 @@ pub fn map(
     let light = registration.resample(&clean, (height, width));
     let nodes = |n: usize| (NODES * n / height.max(width)).max(2);
     let (rows, columns) = (nodes(height), nodes(width));
-    // What a node stands for: the pixels nearer to it than its neighbours, weighted by how near.
     let step = |n: usize, nodes: usize| ((n - 1) as f64 / (nodes - 1) as f64).max(1.0);
     let (step_y, step_x) = (step(height, rows), step(width, columns));
+    // Into pixels at the rim the median, sampling and what registration is off bring the dark beside it: nodes there look at pixels
+    // a little further in, and follow their slope.
+    let reach = ((HALF as f64 + 1.0) / registration.zoom + 0.5).ceil();
+    let window = |node: usize, step: f64, n: usize| {
+        let quarter = (n - 1) as f64 / 4.0;
+        let (rim, half) = (reach.min(quarter), step.min(quarter));
+        let at = node as f64 * step;
+        Window::new(at, at.clamp(rim + half, (n - 1) as f64 - rim - half), half)
+    };
     let mut map = Array2::zeros((rows, columns));
     for ((i, j), value) in map.indexed_iter_mut() {
-        let range = |node: usize, step: f64, end: usize| {
-            let (from, to) = ((node as f64 - 1.0) * step, (node as f64 + 1.0) * step);
-            (from.max(0.0).ceil() as usize)..(to.floor() as usize + 1).min(end)
-        };
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for y in range(i, step_y, height) {
-            let wy = 1.0 - (y as f64 / step_y - i as f64).abs();
-            for x in range(j, step_x, width) {
-                let weight = wy * (1.0 - (x as f64 / step_x - j as f64).abs());
-                sum += weight * f64::from(light[(y, x)] - dark);
-                weights += weight;
+        let (along_y, along_x) = (window(i, step_y, height), window(j, step_x, width));
+        let mut sum = 0.0;
+        for (y, wy) in &along_y.shares {
+            for (x, wx) in &along_x.shares {
+                let light = f64::from(light[(*y, *x)] - dark);
+                // The plane that fits the window best, where the node is.
+                sum += light * (wy[0] * wx[0] + wy[1] * wx[0] + wy[0] * wx[1]);
             }
         }
-        *value = (sum / f64::max(weights, f64::MIN_POSITIVE)).max(0.0).sqrt() as f32;
+        *value = sum.max(0.0).sqrt() as f32;
     }
     let most = map.iter().copied().fold(0.0, f32::max);
     if most < 0.05 {
@@ -64,6 +68,36 @@ pub fn map(
         ));
     }
     Ok(map / most)
+}
+
+/// The pixels of an axis that a node looks at, with their shares in the mean and in the way from the mean to the node by
+/// the slope.
+struct Window {
+    shares: Vec<(usize, [f64; 2])>,
+}
+
+impl Window {
+    /// Of pixels less than `half` from `centre`, the nearer the more, for a node `at`.
+    fn new(at: f64, centre: f64, half: f64) -> Self {
+        let pixels = (centre - half).ceil() as usize..=(centre + half).floor() as usize;
+        // At a distance of `half` a pixel still counts a little, so that one alone counts at all.
+        let weight = |x: usize| 1.01 - (x as f64 - centre).abs() / half;
+        let all: f64 = pixels.clone().map(weight).sum();
+        let mean = pixels.clone().map(|x| weight(x) * x as f64).sum::<f64>() / all;
+        let spread: f64 = pixels
+            .clone()
+            .map(|x| weight(x) * (x as f64 - mean).powi(2))
+            .sum();
+        let slope = if spread > 0.0 {
+            (at - mean) / spread
+        } else {
+            0.0
+        };
+        let shares = pixels.map(|x| (x, [weight(x) / all, weight(x) * (x as f64 - mean) * slope]));
+        Window {
+            shares: shares.collect(),
+        }
+    }
 }
 
 /// The median of 5×5 pixels, the rim going on outside.
@@ -131,19 +165,19 @@ pub fn mixture(map: &Array2<f32>, count: usize) -> Result<(Array2<f32>, Vec<Gaus
     let mut beams: Vec<Gaussian> = Vec::new();
     let mut left = f64::INFINITY;
     for _ in 0..count {
-        // The next beam begins where the most is left.
+        // The next beam begins where the most light is left; a fit of one beam to two leaves less than none too.
         let rest = Array2::from_shape_fn((rows, columns), |(y, x)| {
             let sum: f64 = beams.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
             seen[(y, x)] - sum
         });
         let (at, most) = rest
             .indexed_iter()
-            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .max_by(|a, b| a.1.total_cmp(b.1))
             .map_or(((0, 0), 1.0), |(at, v)| (at, *v));
         let narrow = 4.0 / (columns.max(rows) as f64).powi(2);
         let wide = if beams.is_empty() { 1.0 } else { 8.0 };
         beams.push(Gaussian([
-            if most == 0.0 { 1e-6 } else { most },
+            most.max(1e-6),
             at.1 as f64,
             at.0 as f64,
             narrow * wide,
@@ -195,8 +229,8 @@ fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
                 .map(|(b, step)| Gaussian(std::array::from_fn(|i| b.0[i] + step[i])))
                 .collect();
             let closes = (tried.iter()).all(|b| {
-                let [.., p, q, r] = b.0;
-                p > 0.0 && r > 0.0 && q * q < p * r
+                let [height, _, _, p, q, r] = b.0;
+                height > 0.0 && p > 0.0 && r > 0.0 && q * q < p * r
             });
             let then = cost(&tried);
             if then < now && closes {
@@ -244,7 +278,6 @@ mod tests {
     use phasefront::Display;
 
     #[test]
-    #[ignore = "off by 0.0103"]
     fn the_beam_comes_back_from_dust_and_noise() {
         let display = Display::from_toml("width = 176\nheight = 120").unwrap();
         let pattern = Pattern::new(120, 176).unwrap();
@@ -284,7 +317,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "the mixture stays off by 0.056"]
     fn two_beams_are_told_apart() {
         let two = [
             Gaussian([0.9, 12.0, 8.0, 0.004, 0.001, 0.006]),

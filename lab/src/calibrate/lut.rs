@@ -11,9 +11,10 @@ use super::curve::{self, Basis, COEFFICIENTS, LEVELS};
 use super::marks::{NoMarks, Registration};
 use super::pattern::{PATTERNS, Pattern};
 use super::photograph::{Photograph, SATURATED_SHARE};
+use super::surface;
 use crate::error::{Error, Result};
-use ndarray::{Array2, Array3, Axis};
-use phasefront::slm::per_pixel::{self, PerPixel};
+use ndarray::Array2;
+use phasefront::slm::per_pixel::PerPixel;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::fs::File;
@@ -421,10 +422,8 @@ pub fn spacing(height: usize, width: usize) -> usize {
     height.max(width).div_ceil(NODES)
 }
 
-/// The compact table of the curves of red, green and blue.
-///
-/// Each node's curve is the mean of those around it, weighted by how near they are, which also takes the noise of
-/// single pixels away; a node without any has the mean of its neighbours.
+/// The compact table of the curves of red, green and blue: its nodes' curves are those of a smooth surface through the pixels'
+/// ([`surface`]), which also takes the noise of single pixels away, and bridges marks and dust.
 ///
 /// # Errors
 /// Curves of different shapes, or without any.
@@ -436,53 +435,22 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
         ));
     }
     let spacing = spacing(height, width);
-    let (rows, columns) = per_pixel::nodes(height, width, spacing);
     let basis = Basis::new();
     let (mut levels, mut turns) = (Vec::new(), Vec::new());
     for curves in curves {
-        // For each node: knots, turn, weight.
-        const VALUES: usize = INTERVALS + 3;
-        let mut nodes = Array3::<f64>::zeros((rows, columns, VALUES));
-        let lines = nodes.as_slice_mut().expect("standard layout");
-        let lines = lines.par_chunks_exact_mut(columns * VALUES).enumerate();
-        lines.for_each(|(i, line)| {
-            let near = |node: usize, end: usize| {
-                (node * spacing).saturating_sub(spacing - 1)..(node * spacing + spacing).min(end)
-            };
-            for y in near(i, height) {
-                let wy = 1.0 - (y.abs_diff(i * spacing)) as f64 / spacing as f64;
-                for x in 0..width {
-                    let Some(curve) = curves.curve(&basis, y, x) else {
-                        continue;
-                    };
-                    let (values, turn) = knots(&curve);
-                    for j in [x / spacing, x / spacing + 1] {
-                        let wx = 1.0 - (x.abs_diff(j * spacing)) as f64 / spacing as f64;
-                        if j >= columns || wx <= 0.0 {
-                            continue;
-                        }
-                        let weight = wx * wy;
-                        let node = &mut line[j * VALUES..][..VALUES];
-                        for (sum, value) in node.iter_mut().zip(values.iter().chain([&turn])) {
-                            *sum += weight * f64::from(*value);
-                        }
-                        node[VALUES - 1] += weight;
-                    }
-                }
-            }
-        });
-        for mut node in nodes.lanes_mut(Axis(2)) {
-            let weight = node[VALUES - 1];
-            if weight > 0.0 {
-                node.mapv_inplace(|v| v / weight);
-            }
-        }
-        fill(&mut nodes).map_err(|()| {
+        let nodes = surface::fit(curves.coefficients.view(), spacing).ok_or_else(|| {
             Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour]))
         })?;
-        for node in nodes.lanes(Axis(2)) {
-            levels.extend(node.iter().take(INTERVALS + 1).map(|v| *v as f32));
-            turns.push((node[INTERVALS + 1] as f32).min(TAU));
+        for coefficients in &nodes {
+            let mut highest = 0.0f32;
+            // Where the surface goes on beyond the pixels a curve could fall.
+            let rising = coefficients.map(|c| {
+                highest = highest.max(c);
+                highest
+            });
+            let (values, turn) = knots(&basis.curve(&rising));
+            levels.extend(values);
+            turns.push(turn);
         }
     }
     Ok(PerPixel::new(
@@ -490,46 +458,11 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
     )?)
 }
 
-/// The levels of the knots' phases by a pixel's curve, and the phase from which 0 is nearer than its end.
+/// The levels of the knots' phases by a node's curve, and the phase from which 0 is nearer than its end.
 fn knots(curve: &[f32; LEVELS]) -> ([f32; INTERVALS + 1], f32) {
     let values = std::array::from_fn(|k| curve::level_of(curve, k as f32 / INTERVALS as f32 * TAU));
     let last = curve[LEVELS - 1];
     (values, if last < TAU { 0.5 * (last + TAU) } else { TAU })
-}
-
-/// Gives nodes without weight (the last value) the mean of neighbours that have one, ring by ring.
-fn fill(nodes: &mut Array3<f64>) -> std::result::Result<(), ()> {
-    let (rows, columns, values) = nodes.dim();
-    let empty = |nodes: &Array3<f64>, i: usize, j: usize| nodes[(i, j, values - 1)] == 0.0;
-    loop {
-        let before = nodes.clone();
-        let mut missing = 0;
-        for i in 0..rows {
-            for j in 0..columns {
-                if !empty(&before, i, j) {
-                    continue;
-                }
-                let around: Vec<_> = (i.saturating_sub(1)..(i + 2).min(rows))
-                    .flat_map(|i| (j.saturating_sub(1)..(j + 2).min(columns)).map(move |j| (i, j)))
-                    .filter(|(i, j)| !empty(&before, *i, *j))
-                    .collect();
-                missing += usize::from(around.is_empty());
-                for v in 0..values {
-                    let sum: f64 = around.iter().map(|(i, j)| before[(*i, *j, v)]).sum();
-                    nodes[(i, j, v)] = if around.is_empty() {
-                        0.0
-                    } else {
-                        sum / around.len() as f64
-                    };
-                }
-            }
-        }
-        match missing {
-            0 => return Ok(()),
-            n if n == rows * columns => return Err(()),
-            _ => {}
-        }
-    }
 }
 
 /// How far apart phases are that should be equal, over all pixels with a curve, radians.

@@ -283,14 +283,14 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "its two points are not a grid"]
     fn aberrations_are_written_and_read_and_wrong_ones_named() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("aberration.toml");
-        let entry = |z_mm: f64, place: Option<f64>| Entry {
+        // Places of one row.
+        let entry = |z_mm: f64, x: Option<f64>| Entry {
             z_mm,
-            x: place,
-            y: place,
+            x,
+            y: x.map(|_| 0.5),
             red: [0.1, -0.2, 0.3, 0.0, 1.5],
             green: [z_mm; 5],
             blue: [0.0; 5],
@@ -302,14 +302,25 @@ mod tests {
         assert_eq!(read.at(0.5e-3).coefficients()[1], [0.5; 5]);
         assert_eq!(read.at(0.0).coefficients()[0], [0.1, -0.2, 0.3, 0.0, 1.5]);
         write_aberrations(&path, &[entry(0.0, Some(0.2)), entry(0.0, Some(0.8))]).unwrap();
-        assert!(matches!(
-            read_aberrations(&path).unwrap(),
-            AberrationFile::Spatial(_)
-        ));
+        let AberrationFile::Spatial(read) = read_aberrations(&path).unwrap() else {
+            panic!("not spatial");
+        };
+        let places: Vec<_> = read.points().map(|(place, _)| place).collect();
+        assert_eq!(places, [[0.2, 0.5], [0.8, 0.5]]);
         for (entries, word) in [
             (vec![entry(2.0, None), entry(1.0, None)], "ascend"),
             (vec![entry(0.0, None), entry(1.0, Some(0.5))], "x and y"),
             (vec![entry(0.0, Some(1.5))], "0 to 1"),
+            (
+                vec![
+                    entry(0.0, Some(0.2)),
+                    Entry {
+                        y: Some(0.9),
+                        ..entry(0.0, Some(0.8))
+                    },
+                ],
+                "every column must have a point in every row",
+            ),
         ] {
             let e = write_aberrations(&path, &entries).unwrap_err().to_string();
             assert!(e.contains(word), "{e}");

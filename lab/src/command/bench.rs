@@ -5,19 +5,24 @@ use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront::network::Precision;
+use phasefront::slm::per_pixel::PerPixel;
 use phasefront::{Display, Method, Network, Sweep};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
-use phasefront_lab::{Error, Result, gpu};
+use phasefront_lab::plot::{self, Bar};
+use phasefront_lab::{Error, Result, files, gpu};
 use serde_json::json;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Measure how fast a frame is, stage by stage; all combinations of what is not given
+///
+/// With a --display that has a per-pixel table, also what reading it adds to a frame.
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network; 0 is the plane sweep
+    /// Layers of the network; 0 is the plane sweep. Where none of so many comes along, one with random weights in f32
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
     /// Its numbers
@@ -32,6 +37,12 @@ pub(crate) struct Bench {
     /// Seconds to spend on each combination; five frames at least
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
+    /// ONNX file of a pre-filter, for the deep encoding instead of AA-DPM
+    #[arg(long, value_name = "FILE")]
+    prefilter: Option<String>,
+    /// Draw the stages' times there
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
     #[command(flatten)]
     backend: BackendFlags,
     /// How the network is computed on the GPU, both ways if not given
@@ -40,6 +51,9 @@ pub(crate) struct Bench {
     #[command(flatten)]
     display: DisplayFlags,
 }
+
+/// Layers of the deepest network that GPUs are measured with.
+const DEEPEST: usize = 30;
 
 /// How many layers a dispatch of the GPU computes.
 #[derive(Clone, Copy, ValueEnum)]
@@ -52,7 +66,17 @@ enum FusionName {
 
 impl Bench {
     pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        if let Some(path) = &self.plot
+            && !files::has_extension(path, "svg")
+        {
+            return Err(Error::file(path, "the name must end in .svg"));
+        }
+        let file = self.display.read()?;
+        let (display, table) = (file.display, file.per_pixel);
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, false)?),
+            None => None,
+        };
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
         let wanted = |built: &&Built| {
@@ -68,9 +92,22 @@ impl Bench {
         if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
             methods.push(Method::Sweep(Sweep::for_display(&display)));
         }
+        let device = self.backend.device()?;
+        // What a GPU is judged by, unless it comes along.
+        let made = match self.layers {
+            Some(layers) => Some(layers).filter(|&layers| layers > 0),
+            None => device.is_some().then_some(DEEPEST),
+        };
+        if let Some(layers) = made
+            && self.network.is_none()
+            && self.precision.is_none_or(|p| !p.is_int8())
+            && !BUILT_IN.iter().any(|built| built.layers == layers)
+        {
+            methods.push(Method::Network(bench::random::network(layers)?));
+        }
         if methods.is_empty() {
             return Err(Error::Input(
-                "no network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
+                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
             ));
         }
         let sizes = self
@@ -78,14 +115,19 @@ impl Bench {
             .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| {
                 vec![size]
             });
-        if let Some(options) = self.backend.device()? {
+        if let Some(options) = device {
+            if self.plot.is_some() || self.prefilter.is_some() {
+                return Err(Error::Input(
+                    "--plot and --prefilter go with --backend cpu".into(),
+                ));
+            }
             let networks: Vec<_> = (methods.into_iter())
                 .filter_map(|method| match method {
                     Method::Network(network) => Some(network),
                     _ => None,
                 })
                 .collect();
-            return self.on_gpu(&networks, &sizes, &display, &options, json);
+            return self.on_gpu(&networks, &sizes, &display, table.as_ref(), &options, json);
         }
         let machine = Machine::this();
         let threads = threads.map_or_else(
@@ -102,6 +144,8 @@ impl Bench {
                     method,
                     size,
                     threads,
+                    table: table.as_ref(),
+                    prefilter: prefilter.as_ref(),
                 }));
             }
         }
@@ -112,10 +156,13 @@ impl Bench {
             bar.inc(1);
         }
         bar.finish_and_clear();
+        if let Some(path) = &self.plot {
+            plot::write_bars(path, &title(&machine, &rows[0]), &bars(&rows))?;
+        }
         super::print(
             json,
             &json!({"machine": machine, "rows": rows}),
-            table(&machine, &rows),
+            as_table(&machine, &rows),
         );
         Ok(())
     }
@@ -128,6 +175,7 @@ impl Bench {
         networks: &[Arc<Network>],
         sizes: &[(usize, usize)],
         display: &Display,
+        table: Option<&Arc<PerPixel>>,
         options: &DeviceOptions,
         json: bool,
     ) -> Result<()> {
@@ -149,7 +197,7 @@ impl Bench {
                         let chain = ChainOptions { float, fusion };
                         let budget = Duration::from_secs_f64(self.seconds);
                         rows.push(bench::gpu::measure(
-                            network, size, &device, display, chain, budget,
+                            network, size, &device, display, chain, table, budget,
                         )?);
                     }
                 }
@@ -159,20 +207,20 @@ impl Bench {
         super::print(
             json,
             &json!({"machine": device.name(), "rows": rows}),
-            gpu_table(&device, &rows),
+            as_gpu_table(&device, &rows),
         );
         Ok(())
     }
 }
 
-fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
+fn as_gpu_table(device: &Device, rows: &[GpuRow]) -> String {
     let mut text = format!("{}\n\n", device.name());
-    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(f64::NAN);
         text += &format!(
-            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} |",
+            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} | {} |",
             row.layers,
             row.precision,
             row.kernels,
@@ -189,19 +237,20 @@ fn gpu_table(device: &Device, rows: &[GpuRow]) -> String {
             whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.bandwidth_percent),
+            tenths(row.table_percent),
         );
     }
     text
 }
 
-fn table(machine: &Machine, rows: &[Row]) -> String {
+fn as_table(machine: &Machine, rows: &[Row]) -> String {
     let mut text = format!("{}, {} cores\n\n", machine.cpu, machine.cores);
-    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(0.0);
         text += &format!(
-            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} |",
+            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} | {} |",
             row.method,
             row.layers,
             row.precision,
@@ -218,9 +267,45 @@ fn table(machine: &Machine, rows: &[Row]) -> String {
             whole(row.gmac_per_s),
             whole(row.peak_percent),
             whole(row.peak_memory_mb),
+            tenths(row.table_percent),
         );
     }
     text
+}
+
+fn tenths(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value:.1}"))
+}
+
+fn title(machine: &Machine, row: &Row) -> String {
+    format!(
+        "{}, {} cores: ms a frame, offset {} mm, {}",
+        machine.cpu, machine.cores, row.offset_mm, row.encoder
+    )
+}
+
+fn bars(rows: &[Row]) -> Vec<Bar> {
+    let bar = |row: &Row| Bar {
+        label: format!(
+            "{} {}×{}, {} thr.",
+            match row.layers {
+                0 => row.method.to_owned(),
+                layers => format!("{layers} layers {}", row.precision),
+            },
+            row.width,
+            row.height,
+            row.threads
+        ),
+        // Bars of one picture name their parts alike, whatever makes the hologram.
+        parts: [
+            ("hologram", row.method),
+            ("propagate", "propagate"),
+            ("encode", "encode"),
+        ]
+        .map(|(part, stage)| (part, row.stage_ms.get(stage).copied().unwrap_or(0.0)))
+        .to_vec(),
+    };
+    rows.iter().map(bar).collect()
 }
 
 fn whole(value: Option<f64>) -> String {

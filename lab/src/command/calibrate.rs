@@ -3,7 +3,7 @@
 use super::flags::{DisplayFlags, parse_size, progress_bar};
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
-use phasefront::Display;
+use phasefront::{Calibration, Display};
 use phasefront_lab::calibrate::lut::{self, Refusal};
 use phasefront_lab::calibrate::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_lab::calibrate::photograph::Photograph;
@@ -23,6 +23,7 @@ pub(crate) enum Calibrate {
     Lut(Lut),
     Laser(Laser),
     Aberration(Aberration),
+    Pack(Pack),
     Rehearse(Rehearse),
 }
 
@@ -32,6 +33,7 @@ impl Calibrate {
             Calibrate::Lut(command) => command.run(json),
             Calibrate::Laser(command) => command.run(json),
             Calibrate::Aberration(command) => command.run(json),
+            Calibrate::Pack(command) => command.run(json),
             Calibrate::Rehearse(command) => command.run(json),
         }
     }
@@ -498,6 +500,40 @@ impl Aberration {
 fn write_state(path: &Path, now: &SearchFile) -> Result<()> {
     let text = serde_json::to_string_pretty(now).map_err(|e| Error::file(path, e))?;
     files::write_atomically(path, |file| writeln!(file, "{text}"))
+}
+
+/// Put a display's file and all that it refers to into one, for an app to carry
+#[derive(Args)]
+pub(crate) struct Pack {
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// The file for the app
+    #[arg(short, value_name = "FILE")]
+    output: PathBuf,
+    /// Write over what is there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Pack {
+    fn run(self, json: bool) -> Result<()> {
+        keep(&self.output, self.force)?;
+        let file = self.display.read()?;
+        let bytes = Calibration {
+            response: file.response()?,
+            correction: file.constant_correction()?,
+            illumination: file.laser,
+            display: file.display,
+        }
+        .to_bytes()?;
+        files::write_atomically(&self.output, |file| file.write_all(&bytes))?;
+        super::print(
+            json,
+            &json!({"file": self.output, "bytes": bytes.len()}),
+            format!("{}: {} bytes", self.output.display(), bytes.len()),
+        );
+        Ok(())
+    }
 }
 
 /// Go through a calibration on a simulated display with a simulated camera

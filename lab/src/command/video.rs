@@ -1,19 +1,21 @@
 //! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
 
-use super::flags::{DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar};
+use super::flags::{
+    BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar,
+};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use ndarray::ArrayView3;
 use phasefront::depth::DepthUnit;
 use phasefront::depth::range::DepthRange;
 use phasefront::session::{
-    Brightness, Event, Hologram, Quality, RunningMode, SessionOptions, Statistics,
+    Backend, Brightness, Event, Hologram, Quality, RunningMode, SessionOptions, Statistics,
 };
 use phasefront::sweep::Sweep;
 use phasefront::{Display, Method, Session};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::video::{self, RawVideo, VideoFrame};
-use phasefront_lab::{Error, Result, models};
+use phasefront_lab::{Error, Result, gpu, models};
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -49,6 +51,8 @@ pub(crate) struct Video {
     size: Option<(usize, usize)>,
     #[command(flatten)]
     display: DisplayFlags,
+    #[command(flatten)]
+    backend: BackendFlags,
     /// Which amplitude full light stands for
     #[arg(long, value_enum, default_value_t = BrightnessName::Steady)]
     brightness: BrightnessName,
@@ -184,6 +188,22 @@ impl Sink {
     }
 }
 
+/// A session that is warm. Where the GPU was asked for and does not serve, that is said; where it does, what was compiled
+/// for it is kept.
+fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
+    let asked = options.backend;
+    let session = Session::new(options, mode)?;
+    session.warm_up()?;
+    match session.gpu() {
+        Some(device) => gpu::keep_programs(&device),
+        None if asked == Backend::Gpu => {
+            log::warn!("on the CPU: {}", session.statistics().backend.why);
+        }
+        None => {}
+    }
+    Ok(session)
+}
+
 impl Video {
     pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
         if !(self.rate.is_finite() && self.rate > 0.0 && self.rate <= 1000.0) {
@@ -308,6 +328,10 @@ impl Video {
                 ));
             }
         };
+        if let Some(device) = self.backend.device()? {
+            options.backend = Backend::Gpu;
+            options.gpu.device = device;
+        }
         options.threads = threads;
         options.quality = Quality::Fixed(0);
         if self.adaptive {
@@ -342,8 +366,7 @@ impl Video {
         sink: &mut Sink,
         bar: &indicatif::ProgressBar,
     ) -> Result<Statistics> {
-        let session = Session::new(options, RunningMode::Video)?;
-        session.warm_up()?;
+        let session = start(options, RunningMode::Video)?;
         let mut frame = 0;
         while let Some(image) = source.next()? {
             sink.take(&session.process(&image.camera_frame(self.timestamp_ns(frame))?)?)?;
@@ -388,8 +411,7 @@ impl Video {
                 _ => {}
             }
         };
-        let session = Session::new(options, RunningMode::Live(Box::new(listener)))?;
-        session.warm_up()?;
+        let session = start(options, RunningMode::Live(Box::new(listener)))?;
         let (submitted, written) = std::thread::scope(|scope| {
             let writer = scope.spawn(move || {
                 let mut result = Ok(());

@@ -6,7 +6,8 @@
 //!
 //! [`int8`] defines the quantised chain's arithmetic so that every instruction set gives the same bits; [`f32`](mod@f32)
 //! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
-//! against. `unsafe` lives in those files alone.
+//! against. `unsafe` lives in those files, and in two that serve the optics: [`wide`] runs plain loops in the widest
+//! vectors, [`each_tile_rows`] lets threads fill a plane whose tiles lie column by column.
 //!
 //! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
 //!
@@ -17,7 +18,9 @@ pub mod fir;
 mod int8;
 mod isa;
 mod peak;
+mod tiles;
 mod wavefront;
+mod wide;
 
 mod portable;
 
@@ -41,7 +44,9 @@ pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
 pub use peak::{f32_peak, int8_peak};
+pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
 pub use wavefront::{Band, Rows, Scratch, Tiling};
+pub use wide::wide;
 
 /// Planes of a hologram network's output: two a colour.
 pub const OUTPUTS: usize = 6;

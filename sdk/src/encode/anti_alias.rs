@@ -3,6 +3,7 @@
 
 use crate::error::{Error, Result};
 use num_complex::Complex32;
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// A separable Gaussian of an odd number of taps, its sum 1; edges are repeated.
@@ -39,102 +40,130 @@ impl AntiAlias {
         &self.taps
     }
 
-    /// Working memory for rows of `width` values, one call at a time: some rows for each thread.
+    /// Working memory for rows of `width` values, one call at a time: some rows for each part of a plane.
     pub fn scratch(&self, width: usize) -> AntiAliasScratch {
-        let half = self.taps.len() - 1;
-        let parts = 2 * rayon::current_num_threads();
+        // Rows blurred along themselves, in a ring, and one blurred both ways.
+        let rows = 2 * (self.taps.len() - 1) + 2;
         AntiAliasScratch {
-            rows: vec![Complex32::ZERO; parts * (3 * half + 1) * width],
-            parts,
+            rows: vec![Complex32::ZERO; 2 * rayon::current_num_threads() * rows * width],
+            part: rows * width,
         }
     }
 
-    /// Blurs `plane`, rows of `width` values, in place.
-    pub fn filter(&self, plane: &mut [Complex32], width: usize, scratch: &mut AntiAliasScratch) {
-        let half = self.taps.len() - 1;
+    /// Hands each row of `plane`, (H, W), blurred, to `then`: its index, its values, to be worked on, and its part of `out`,
+    /// which is cut into H parts of one size.
+    pub fn rows<T: Send>(
+        &self,
+        plane: &[Complex32],
+        width: usize,
+        out: &mut [T],
+        scratch: &mut AntiAliasScratch,
+        then: impl Fn(usize, &mut [Complex32], &mut [T]) + Sync,
+    ) {
         let height = plane.len() / width;
-        let band = height.div_ceil(scratch.parts);
-        let own = (3 * half + 1) * width;
-        plane
-            .par_chunks_mut(band * width)
-            .zip(scratch.rows.par_chunks_exact_mut(own))
-            .for_each(|(band, own)| {
-                let copy = &mut own[..width];
-                for row in band.chunks_exact_mut(width) {
-                    copy.copy_from_slice(row);
-                    self.blur_row(copy, row);
+        let per_row = out.len() / height;
+        let band = height.div_ceil(scratch.rows.len() / scratch.part);
+        out.par_chunks_mut(band * per_row)
+            .zip(scratch.rows.par_chunks_exact_mut(scratch.part))
+            .enumerate()
+            .for_each(|(part, (out, own))| {
+                let first = part * band;
+                let (ring, blurred) = own.split_at_mut(own.len() - width);
+                let half = self.taps.len() - 1;
+                let count = ring.len() / width;
+                // The next row to be blurred along itself; rows outside of the plane are those at its edge.
+                let mut next = first.saturating_sub(half);
+                for (i, out) in out.chunks_exact_mut(per_row).enumerate() {
+                    let y = first + i;
+                    wide(|| {
+                        while next <= (y + half).min(height - 1) {
+                            let ring = &mut ring[next % count * width..][..width];
+                            self.blur_row(&plane[next * width..][..width], ring);
+                            next += 1;
+                        }
+                        let row = |y: usize| &ring[y % count * width..][..width];
+                        let centre = values(row(y));
+                        for (to, from) in values_mut(blurred).iter_mut().zip(centre) {
+                            *to = from * self.taps[0];
+                        }
+                        for (i, tap) in self.taps.iter().enumerate().skip(1) {
+                            let up = values(row(y.saturating_sub(i)));
+                            let down = values(row((y + i).min(height - 1)));
+                            let sums = values_mut(blurred).iter_mut();
+                            for ((to, up), down) in sums.zip(up).zip(down) {
+                                *to += (up + down) * tap;
+                            }
+                        }
+                        then(y, blurred, out);
+                    });
                 }
             });
-        // Bands are blurred in place side by side, so each first keeps its neighbours' rows as they are now.
-        for (part, own) in scratch.rows.chunks_exact_mut(own).enumerate() {
-            let (start, end) = (part * band, ((part + 1) * band).min(height));
-            if start >= height {
-                break;
-            }
-            let (above, below) = own[..2 * half * width].split_at_mut(half * width);
-            for (i, row) in above.chunks_exact_mut(width).enumerate() {
-                let y = (start + i).saturating_sub(half);
-                row.copy_from_slice(&plane[y * width..][..width]);
-            }
-            for (i, row) in below.chunks_exact_mut(width).enumerate() {
-                let y = (end + i).min(height - 1);
-                row.copy_from_slice(&plane[y * width..][..width]);
+    }
+
+    /// The blur of `plane`, (H, W), value by value: the oracle of [`Self::rows`], to the bit.
+    pub fn filter(&self, plane: &mut [Complex32], width: usize) {
+        let height = plane.len() / width;
+        // What stands `i` places before and after the value at `at`, of `count` that are `step` apart.
+        let pair = |from: &[Complex32], at: usize, i: usize, count: usize, step: usize| {
+            let place = at / step % count;
+            let (before, after) = (place.saturating_sub(i), (place + i).min(count - 1));
+            from[at - (place - before) * step] + from[at + (after - place) * step]
+        };
+        for (count, step) in [(width, 1), (height, width)] {
+            let from = plane.to_vec();
+            for (at, to) in plane.iter_mut().enumerate() {
+                *to = from[at] * self.taps[0];
+                for (i, tap) in self.taps.iter().enumerate().skip(1) {
+                    *to += pair(&from, at, i, count, step) * *tap;
+                }
             }
         }
-        plane
-            .par_chunks_mut(band * width)
-            .zip(scratch.rows.par_chunks_exact_mut(own))
-            .for_each(|(band, own)| self.blur_columns(band, width, own));
     }
 
     /// The blur of `row` along itself into `out`.
+    #[inline(always)]
     fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
-        let last = row.len() - 1;
-        for (x, value) in out.iter_mut().enumerate() {
-            *value = row[x] * self.taps[0];
+        let (last, half) = (row.len() - 1, self.taps.len() - 1);
+        let inner = half..row.len().saturating_sub(half).max(half);
+        for x in (0..half.min(row.len())).chain(inner.end..row.len()) {
+            out[x] = row[x] * self.taps[0];
             for (i, tap) in self.taps.iter().enumerate().skip(1) {
-                *value += (row[x.saturating_sub(i)] + row[(x + i).min(last)]) * *tap;
+                out[x] += (row[x.saturating_sub(i)] + row[(x + i).min(last)]) * *tap;
             }
         }
-    }
-
-    /// The blur of a band of rows across them, in place. `own` holds the rows above the band, those below
-    /// it, and room: once a row is overwritten, it takes its place among the rows above.
-    fn blur_columns(&self, band: &mut [Complex32], width: usize, own: &mut [Complex32]) {
-        let half = self.taps.len() - 1;
-        let rows = band.len() / width;
-        let (above, rest) = own.split_at_mut(half * width);
-        let (below, room) = rest.split_at_mut(half * width);
-        let current = &mut room[..width];
-        for y in 0..rows {
-            let (done, ahead) = band.split_at_mut((y + 1) * width);
-            let row = &mut done[y * width..];
-            current.copy_from_slice(row);
-            for value in row.iter_mut() {
-                *value *= self.taps[0];
-            }
-            for (i, tap) in self.taps.iter().enumerate().skip(1) {
-                // `above` is a ring: the row i above y is i − 1 places behind the one overwritten last.
-                let up = &above[((y + half - i) % half) * width..][..width];
-                let down = match y + i < rows {
-                    true => &ahead[(i - 1) * width..][..width],
-                    false => &below[(y + i - rows) * width..][..width],
-                };
-                for ((value, up), down) in row.iter_mut().zip(up).zip(down) {
-                    *value += (up + down) * *tap;
-                }
-            }
-            if half > 0 {
-                above[(y % half) * width..][..width].copy_from_slice(current);
+        if inner.is_empty() {
+            return;
+        }
+        let part = |from: usize| values(&row[from..][..inner.len()]);
+        let out = values_mut(&mut out[inner.clone()]);
+        for (to, from) in out.iter_mut().zip(part(half)) {
+            *to = from * self.taps[0];
+        }
+        for (i, tap) in self.taps.iter().enumerate().skip(1) {
+            let sums = out.iter_mut().zip(part(half - i)).zip(part(half + i));
+            for ((to, left), right) in sums {
+                *to += (left + right) * tap;
             }
         }
     }
 }
 
-/// Working memory of [`AntiAlias::filter`].
+/// Real and imaginary parts in turn.
+#[inline(always)]
+fn values(row: &[Complex32]) -> &[f32] {
+    bytemuck::cast_slice(row)
+}
+
+#[inline(always)]
+fn values_mut(row: &mut [Complex32]) -> &mut [f32] {
+    bytemuck::cast_slice_mut(row)
+}
+
+/// Working memory of [`AntiAlias::rows`].
 pub struct AntiAliasScratch {
     rows: Vec<Complex32>,
-    parts: usize,
+    /// Values of a part.
+    part: usize,
 }
 
 #[cfg(test)]
@@ -167,7 +196,11 @@ mod tests {
             .map(|i| Complex32::new((i as f32).sin(), (i as f32 * 2.0).cos()))
             .collect();
         let mut out = plane.clone();
-        plan.filter(&mut out, w, &mut plan.scratch(w));
+        let copy = |_, row: &mut [Complex32], out: &mut [Complex32]| out.copy_from_slice(row);
+        plan.rows(&plane, w, &mut out, &mut plan.scratch(w), copy);
+        let mut naive = plane.clone();
+        plan.filter(&mut naive, w);
+        assert_eq!(out, naive);
         let half = taps as i32 / 2;
         let weight = |i: i32| (-0.5 * (f64::from(i) / f64::from(sigma)).powi(2)).exp();
         let sum: f64 = (-half..=half).map(weight).sum();

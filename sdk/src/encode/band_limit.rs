@@ -2,7 +2,7 @@
 //! (Sui et al., Opt. Express 29, 2597, 2021): |tan(πfx)·tan(πfy)| ≤ k stays, f in cycles a pixel.
 
 use crate::error::{Error, Result};
-use crate::wave::fft::{Fft2, Scratch};
+use crate::wave::fft::{ConvolveScratch, Fft2};
 use num_complex::Complex32;
 use std::f64::consts::PI;
 
@@ -34,8 +34,8 @@ impl BandLimit {
     }
 
     /// Working memory for one call at a time.
-    pub fn scratch(&self) -> Scratch {
-        self.fft.scratch()
+    pub fn scratch(&self) -> ConvolveScratch {
+        self.fft.convolve_scratch()
     }
 
     /// The largest |ky| that stays in column `kx` of the spectrum.
@@ -53,7 +53,7 @@ impl BandLimit {
     }
 
     /// Filters `plane`, (H, W), as a periodic one.
-    pub fn filter(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
+    pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         let (height, width) = self.fft.padded_shape();
         let scale = 1.0 / (height * width) as f32;
         self.fft.convolve(

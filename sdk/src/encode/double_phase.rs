@@ -3,7 +3,6 @@
 
 use crate::slm::Response;
 use num_complex::Complex32;
-use rayon::prelude::*;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// The two phases of one value at pixel (x, y): φ + acos A where x + y is even, φ − acos A where it is
@@ -31,64 +30,70 @@ pub fn wrap(phase: f32) -> f32 {
     if wrapped < TAU { wrapped } else { 0.0 }
 }
 
-/// The largest amplitude in `field`, 0 for an empty one.
-pub fn max_amplitude(field: &[Complex32]) -> f32 {
-    field
-        .par_chunks(1 << 14)
-        .map(|part| part.iter().map(Complex32::norm_sqr).fold(0.0, f32::max))
-        .reduce(|| 0.0, f32::max)
-        .sqrt()
+/// The largest |u|² of a row, 0 for an empty one.
+#[inline(always)]
+pub fn max_norm_sqr(row: &[Complex32]) -> f32 {
+    // Several maxima side by side, so that it vectorises.
+    let (runs, rest) = row.as_chunks::<16>();
+    let mut most = [0.0f32; 16];
+    for run in runs {
+        for (most, value) in most.iter_mut().zip(run) {
+            *most = most.max(value.norm_sqr());
+        }
+    }
+    let rest = rest.iter().map(Complex32::norm_sqr);
+    rest.chain(most).fold(0.0, f32::max)
 }
 
-/// [`encode_value`] on a stack of planes of `width` columns and `plane` values each, to 1e-5 rad.
-pub fn encode(field: &[Complex32], width: usize, plane: usize, scale: f32, phase: &mut [f32]) {
-    let height = plane / width;
-    field
-        .par_chunks_exact(width)
-        .zip(phase.par_chunks_exact_mut(width))
-        .enumerate()
-        .for_each(|(row, (values, phases))| encode_run(values, row % height, scale, phases));
+/// [`encode_value`] on row `y` of a plane, to 1e-5 rad.
+#[inline(always)]
+pub fn encode_row(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
+    let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
+    // The sign of acos, on the two colours of the checkerboard.
+    let sign = if y.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let signs: [f32; 16] = std::array::from_fn(|x| if x % 2 == 0 { sign } else { -sign });
+    let (runs, rest) = values.as_chunks::<16>();
+    let (phase_runs, phase_rest) = phases.as_chunks_mut::<16>();
+    for (values, phases) in runs.iter().zip(phase_runs) {
+        for ((value, phase), sign) in values.iter().zip(phases).zip(signs) {
+            *phase = encode_one(*value, inverse, sign);
+        }
+    }
+    for ((value, phase), sign) in rest.iter().zip(phase_rest).zip(signs) {
+        *phase = encode_one(*value, inverse, sign);
+    }
 }
 
-/// [`encode`] and [`Response::level`] in one sweep: phases never leave the cache.
-pub fn encode_levels(
-    field: &[Complex32],
-    width: usize,
-    plane: usize,
+/// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first` of
+/// the stack (3, H, W).
+#[inline(always)]
+pub fn encode_row_levels(
+    values: &[Complex32],
+    y: usize,
     scale: f32,
     response: &Response,
+    first: usize,
     levels: &mut [u8],
 ) {
     /// Even, so that each run starts on the colour of the checkerboard that its row starts on.
     const RUN: usize = 256;
-    let height = plane / width;
-    field
-        .par_chunks_exact(width)
-        .zip(levels.par_chunks_exact_mut(width))
-        .enumerate()
-        .for_each(|(row, (values, levels))| {
-            let mut phases = [0.0; RUN];
-            let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
-            for (run, (values, levels)) in runs.enumerate() {
-                let phases = &mut phases[..values.len()];
-                encode_run(values, row % height, scale, phases);
-                response.levels(phases, row * width + run * RUN, levels);
-            }
-        });
+    let mut phases = [0.0; RUN];
+    let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
+    for (run, (values, levels)) in runs.enumerate() {
+        let phases = &mut phases[..values.len()];
+        encode_row(values, y, scale, phases);
+        response.levels(phases, first + run * RUN, levels);
+    }
 }
 
-/// [`encode_value`] from an even x on, in row `y`; without branches, so that it vectorises.
-fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
-    let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
-    for (x, (value, phase)) in values.iter().zip(phases).enumerate() {
-        let amplitude = (value.norm_sqr().sqrt() * inverse).min(1.0);
-        let half = acos(amplitude);
-        let signed = if (x + y) & 1 == 0 { half } else { -half };
-        let sum = atan2(value.im, value.re) + signed;
-        // The sum lies in [−3π/2, 3π/2].
-        let turned = if sum < 0.0 { sum + TAU } else { sum };
-        *phase = if turned < TAU { turned } else { 0.0 };
-    }
+/// One value's phase; without branches, so that loops over it vectorise.
+#[inline(always)]
+fn encode_one(value: Complex32, inverse: f32, sign: f32) -> f32 {
+    let amplitude = (value.norm_sqr().sqrt() * inverse).min(1.0);
+    let sum = atan2(value.im, value.re) + sign * acos(amplitude);
+    // The sum lies in [−3π/2, 3π/2].
+    let turned = if sum < 0.0 { sum + TAU } else { sum };
+    if turned < TAU { turned } else { 0.0 }
 }
 
 /// acos of a number in \[0, 1], to 1e-6: √(1 − a) times a polynomial (Abramowitz and Stegun, 4.4.46).
@@ -150,6 +155,18 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_amplitude_is_found_wherever_it_stands() {
+        for n in [0, 1, 15, 16, 40] {
+            for at in 0..n {
+                let mut row = vec![Complex32::new(0.1, -0.2); n];
+                row[at] = Complex32::new(-0.3, 0.4);
+                assert!((max_norm_sqr(&row) - 0.25).abs() < 1e-6);
+            }
+            assert_eq!(max_norm_sqr(&vec![Complex32::ZERO; n]), 0.0);
+        }
+    }
+
+    #[test]
     fn a_zero_scale_is_dark_and_tiny_negative_phases_stay_in_range() {
         let even = encode_value(Complex32::new(1.0, 0.0), 0, 0, 0.0);
         let odd = encode_value(Complex32::new(1.0, 0.0), 1, 0, 0.0);
@@ -187,7 +204,10 @@ mod tests {
             .collect();
         for scale in [1.0, 0.7, 0.0] {
             let mut phase = vec![0.0; field.len()];
-            encode(&field, w, h * w, scale, &mut phase);
+            let rows = field.chunks_exact(w).zip(phase.chunks_exact_mut(w));
+            for (row, (values, phases)) in rows.enumerate() {
+                encode_row(values, row % h, scale, phases);
+            }
             for (i, (value, phase)) in field.iter().zip(&phase).enumerate() {
                 let exact = encode_value(*value, i % w, i / w % h, scale);
                 let apart = (exact - phase).abs();
@@ -206,7 +226,10 @@ mod tests {
                 per_pixel((h, w)),
             ] {
                 let mut fused = vec![0; field.len()];
-                encode_levels(&field, w, h * w, scale, &response, &mut fused);
+                let rows = field.chunks_exact(w).zip(fused.chunks_exact_mut(w));
+                for (row, (values, levels)) in rows.enumerate() {
+                    encode_row_levels(values, row % h, scale, &response, row * w, levels);
+                }
                 assert!(
                     (phase.iter().zip(&fused).enumerate())
                         .all(|(at, (p, l))| response.level(*p, at) == *l)

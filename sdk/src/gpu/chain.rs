@@ -612,7 +612,7 @@ impl NetworkPlan {
         device.guarded(|| {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
-            let packer = Packer::new(device, chain, numbers, size, Source::Planes)?;
+            let packer = Packer::new(device, chain, numbers, size, Source::Planes, None)?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
             Ok(NetworkPlan {

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
-/// How long a frame may take before the device counts as hung: drivers themselves give up after some seconds.
+/// How long a frame may take before a device counts as hung: drivers themselves give up after some seconds.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// The same for drivers in software, which take their time.
 const SOFTWARE_PATIENCE: Duration = Duration::from_secs(300);
@@ -33,6 +33,25 @@ pub(crate) struct Features {
     pub(crate) timestamps: bool,
 }
 
+/// What a device is opened with at most.
+pub(crate) struct Allowed {
+    pub(crate) features: wgpu::Features,
+    /// From the adapter's limits.
+    pub(crate) limits: fn(wgpu::Limits) -> wgpu::Limits,
+    /// Of the memory that the driver says is free, where it says so.
+    pub(crate) memory_percent: Option<u8>,
+}
+
+impl Default for Allowed {
+    fn default() -> Self {
+        Allowed {
+            features: wgpu::Features::all(),
+            limits: |limits| limits,
+            memory_percent: None,
+        }
+    }
+}
+
 /// An open GPU. Immutable; threads share it.
 pub struct Device {
     pub(crate) inner: wgpu::Device,
@@ -41,6 +60,8 @@ pub struct Device {
     limits: wgpu::Limits,
     features: Features,
     cache: Option<wgpu::PipelineCache>,
+    /// How long a frame may take before the device counts as hung.
+    patience: Duration,
     /// By entry and text: layers that are alike, and frames of all sizes, share their programs.
     compiled: Mutex<HashMap<(&'static str, String), Program>>,
     lost: Arc<Mutex<Option<String>>>,
@@ -59,31 +80,37 @@ impl Device {
     /// [`Error::None`] where there is none, or none of that name, with those that there are;
     /// [`Error::Refused`] where the driver does not open it.
     pub fn open(options: &DeviceOptions) -> Result<Self> {
-        Self::open_with(options, wgpu::Features::all(), |limits| limits)
+        Self::open_with(options, &Allowed::default())
     }
 
-    /// [`Device::open`] with no more than the given features, and with limits that `limit` may lower.
-    pub(crate) fn open_with(
-        options: &DeviceOptions,
-        allowed: wgpu::Features,
-        limit: impl Fn(wgpu::Limits) -> wgpu::Limits,
-    ) -> Result<Self> {
-        let adapter = adapter(options.name.as_deref())?;
+    /// [`Device::open`] with no more than `allowed`.
+    pub(crate) fn open_with(options: &DeviceOptions, allowed: &Allowed) -> Result<Self> {
+        let adapter = adapter(options.name.as_deref(), allowed.memory_percent)?;
         let info = adapter.get_info();
-        let wanted = wgpu::Features::SHADER_F16
-            | wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::PIPELINE_CACHE;
-        let granted = adapter.features() & wanted & allowed;
-        let limits = limit(adapter.limits());
         let descriptor = wgpu::DeviceDescriptor {
-            required_features: granted,
-            required_limits: limits.clone(),
+            required_features: adapter.features() & Self::wanted() & allowed.features,
+            required_limits: (allowed.limits)(adapter.limits()),
             ..Default::default()
         };
         let (device, queue) =
             pollster::block_on(adapter.request_device(&descriptor)).map_err(|why| {
                 Error::Refused(format!("{} cannot be opened: {}", info.name, one_line(why)))
             })?;
+        Ok(Self::of(device, queue, options.programs.as_deref()))
+    }
+
+    /// The features that an app's own device should have for [`Device::of`], as far as its adapter has them.
+    pub fn wanted() -> wgpu::Features {
+        wgpu::Features::SHADER_F16
+            | wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::PIPELINE_CACHE
+    }
+
+    /// A device that an app opened, so that it shows on its own surface what is computed, without a copy: best with the
+    /// limits of its adapter, and with what it has of [`Device::wanted`]. Its loss and its uncaptured errors are told
+    /// here from then on. `programs` are those of an earlier run, as in [`DeviceOptions`].
+    pub fn of(device: wgpu::Device, queue: wgpu::Queue, programs: Option<&[u8]>) -> Self {
+        let (info, limits, granted) = (device.adapter_info(), device.limits(), device.features());
         let lost = Arc::new(Mutex::new(None));
         let note = |lost: &Arc<Mutex<Option<String>>>, why: String| {
             lock(lost).get_or_insert(why);
@@ -99,8 +126,12 @@ impl Device {
         }));
         let cache = granted
             .contains(wgpu::Features::PIPELINE_CACHE)
-            .then(|| pipeline_cache(&device, options.programs.as_deref()));
-        Ok(Device {
+            .then(|| pipeline_cache(&device, programs));
+        Device {
+            patience: match info.device_type {
+                wgpu::DeviceType::Cpu => SOFTWARE_PATIENCE,
+                _ => PATIENCE,
+            },
             inner: device,
             queue,
             limits,
@@ -112,7 +143,7 @@ impl Device {
             cache,
             compiled: Mutex::default(),
             lost,
-        })
+        }
     }
 
     /// The GPU's name and the interface it is spoken to by.
@@ -165,18 +196,14 @@ impl Device {
     /// Waits for what was submitted up to `submission`.
     pub(crate) fn wait(&self, submission: &wgpu::SubmissionIndex) -> Result<()> {
         self.check()?;
-        let patience = match self.is_software() {
-            true => SOFTWARE_PATIENCE,
-            false => PATIENCE,
-        };
         let waited = self.inner.poll(wgpu::PollType::Wait {
             submission_index: Some(submission.clone()),
-            timeout: Some(patience),
+            timeout: Some(self.patience),
         });
         match waited {
             Ok(_) => {}
             Err(wgpu::PollError::Timeout) => {
-                self.give_up(&format!("no answer for {} s", patience.as_secs()));
+                self.give_up(&format!("no answer for {:?}", self.patience));
             }
             Err(why) => self.give_up(&one_line(why)),
         }
@@ -311,6 +338,13 @@ impl Device {
         Program(pipeline)
     }
 
+    /// Has `forged` run wherever `source` is to run: a driver that compiles wrongly.
+    #[cfg(test)]
+    pub(crate) fn forge(&self, entry: &'static str, source: &str, forged: &str) {
+        let program = self.compile("forged", forged, entry);
+        lock(&self.compiled).insert((entry, source.to_owned()), program);
+    }
+
     /// Reads `buffer` back, once what was submitted is done: for tests and for looking at what is between stages.
     pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
         let target = self.readable("read back", bytes);
@@ -423,8 +457,10 @@ impl Dispatch {
 }
 
 /// The adapter of that name, or the fastest that is hardware.
-fn adapter(name: Option<&str>) -> Result<wgpu::Adapter> {
-    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapter> {
+    let mut wanted = wgpu::InstanceDescriptor::new_without_display_handle();
+    wanted.memory_budget_thresholds.for_resource_creation = memory_percent;
+    let instance = wgpu::Instance::new(wanted);
     let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
     let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
@@ -576,11 +612,15 @@ mod tests {
 
     #[test]
     fn what_a_device_does_not_take_is_an_error() {
-        let small = |limits: wgpu::Limits| wgpu::Limits {
-            max_storage_buffer_binding_size: 1 << 20,
-            ..limits
+        let little = Allowed {
+            features: wgpu::Features::empty(),
+            limits: |limits| wgpu::Limits {
+                max_storage_buffer_binding_size: 1 << 20,
+                ..limits
+            },
+            ..Default::default()
         };
-        let Ok(device) = Device::open_with(&software(), wgpu::Features::empty(), small) else {
+        let Ok(device) = Device::open_with(&software(), &little) else {
             println!("skipped: no driver in software (mesa-vulkan-drivers)");
             return;
         };
@@ -596,6 +636,117 @@ mod tests {
         // A lost device says so, and why, to all that comes.
         device.give_up("pulled out");
         assert_eq!(device.check(), Err(Error::Lost("pulled out".into())));
+        assert!(matches!(device.guarded(|| Ok(())), Err(Error::Lost(_))));
+    }
+
+    #[test]
+    fn memory_that_is_not_there_is_an_error() {
+        let little = Allowed {
+            memory_percent: Some(1),
+            ..Default::default()
+        };
+        let Ok(device) = Device::open_with(&software(), &little) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;
+        let taken = device.guarded(|| {
+            // More than a hundredth of any machine's memory.
+            let all = (0..64).map(|_| device.buffer("a frame", most));
+            all.collect::<Result<Vec<_>>>()
+        });
+        assert!(matches!(taken, Err(Error::OutOfMemory(_))), "{taken:?}");
+        // What does fit still works.
+        let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
+        assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
+    }
+
+    #[test]
+    fn a_device_that_hangs_is_given_up() {
+        let Ok(mut device) = Device::open(&software()) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        device.patience = Duration::from_millis(1);
+        let source = "
+            @group(0) @binding(0) var<storage, read_write> result: array<u32>;
+            @compute @workgroup_size(64)
+            fn long(@builtin(global_invocation_id) at: vec3u) {
+                var v = at.x;
+                for (var k = 0u; k < 2000000u; k++) { v = v * 1664525u + 1013904223u; }
+                result[at.x % 4u] = v;
+            }";
+        let step = device.guarded(|| {
+            let result = device.buffer("result", 16)?;
+            let program = device.program("a long one", source.into(), "long");
+            program.on(&device, &[(0, result.as_entire_binding())], [64, 1, 1])
+        });
+        let step = step.unwrap();
+        let mut encoder = device.inner.create_command_encoder(&Default::default());
+        step.run(&mut encoder.begin_compute_pass(&Default::default()));
+        let waited = device.wait(&device.queue.submit([encoder.finish()]));
+        assert_eq!(waited, Err(Error::Lost("no answer for 1ms".into())));
+        assert!(device.check().is_err());
+    }
+
+    #[test]
+    fn programs_are_kept_from_run_to_run() {
+        let Ok(first) = Device::open(&software()) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        let Some(before) = first.programs() else {
+            println!("skipped: {first:?} keeps its programs itself");
+            return;
+        };
+        let source = "
+            @group(0) @binding(0) var<storage, read_write> result: array<u32>;
+            @compute @workgroup_size(1) fn seven() { result[0] = 7u; }";
+        let seven = |device: &Device| {
+            let buffer = device.guarded(|| {
+                let result = device.buffer("result", 16)?;
+                let program = device.program("seven", source.into(), "seven");
+                let step = program.on(device, &[(0, result.as_entire_binding())], [1, 1, 1])?;
+                let mut encoder = device.inner.create_command_encoder(&Default::default());
+                step.run(&mut encoder.begin_compute_pass(&Default::default()));
+                device.queue.submit([encoder.finish()]);
+                Ok(result)
+            });
+            device.read(&buffer.unwrap(), 4).unwrap()
+        };
+        assert_eq!(seven(&first), [7, 0, 0, 0]);
+        let programs = first.programs().unwrap();
+        assert!(programs.len() >= before.len());
+        // Those of this driver are taken, those of another or of nobody are ignored.
+        let mut foreign = programs.clone();
+        foreign.iter_mut().for_each(|byte| *byte ^= 0x55);
+        for programs in [programs, foreign, vec![1, 2, 3], Vec::new()] {
+            let options = DeviceOptions {
+                programs: Some(programs),
+                ..software()
+            };
+            assert_eq!(seven(&Device::open(&options).unwrap()), [7, 0, 0, 0]);
+        }
+    }
+
+    #[test]
+    fn an_app_computes_on_its_own_device() {
+        let Ok(adapter) = adapter(software().name.as_deref(), None) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        let descriptor = wgpu::DeviceDescriptor {
+            required_features: adapter.features() & Device::wanted(),
+            required_limits: adapter.limits(),
+            ..Default::default()
+        };
+        let (inner, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
+        let device = Device::of(inner.clone(), queue, None);
+        assert!(device.is_software());
+        let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
+        assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
+        // The app takes it away.
+        inner.destroy();
         assert!(matches!(device.guarded(|| Ok(())), Err(Error::Lost(_))));
     }
 }

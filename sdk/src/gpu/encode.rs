@@ -1,14 +1,16 @@
 //! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
 //! double phase, the response. The twin of [`crate::encode`] and [`crate::slm`].
 
+use super::brightness::Steadier;
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Constants, Device, Dispatch};
 use super::fft::{Convolution, Planes, quadrant};
 use super::input::{Packer, Source};
 use super::{Error, Result};
+use crate::brightness::{Brightness, Past};
+use crate::encode::Encoding;
 use crate::encode::anti_alias::AntiAlias;
 use crate::encode::band_limit::BandLimit;
-use crate::encode::{Encoding, Scale};
 use crate::illumination::Illumination;
 use crate::network::{InputKind, Network};
 use crate::slm::{Response, per_pixel};
@@ -85,14 +87,16 @@ impl Target {
 
 /// The encoding of one field buffer into several targets.
 pub(super) struct Encoder {
+    /// Of steady brightness.
+    steadier: Option<Steadier>,
     prefilter: Option<Prefilter>,
     convolution: Option<Convolution>,
     before: Vec<Dispatch>,
     /// For each target.
     encode: Vec<Dispatch>,
-    /// One u32: the bits of the largest squared amplitude.
+    /// One u32: the bits of the largest squared amplitude, or of the squared steady scale.
     pub(super) largest: wgpu::Buffer,
-    scale: Scale,
+    brightness: Brightness,
 }
 
 impl Encoder {
@@ -105,7 +109,7 @@ impl Encoder {
         size: (usize, usize),
         encoding: &Encoding,
         options: ChainOptions,
-        scale: Scale,
+        brightness: Brightness,
         response: &Response,
         light: Option<(&Illumination, (usize, usize))>,
         mut turn: Option<&wgpu::Buffer>,
@@ -158,13 +162,20 @@ impl Encoder {
             half = 0;
         }
         taps.resize(3, 0.0);
-        let fixed = match scale {
-            Scale::Fixed(scale) => scale,
-            Scale::Max => 0.0,
+        let fixed = match brightness {
+            Brightness::Fixed(scale) => scale,
+            _ => 0.0,
         };
         let settings = [taps[0], taps[1], taps[2], fixed];
         let settings = device.constants("settings", bytemuck::cast_slice(&settings))?;
         let largest = device.buffer("the largest amplitude", 4)?;
+        let steadier = match brightness {
+            Brightness::Steady => {
+                let len = 3 * height * width;
+                Some(Steadier::new(device, field, len, &largest)?)
+            }
+            _ => None,
+        };
         let mut curves = None;
         let (steps, table) = match response {
             Response::Linear { bits } => (1u32 << bits, vec![0]),
@@ -201,7 +212,7 @@ impl Encoder {
             const ALL_WIDTH: u32 = {}u;
             ",
             turn.is_some(),
-            scale != Scale::Max,
+            matches!(brightness, Brightness::Fixed(_)),
             table.len() > 1,
             curves.is_some(),
             light.is_some(),
@@ -221,7 +232,7 @@ impl Encoder {
             (3, turn.as_entire_binding()),
         ];
         let grid = [width.div_ceil(COLUMNS), height, 1];
-        if scale == Scale::Max {
+        if brightness == Brightness::FrameMax {
             let program = device.program("the largest amplitude", source.clone(), "peak");
             let mut arguments = common.to_vec();
             arguments.push((4, largest.as_entire_binding()));
@@ -241,24 +252,39 @@ impl Encoder {
             })
             .collect::<Result<_>>()?;
         Ok(Encoder {
+            steadier,
             prefilter,
             convolution,
             before,
             encode,
             largest,
-            scale,
+            brightness,
         })
+    }
+
+    /// Where the scale of the frame comes from that is submitted next, if it is steady.
+    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+        if let Some(steadier) = &self.steadier {
+            steadier.heed(device, past);
+        }
     }
 
     /// To be called before the pass: the largest amplitude of this frame is not known yet.
     pub(super) fn reset(&self, encoder: &mut wgpu::CommandEncoder) {
-        if self.scale == Scale::Max {
+        if self.brightness == Brightness::FrameMax {
             encoder.clear_buffer(&self.largest, 0, None);
+        }
+        if let Some(steadier) = &self.steadier {
+            steadier.reset(encoder);
         }
     }
 
     /// Encodes into the target of that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, target: usize) {
+        // Of the field as it comes, as on the CPU.
+        if let Some(steadier) = &self.steadier {
+            steadier.run(pass);
+        }
         if let Some(prefilter) = &self.prefilter {
             prefilter.packer.run(pass);
             prefilter.chain.run(pass);
@@ -272,9 +298,9 @@ impl Encoder {
 
     /// The scale that a frame had whose `largest` was read back.
     pub(super) fn scale(&self, largest: u32) -> f32 {
-        match self.scale {
-            Scale::Fixed(scale) => scale,
-            Scale::Max => f32::from_bits(largest).sqrt(),
+        match self.brightness {
+            Brightness::Fixed(scale) => scale,
+            _ => f32::from_bits(largest).sqrt(),
         }
     }
 }
@@ -302,7 +328,7 @@ impl Prefilter {
         }
         let chain = network.chain();
         let numbers = Numbers::of(device, chain, options.float)?;
-        let packer = Packer::new(device, chain, numbers, size, Source::Field(field))?;
+        let packer = Packer::new(device, chain, numbers, size, Source::Field(field), None)?;
         let end = End::Field(network.head(), InputKind::Field);
         let (input, fusion) = (&packer.input, options.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
@@ -357,6 +383,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::testing::{apart, device, field, read, run, upload};
     use super::*;
+    use crate::encode::Scale;
     use crate::modulator::remove_mean_phase;
     use crate::slm::per_pixel::PerPixel;
     use num_complex::Complex32;
@@ -458,7 +485,7 @@ mod tests {
                         size,
                         &encoding,
                         ChainOptions::default(),
-                        scale,
+                        scale.into(),
                         &response,
                         None,
                         Some(&turn),
@@ -473,6 +500,7 @@ mod tests {
             for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
                 plane.iter_mut().for_each(|value| *value *= turn);
             }
+            let mut given = expected.clone();
             let twin = crate::encode::Encoder::new(size.0, size.1, encoding.clone()).unwrap();
             let mut levels = vec![0; 3 * area];
             let used = twin.encode_levels(
@@ -483,7 +511,12 @@ mod tests {
                 &mut twin.scratch(),
             );
             let mut phase = vec![0.0; 3 * area];
-            crate::encode::double_phase::encode(&expected, size.1, area, used, &mut phase);
+            twin.encode(
+                &mut given,
+                Scale::Fixed(used),
+                &mut phase,
+                &mut twin.scratch(),
+            );
             let largest: Vec<u32> =
                 bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
             let found = encoder.scale(largest[0]);

@@ -127,6 +127,7 @@ pub(super) enum Source<'a> {
 }
 
 /// What a chain reads, on the GPU.
+#[derive(Clone)]
 pub(super) struct ChainInput {
     /// The first layer's input.
     pub(super) first: wgpu::Buffer,
@@ -134,6 +135,25 @@ pub(super) struct ChainInput {
     pub(super) last: wgpu::Buffer,
     /// It in f32, for a head that adds to it; the same buffer but in int8.
     pub(super) image: wgpu::Buffer,
+}
+
+impl ChainInput {
+    /// Memory for so many groups of four channels at a pixel.
+    fn new(device: &Device, groups: usize, numbers: Numbers) -> Result<Self> {
+        let first = device.buffer("the network's input", groups * numbers.value_bytes())?;
+        Ok(match numbers {
+            Numbers::Int8 => ChainInput {
+                first,
+                last: device.buffer("the network's input", groups * 4)?,
+                image: device.buffer("the image", groups * 16)?,
+            },
+            _ => ChainInput {
+                last: first.clone(),
+                image: first.clone(),
+                first,
+            },
+        })
+    }
 }
 
 /// The input stage for one frame size.
@@ -157,29 +177,22 @@ struct Camera {
 }
 
 impl Packer {
-    /// The stage for `chain` and frames of `size` (height, width).
+    /// The stage for `chain` and frames of `size` (height, width), into memory of its own or `input`, which another
+    /// stage of the same chain, numbers and size had.
     pub(super) fn new(
         device: &Device,
         chain: &Chain,
         numbers: Numbers,
         size: (usize, usize),
         source: Source<'_>,
+        input: Option<ChainInput>,
     ) -> Result<Self> {
         let (height, width) = size;
         let area = height * width;
         let groups = chain.inputs.div_ceil(GROUP);
-        let first = device.buffer("the network's input", groups * area * numbers.value_bytes())?;
-        let input = match numbers {
-            Numbers::Int8 => ChainInput {
-                first,
-                last: device.buffer("the network's input", groups * area * 4)?,
-                image: device.buffer("the image", groups * area * 16)?,
-            },
-            _ => ChainInput {
-                last: first.clone(),
-                image: first.clone(),
-                first,
-            },
+        let input = match input {
+            Some(input) => input,
+            None => ChainInput::new(device, groups * area, numbers)?,
         };
         let frame = [width, height, area, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
@@ -322,6 +335,11 @@ impl Packer {
             _ => return Err(other("depth").into()),
         }
         Ok(())
+    }
+
+    /// What frames come as, where they do.
+    pub(super) fn formats(&self) -> Option<(Colour, Depth)> {
+        self.formats
     }
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
@@ -512,7 +530,85 @@ fn thresholds(rounded: impl Fn(f32) -> u8) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::testing::{device, run};
     use super::*;
+    use crate::Network;
+    use crate::frame::{Rotation, YuvEncoding};
+
+    /// Camera images of odd sizes, turned, made larger and smaller, in the numbers of float chains.
+    #[test]
+    fn the_input_is_that_of_the_cpu() {
+        let Some(device) = device() else { return };
+        let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
+        let format = ColourFormat::Nv12(YuvEncoding::default());
+        let orientation = Orientation {
+            rotation: Rotation::Clockwise90,
+            mirrored: true,
+        };
+        for ((height, width), sensor) in [
+            ((61, 47), (75, 101)),
+            ((384, 384), (301, 407)),
+            ((540, 960), (1081, 607)),
+        ] {
+            let colour = Colour::Camera {
+                format,
+                height: sensor.0,
+                width: sensor.1,
+                orientation,
+            };
+            let byte = |i: usize| (i * 7 % 251) as u8;
+            let luma: Vec<u8> = (0..sensor.0 * sensor.1).map(byte).collect();
+            let half = (sensor.0.div_ceil(2), sensor.1.div_ceil(2));
+            let chroma: Vec<u8> = (0..2 * half.0 * half.1).map(byte).collect();
+            let planes = [
+                Plane::new(&luma, sensor.1, 1),
+                Plane::new(&chroma, 2 * half.1, 2),
+            ];
+            let image = ColourImage::new(format, sensor.1, sensor.0, &planes).unwrap();
+            let words: Vec<u16> = (0..height * width).map(|i| (i * 4099) as u16).collect();
+            let frame = Frame {
+                colour: ColourData::Camera(image),
+                depth: DepthData::U16(&words),
+            };
+            let twin = frame.read(orientation, height, width).unwrap();
+            for (numbers, most) in [(Numbers::F32, 1e-4), (Numbers::F16, 5e-4)] {
+                if numbers == Numbers::F16 && !device.has_half() {
+                    continue;
+                }
+                let source = Source::Frame(colour, Depth::U16);
+                let size = (height, width);
+                let chain = network.chain();
+                let packer = device
+                    .guarded(|| Packer::new(&device, chain, numbers, size, source, None))
+                    .unwrap();
+                packer.upload(&device, &frame).unwrap();
+                run(&device, |pass| packer.run(pass));
+                let bytes = numbers.value_bytes() * height * width;
+                let bytes = device.read(&packer.input.first, bytes).unwrap();
+                let values: Vec<f32> = match numbers {
+                    Numbers::F16 => bytemuck::pod_collect_to_vec::<u8, u16>(&bytes)
+                        .into_iter()
+                        .map(|bits| half::f16::from_bits(bits).to_f32())
+                        .collect(),
+                    _ => bytemuck::pod_collect_to_vec(&bytes),
+                };
+                for (i, pixel) in values.chunks_exact(4).enumerate() {
+                    let (y, x) = (i / width, i % width);
+                    let rgbd: [f32; 4] = std::array::from_fn(|c| match c {
+                        3 => twin.depth()[(y, x)] - 0.5,
+                        c => twin.rgb()[(c, y, x)] - 0.5,
+                    });
+                    for (value, expected) in pixel.iter().zip(rgbd) {
+                        assert!(
+                            (value - expected).abs() < most,
+                            "{numbers:?} {size:?} at {x}, {y}: {value} {expected}"
+                        );
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn thresholds_round_as_the_quantiser_does() {

@@ -7,6 +7,7 @@ use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame, Packer, Source};
 use super::peak::Peak;
 use super::{Error, Result};
+use crate::brightness::{Brightness, Past};
 use crate::display::Display;
 use crate::encode::{Encoding, Scale, deep};
 use crate::illumination::Illumination;
@@ -41,7 +42,7 @@ pub struct Job {
     /// From a field to phases.
     pub encoding: Encoding,
     /// What full light stands for.
-    pub scale: Scale,
+    pub brightness: Brightness,
     /// From phases to levels.
     pub response: Response,
     /// The lasers' light over the modulator, where it is calibrated.
@@ -64,7 +65,7 @@ impl Job {
         method: Method,
         display: &Display,
         encoding: Encoding,
-        scale: Scale,
+        scale: impl Into<Brightness>,
         response: Response,
     ) -> Self {
         Job {
@@ -73,7 +74,7 @@ impl Job {
             method,
             display: display.clone(),
             encoding,
-            scale,
+            brightness: scale.into(),
             response,
             illumination: None,
             correction: None,
@@ -83,18 +84,23 @@ impl Job {
         }
     }
 
-    /// The same on the CPU.
+    /// The same on the CPU, with each frame's largest amplitude where brightness is steady: a plan on the CPU is told a
+    /// steady scale by its caller, in [`crate::Pipeline::modulate_at`].
     ///
     /// # Errors
     /// What [`crate::Pipeline::new`] and the correction refuse.
     pub fn on_cpu(&self) -> crate::Result<crate::Pipeline> {
+        let scale = match self.brightness {
+            Brightness::Fixed(scale) => Scale::Fixed(scale),
+            _ => Scale::Max,
+        };
         let mut pipeline = crate::Pipeline::new(
             self.height,
             self.width,
             self.method.clone(),
             &self.display,
             self.encoding.clone(),
-            self.scale,
+            scale,
             self.response.clone(),
         )?;
         if let Some(illumination) = &self.illumination {
@@ -106,10 +112,11 @@ impl Job {
         Ok(pipeline)
     }
 
-    pub(super) fn network(&self) -> Result<&Network> {
+    /// The network, where it is one that a GPU runs.
+    pub(crate) fn network(&self) -> Result<&Arc<Network>> {
         let Method::Network(network) = &self.method else {
             return Err(Error::Refused(
-                "methods without a network run on the CPU only".into(),
+                "plane sweeps, corrected by a network or not, run on the CPU only".into(),
             ));
         };
         if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
@@ -173,6 +180,7 @@ pub struct FrameReport {
 pub struct Pipeline {
     device: Arc<Device>,
     size: (usize, usize),
+    network: Arc<Network>,
     numbers: Numbers,
     packer: Packer,
     chain: ChainPlan,
@@ -210,14 +218,7 @@ impl Pipeline {
         let network = job.network()?;
         let size = (job.height, job.width);
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
-        if let Scale::Fixed(scale) = job.scale
-            && !(scale > 0.0 && scale.is_finite())
-        {
-            return Err(crate::Error::Plan(format!(
-                "a scale of {scale} cannot stand for full light; it must be above 0"
-            ))
-            .into());
-        }
+        job.brightness.check()?;
         if let Encoding::Deep(network) = &job.encoding {
             deep::check(network, &job.display)?;
         }
@@ -236,13 +237,13 @@ impl Pipeline {
     fn build(
         device: &Arc<Device>,
         job: &Job,
-        network: &Network,
+        network: &Arc<Network>,
         size: (usize, usize),
     ) -> Result<Self> {
         let chain = network.chain();
         let numbers = Numbers::of(device, chain, job.chain.float)?;
         let source = Source::Frame(job.colour, job.depth);
-        let packer = Packer::new(device, chain, numbers, size, source)?;
+        let packer = Packer::new(device, chain, numbers, size, source, None)?;
         let end = End::Field(network.head(), network.input());
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
@@ -298,7 +299,7 @@ impl Pipeline {
             size,
             &job.encoding,
             job.chain,
-            job.scale,
+            job.brightness,
             &job.response,
             light,
             turn,
@@ -308,6 +309,7 @@ impl Pipeline {
         Ok(Pipeline {
             device: device.clone(),
             size,
+            network: network.clone(),
             numbers,
             packer,
             chain,
@@ -359,11 +361,41 @@ impl Pipeline {
         self.chain.bytes
     }
 
+    /// Frames come so from now on: the input stage alone is planned again. Frames in flight are not harmed.
+    ///
+    /// # Errors
+    /// A format that the CPU refuses too, or what this device cannot do; frames then come as before.
+    pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
+        if self.packer.formats() == Some((colour, depth)) {
+            return Ok(());
+        }
+        let device = self.device.clone();
+        self.packer = device.guarded(|| {
+            let (chain, source) = (self.network.chain(), Source::Frame(colour, depth));
+            let input = Some(self.packer.input.clone());
+            Packer::new(&device, chain, self.numbers, self.size, source, input)
+        })?;
+        Ok(())
+    }
+
     /// Sends a frame through. At most [`FLIGHTS`] may be in flight.
     ///
     /// # Errors
     /// Bytes of another length than planned, too many frames in flight, or a device that is lost.
     pub fn submit(&mut self, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
+        self.submit_after(None, frame, deliver)
+    }
+
+    /// [`Pipeline::submit`] for steady brightness, whose scale comes from `past`.
+    ///
+    /// # Errors
+    /// As [`Pipeline::submit`].
+    pub fn submit_after(
+        &mut self,
+        past: Option<Past>,
+        frame: &Frame<'_>,
+        deliver: Deliver,
+    ) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
             return Err(crate::Error::Plan(format!(
                 "{FLIGHTS} frames are in flight; one must be collected first"
@@ -373,6 +405,7 @@ impl Pipeline {
         let device = self.device.clone();
         let submission = device.guarded(|| {
             self.packer.upload(&device, frame)?;
+            self.encoder.heed(&device, past);
             Ok(device.queue.submit([self.commands(slot, deliver)]))
         })?;
         self.serial += 1;

@@ -201,7 +201,16 @@ mod tests {
     #[test]
     fn an_eye_sees_what_it_sees_on_the_cpu() {
         let Some(device) = device() else { return };
-        let (height, width) = (61, 47);
+        for (size, all_z_m) in [
+            ((61, 47), &[3e-3, -3e-3, 2e-3][..]),
+            ((384, 384), &[-2e-3][..]),
+            ((540, 960), &[1e-3][..]),
+        ] {
+            check(&device, size, all_z_m);
+        }
+    }
+
+    fn check(device: &Arc<Device>, (height, width): (usize, usize), all_z_m: &[f64]) {
         let display = Display::default().with_offset_m(2e-3).unwrap();
         let response = Response::lut(std::array::from_fn(|i| 255 - i as u8));
         let words: Vec<u32> = (0..height * width)
@@ -212,19 +221,19 @@ mod tests {
             .queue
             .write_buffer(&levels, 0, bytemuck::cast_slice(&words));
         let mut preview =
-            Preview::new(&device, height, width, &display, &response, 5e-3, 1.0).unwrap();
+            Preview::new(device, height, width, &display, &response, 5e-3, 1.0).unwrap();
         let planes: Vec<u8> = (0..3)
             .flat_map(|c| words.iter().map(move |word| (word >> (8 * c)) as u8))
             .collect();
         let mut field = vec![Complex32::ZERO; planes.len()];
         phase_only_field(&planes, &response, 1.0, &mut field);
-        for z_m in [3e-3, -3e-3, 2e-3] {
+        for &z_m in all_z_m {
             preview.look(&levels, z_m).unwrap();
             let seen = preview.amplitudes().unwrap();
             let twin = Refocus::new(height, width, &display, &[-3e-3, 7e-3], Some(1.0)).unwrap();
             let expected = &twin.focal_stack(&field, &[z_m]).unwrap()[0];
             let worst = seen.iter().zip(expected).map(|(a, b)| (a - b).abs());
-            assert!(worst.fold(0.0, f32::max) < 1e-4, "{z_m}");
+            assert!(worst.fold(0.0, f32::max) < 1e-4, "{height}×{width} {z_m}");
         }
         assert!(preview.look(&levels, 8e-3).is_err());
         assert!(preview.look(&levels, f64::NAN).is_err());

@@ -5,6 +5,8 @@ use super::device::Device;
 use super::input::Frame;
 use super::pipeline::{Job, Pipeline};
 use super::{Error, Result};
+use crate::brightness::{Brightness, Percentile};
+use crate::encode::Scale;
 use crate::frame::RgbdFrame;
 use crate::slm::Response;
 use ndarray::{Array2, Array3};
@@ -35,9 +37,16 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     };
     let frame = frame()?;
     let cpu = job.on_cpu()?;
+    let mut scratch = cpu.scratch();
     let mut field = vec![Complex32::ZERO; 3 * height * width];
     let mut expected = vec![0; 3 * height * width];
-    cpu.process(&frame, &mut field, &mut expected, &mut cpu.scratch())?;
+    cpu.field(&frame, &mut field, &mut scratch)?;
+    let scale = match job.brightness {
+        Brightness::FrameMax => Scale::Max,
+        Brightness::Fixed(scale) => Scale::Fixed(scale),
+        Brightness::Steady => Scale::Fixed(Percentile::new().scale(&field, None)),
+    };
+    cpu.modulate_at(&mut field, scale, &mut expected, &mut scratch);
     let mut gpu = Pipeline::new(device, &job)?;
     let mut levels = vec![0; 3 * height * width];
     // Twice: what one frame leaves behind must not reach the next.
@@ -82,4 +91,58 @@ fn frame() -> Result<RgbdFrame> {
         false => x as f32 / width as f32,
     });
     Ok(RgbdFrame::new(rgb, depth)?)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::DeviceOptions;
+    use super::super::device::testing::software;
+    use super::super::renderer::{Otherwise, Renderer};
+    use super::*;
+    use crate::encode::Encoding;
+    use crate::{Display, Method, Network};
+
+    /// A driver that compiles one program wrongly is found out, and the caller has its choice.
+    #[test]
+    fn a_device_that_answers_wrongly_is_not_used() {
+        let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
+        let job = Job::new(
+            21,
+            34,
+            Method::Network(Arc::new(network.unwrap())),
+            &Display::default(),
+            Encoding::ANTI_ALIAS,
+            Brightness::Steady,
+            Response::linear(8).unwrap(),
+        );
+        let source = include_str!("turn.wgsl");
+        let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
+        assert_ne!(forged, source);
+        let open = || Device::open(&software()).ok().map(Arc::new);
+        let Some(device) = open() else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return;
+        };
+        probe(&device, &job).unwrap();
+        let device = open().unwrap();
+        device.forge("find", source, &forged);
+        let wrong = probe(&device, &job).unwrap_err();
+        assert!(
+            matches!(&wrong, Error::Wrong(why) if !why.contains('\n')),
+            "{wrong}"
+        );
+        let on = |otherwise| {
+            let (device, job) = (Some(device.clone()), job.clone());
+            Renderer::on(device, DeviceOptions::default(), job, otherwise)
+        };
+        assert_eq!(on(Otherwise::Error).err(), Some(wrong.clone()));
+        let mut renderer = on(Otherwise::Cpu).unwrap();
+        assert_eq!(renderer.reason(), Some(&wrong));
+        // The CPU is steady too.
+        let frame = RgbdFrame::black((21, 34));
+        let handed = renderer.submit(&Frame::of(&frame)).unwrap();
+        let report = renderer.collect(handed, &mut vec![0; 3 * 21 * 34]).unwrap();
+        assert!(report.scale > 0.0 && report.scale.is_finite());
+    }
 }

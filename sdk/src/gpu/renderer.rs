@@ -2,16 +2,24 @@
 //! opened again.
 
 use super::device::{Device, DeviceOptions};
-use super::input::{Colour, Frame};
+use super::input::{Colour, Depth, Frame};
 use super::pipeline::{Deliver, FrameReport, Job, Pipeline, StageTimes, Ticket};
 use super::probe::probe;
+use super::watch::watched;
 use super::{Error, Result};
+use crate::brightness::{Brightness, Past, Percentile};
+use crate::encode::Scale;
 use crate::frame::Orientation;
 use num_complex::Complex32;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// How often in a row a lost device is opened again before it counts as of no use.
 const ATTEMPTS: usize = 3;
+/// How long opening may take, and compiling programs and trying them out: drivers in software compile slowly.
+const OPENING: Duration = Duration::from_secs(30);
+const TRYING: Duration = Duration::from_secs(60);
+const TRYING_SOFTWARE: Duration = Duration::from_secs(600);
 
 /// What happens where the GPU does not serve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,6 +54,7 @@ struct Cpu {
     pipeline: crate::Pipeline,
     scratch: crate::pipeline::PipelineScratch,
     field: Vec<Complex32>,
+    percentile: Percentile,
     done: Vec<(u64, Vec<u8>, FrameReport)>,
     serial: u64,
 }
@@ -66,6 +75,19 @@ impl Renderer {
     /// # Errors
     /// What the CPU refuses too; with [`Otherwise::Error`] also what only the GPU does.
     pub fn new(options: DeviceOptions, job: Job, otherwise: Otherwise) -> Result<Self> {
+        Self::on(None, options, job, otherwise)
+    }
+
+    /// [`Renderer::new`] on a `device` that is open, where there is one; `options` say which is opened should it be lost.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn on(
+        device: Option<Arc<Device>>,
+        options: DeviceOptions,
+        job: Job,
+        otherwise: Otherwise,
+    ) -> Result<Self> {
         let mut renderer = Renderer {
             job,
             options,
@@ -75,7 +97,7 @@ impl Renderer {
             epoch: 0,
             losses: 0,
         };
-        renderer.open()?;
+        renderer.open(device.filter(|device| device.check().is_ok()))?;
         Ok(renderer)
     }
 
@@ -92,12 +114,23 @@ impl Renderer {
         }
     }
 
-    /// Opens a device, or turns to the CPU.
-    fn open(&mut self) -> Result<()> {
+    /// How often a device was opened.
+    pub(crate) fn openings(&self) -> usize {
+        self.epoch
+    }
+
+    /// Gives the device's memory back, and what is on it up; the next frame opens one again.
+    pub(crate) fn let_go(&mut self) {
+        self.place = Place::Lost;
+    }
+
+    /// Opens a device unless one is given, or turns to the CPU.
+    fn open(&mut self, device: Option<Arc<Device>>) -> Result<()> {
         self.epoch += 1;
-        let opened = match self.losses < ATTEMPTS {
-            true => trusted(&self.options, &self.job),
-            false => Err(Error::Lost(format!("{ATTEMPTS} times in a row"))),
+        let opened = match (self.losses < ATTEMPTS, &self.reason) {
+            (true, _) => trusted(device, &self.options, &self.job),
+            (false, Some(last)) => Err(Error::Lost(format!("{ATTEMPTS} times in a row: {last}"))),
+            (false, None) => Err(Error::Lost(format!("{ATTEMPTS} times in a row"))),
         };
         match opened {
             Ok(pipeline) => self.place = Place::Gpu(Box::new(pipeline)),
@@ -113,22 +146,46 @@ impl Renderer {
         Ok(())
     }
 
+    /// Frames come so from now on, as [`Pipeline::expect`].
+    ///
+    /// # Errors
+    /// As that.
+    pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
+        if let Place::Gpu(pipeline) = &mut self.place {
+            match pipeline.expect(colour, depth) {
+                // The next frame finds out, and opens another device for these formats.
+                Ok(()) | Err(Error::Lost(_)) => {}
+                Err(why) => return Err(why),
+            }
+        }
+        (self.job.colour, self.job.depth) = (colour, depth);
+        Ok(())
+    }
+
     /// Hands a frame in, in the formats of the job. On the GPU [`super::FLIGHTS`] may be on their way.
     ///
     /// # Errors
     /// Bytes of another length than planned, or what [`Renderer::new`] refuses where a device was lost before.
     pub fn submit(&mut self, frame: &Frame<'_>) -> Result<Handed> {
+        self.submit_after(None, frame)
+    }
+
+    /// [`Renderer::submit`] for steady brightness, whose scale comes from `past`.
+    ///
+    /// # Errors
+    /// As [`Renderer::submit`].
+    pub fn submit_after(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<Handed> {
         loop {
             match &mut self.place {
-                Place::Gpu(pipeline) => match pipeline.submit(frame, Deliver::Levels) {
+                Place::Gpu(pipeline) => match pipeline.submit_after(past, frame, Deliver::Levels) {
                     Ok(ticket) => {
                         let epoch = self.epoch;
                         return Ok(Handed(Inside::Gpu { epoch, ticket }));
                     }
                     Err(why) => self.note(why)?,
                 },
-                Place::Cpu(cpu) => return cpu.process(frame, &self.job),
-                Place::Lost => self.open()?,
+                Place::Cpu(cpu) => return cpu.process(past, frame, &self.job),
+                Place::Lost => self.open(None)?,
             }
         }
     }
@@ -173,11 +230,25 @@ impl Renderer {
     }
 }
 
-/// Opens a device and plans `job` on it, if it answers as the CPU does.
-fn trusted(options: &DeviceOptions, job: &Job) -> Result<Pipeline> {
-    let device = Arc::new(Device::open(options)?);
-    probe(&device, job)?;
-    Pipeline::new(&device, job)
+/// Plans `job` on `device`, or on one that is opened, if it answers, and as the CPU does.
+fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> Result<Pipeline> {
+    let device = match device {
+        Some(device) => device,
+        None => {
+            let options = options.clone();
+            let open = move || Device::open(&options).map(Arc::new);
+            watched("while it was opened", OPENING, open)?
+        }
+    };
+    let patience = match device.is_software() {
+        true => TRYING_SOFTWARE,
+        false => TRYING,
+    };
+    let job = job.clone();
+    watched("while it was tried out", patience, move || {
+        probe(&device, &job)?;
+        Pipeline::new(&device, &job)
+    })
 }
 
 impl Cpu {
@@ -187,29 +258,38 @@ impl Cpu {
             scratch: pipeline.scratch(),
             pipeline,
             field: vec![Complex32::ZERO; 3 * job.height * job.width],
+            percentile: Percentile::new(),
             done: Vec::new(),
             serial: 0,
         })
     }
 
-    fn process(&mut self, frame: &Frame<'_>, job: &Job) -> Result<Handed> {
+    fn process(&mut self, past: Option<Past>, frame: &Frame<'_>, job: &Job) -> Result<Handed> {
         let orientation = match job.colour {
             Colour::Camera { orientation, .. } => orientation,
             Colour::Planar => Orientation::default(),
         };
         let frame = frame.read(orientation, job.height, job.width)?;
         let mut levels = vec![0; self.field.len()];
-        let made =
-            self.pipeline
-                .process(&frame, &mut self.field, &mut levels, &mut self.scratch)?;
+        let (field, scratch) = (&mut self.field, &mut self.scratch);
+        let (network, propagate) = self.pipeline.field(&frame, field, scratch)?;
+        let start = Instant::now();
+        let scale = match job.brightness {
+            Brightness::FrameMax => Scale::Max,
+            Brightness::Fixed(scale) => Scale::Fixed(scale),
+            Brightness::Steady => Scale::Fixed(self.percentile.scale(field, past)),
+        };
+        let made = self
+            .pipeline
+            .modulate_at(field, scale, &mut levels, scratch);
         self.serial += 1;
         let report = FrameReport {
             scale: made.scale,
             times: Some(StageTimes {
-                network: made.times.method,
-                propagate: made.times.propagate,
-                encode: made.times.encode,
-                ..Default::default()
+                input: Duration::ZERO,
+                network,
+                propagate,
+                encode: start.elapsed(),
             }),
         };
         self.done.push((self.serial, levels, report));
@@ -232,7 +312,7 @@ impl Cpu {
 #[cfg(test)]
 impl Renderer {
     /// Takes the device away, as drivers do.
-    pub(super) fn lose(&self) {
+    pub(crate) fn lose(&self) {
         if let Place::Gpu(pipeline) = &self.place {
             pipeline.device().wgpu().0.destroy();
         }
@@ -242,6 +322,7 @@ impl Renderer {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use super::super::device::Allowed;
     use super::super::device::testing::software;
     use super::super::{ChainOptions, Float};
     use super::*;
@@ -342,11 +423,15 @@ mod tests {
 
     #[test]
     fn what_a_gpu_lacks_goes_to_the_cpu_or_to_the_caller() {
-        let small = |limits: wgpu::Limits| wgpu::Limits {
-            max_storage_buffer_binding_size: 1 << 24,
-            ..limits
+        let little = Allowed {
+            features: wgpu::Features::empty(),
+            limits: |limits| wgpu::Limits {
+                max_storage_buffer_binding_size: 1 << 24,
+                ..limits
+            },
+            ..Default::default()
         };
-        let Ok(device) = Device::open_with(&software(), wgpu::Features::empty(), small) else {
+        let Ok(device) = Device::open_with(&software(), &little) else {
             println!("skipped: no driver in software (mesa-vulkan-drivers)");
             return;
         };
@@ -377,12 +462,17 @@ mod tests {
         // Frames that fit no device fit the CPU; a smaller one stands for them here.
         let mut renderer = Renderer::new(software(), job(&network), Otherwise::Cpu).unwrap();
         renderer.losses = ATTEMPTS;
+        renderer.reason = Some(Error::Lost("pulled out".into()));
         renderer.place = Place::Lost;
         let frame = frame();
         let handed = renderer.submit(&Frame::of(&frame)).unwrap();
         let mut levels = vec![0; 3 * SIZE.0 * SIZE.1];
         renderer.collect(handed, &mut levels).unwrap();
         assert!(renderer.pipeline().is_none());
-        assert!(renderer.reason().unwrap().to_string().contains("in a row"));
+        let reason = renderer.reason().unwrap().to_string();
+        assert!(
+            reason.contains("in a row: the GPU was lost: pulled out"),
+            "{reason}"
+        );
     }
 }

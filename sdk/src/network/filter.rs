@@ -4,7 +4,7 @@
 use super::fused::{FusedChain, FusedScratch, tanh};
 use super::{Engine, Head};
 use num_complex::Complex32;
-use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling};
+use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
 
 /// A network for fields, prepared for one size, from [`super::Network::filter_plan`]. Immutable; one plan serves many
 /// threads, each with its own scratch.
@@ -99,9 +99,11 @@ impl Rows<3> for InPlace<'_> {
                     &self.borders[rows * self.width + from..][..count]
                 }
             };
-            for ((re, im), value) in re.iter_mut().zip(im).zip(values) {
-                (*re, *im) = (value.re, value.im);
-            }
+            wide(|| {
+                for ((re, im), value) in re.iter_mut().zip(im).zip(values) {
+                    (*re, *im) = (value.re, value.im);
+                }
+            });
         }
     }
 
@@ -112,21 +114,23 @@ impl Rows<3> for InPlace<'_> {
         mut values: [&mut [f32]; OUTPUTS],
         band: &mut Band<'_, Complex32, 3>,
     ) {
-        if self.tanh {
-            tanh(&mut values);
-        }
         let field = band.rows_mut(row, from, values[0].len());
-        match self.head {
-            Head::AmplitudePhase => Head::amplitude_phase(values.map(|run| &*run), field),
-            Head::RealImaginary => {
-                for (c, field) in field.into_iter().enumerate() {
-                    let parts = values[c].iter().zip(&*values[3 + c]);
-                    for (value, (re, im)) in field.iter_mut().zip(parts) {
-                        *value = Complex32::new(value.re + re, value.im + im);
+        wide(|| {
+            if self.tanh {
+                tanh(&mut values);
+            }
+            match self.head {
+                Head::AmplitudePhase => Head::amplitude_phase(values.map(|run| &*run), field),
+                Head::RealImaginary => {
+                    for (c, field) in field.into_iter().enumerate() {
+                        let parts = values[c].iter().zip(&*values[3 + c]);
+                        for (value, (re, im)) in field.iter_mut().zip(parts) {
+                            *value = Complex32::new(value.re + re, value.im + im);
+                        }
                     }
                 }
             }
-        }
+        });
     }
 }
 

@@ -5,7 +5,7 @@ use super::{Head, InputKind, Source};
 use num_complex::Complex32;
 use phasefront_kernels::{
     Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows,
-    Scratch, SkipSum, Tiling,
+    Scratch, SkipSum, Tiling, wide,
 };
 use rayon::prelude::*;
 
@@ -73,7 +73,7 @@ impl FusedChain {
             const CHUNK: usize = 1 << 14;
             output
                 .par_chunks_mut(CHUNK)
-                .for_each(|chunk| tanh(&mut [chunk]));
+                .for_each(|chunk| wide(|| tanh(&mut [chunk])));
         }
     }
 
@@ -147,9 +147,11 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
 
     fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, 3>, into: &mut [f32]) {
         let count = into.len() / self.kind.channels();
-        for (plane, into) in into.chunks_exact_mut(count).enumerate() {
-            self.source.read(plane, row, from, into);
-        }
+        wide(|| {
+            for (plane, into) in into.chunks_exact_mut(count).enumerate() {
+                self.source.read(plane, row, from, into);
+            }
+        });
     }
 
     fn write(
@@ -159,15 +161,17 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
         mut values: [&mut [f32]; OUTPUTS],
         band: &mut Band<'_, Complex32, 3>,
     ) {
-        if self.tanh {
-            tanh(&mut values);
-        }
         let field = band.rows_mut(row, from, values[0].len());
         let base = |plane: usize, at: usize, into: &mut [f32]| {
             self.source.read(plane, row, from + at, into);
         };
-        self.head
-            .row(self.kind, values.map(|run| &*run), base, field);
+        wide(|| {
+            if self.tanh {
+                tanh(&mut values);
+            }
+            let values = values.map(|run| &*run);
+            self.head.row(self.kind, values, base, field);
+        });
     }
 }
 
@@ -275,6 +279,7 @@ pub(crate) fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
 }
 
 /// tanh of runs of values, in place.
+#[inline(always)]
 pub(super) fn tanh(runs: &mut [&mut [f32]]) {
     for run in runs {
         run.iter_mut().for_each(|v| *v = tanh_value(*v));

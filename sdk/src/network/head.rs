@@ -3,6 +3,7 @@
 use super::InputKind;
 use crate::{Error, Result};
 use num_complex::Complex32;
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// Pixels of a parallel part, and of a piece that is worked on at once.
@@ -70,12 +71,13 @@ impl Head {
             let base = |plane: usize, from: usize, into: &mut [f32]| {
                 into.copy_from_slice(&input[plane * area + at + from..][..into.len()]);
             };
-            self.row(kind, values, base, [red, green, blue]);
+            wide(|| self.row(kind, values, base, [red, green, blue]));
         });
         Ok(())
     }
 
     /// A run of pixels of [`Head::field`]: `base` gives pixels of a plane of the input, from the given one of the run on.
+    #[inline(always)]
     pub(super) fn row(
         self,
         kind: InputKind,
@@ -118,6 +120,7 @@ impl Head {
     }
 
     /// A run of pixels of [`Head::AmplitudePhase`].
+    #[inline(always)]
     pub(super) fn amplitude_phase(values: [&[f32]; 6], field: [&mut [Complex32]; 3]) {
         for (c, field) in field.into_iter().enumerate() {
             for ((out, a), p) in field.iter_mut().zip(values[c]).zip(values[3 + c]) {

@@ -3,55 +3,19 @@
 //! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of noise
 //! would make the whole picture flicker.
 
+use crate::brightness::{Brightness, Past, Percentile};
 use crate::encode::Scale;
-use crate::error::{Error, Result};
 use num_complex::Complex32;
 use std::time::Duration;
 
-/// How the scale of a frame is chosen.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Brightness {
-    /// The amplitude that all but one of a thousand stay under, smoothed over a second. What is brighter is clipped.
-    #[default]
-    Steady,
-    /// This one, always. What is brighter is clipped.
-    Fixed(f32),
-    /// Each frame's own largest amplitude: nothing is clipped, and video flickers.
-    FrameMax,
-}
-
-impl Brightness {
-    /// # Errors
-    /// A fixed scale that is not positive.
-    pub fn check(self) -> Result<()> {
-        match self {
-            Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(
-                format!("a scale of {scale} cannot stand for full light; it must be above 0"),
-            )),
-            _ => Ok(()),
-        }
-    }
-}
-
 /// Time in which the scale goes 63 % of the way to where it should be.
 const TIME_CONSTANT: Duration = Duration::from_secs(1);
-/// The share of amplitudes that are clipped.
-const CLIPPED: f64 = 1e-3;
-/// Of so many values one is looked at. Odd, so that both colours of a checkerboard are.
-const STEP: usize = 17;
-/// Bins of the histogram, over amplitudes up to [`MOST`].
-const BINS: usize = 2048;
-/// What is brighter counts as this.
-const MOST: f32 = 4.0;
-/// A picture darker than this is shown as dark, not made bright.
-const LEAST: f32 = 0.05;
-
 /// The scale of a sequence of frames.
 #[derive(Debug)]
 pub(super) struct BrightnessTracker {
     brightness: Brightness,
     current: Option<f32>,
-    histogram: Vec<u32>,
+    percentile: Percentile,
 }
 
 impl BrightnessTracker {
@@ -59,7 +23,7 @@ impl BrightnessTracker {
         BrightnessTracker {
             brightness,
             current: None,
-            histogram: vec![0; BINS],
+            percentile: Percentile::new(),
         }
     }
 
@@ -69,44 +33,30 @@ impl BrightnessTracker {
             Brightness::FrameMax => Scale::Max,
             Brightness::Fixed(scale) => Scale::Fixed(scale),
             Brightness::Steady => {
-                let now = self.percentile(field).max(LEAST);
-                let next = match (self.current, elapsed) {
-                    (Some(before), Some(elapsed)) => {
-                        let share =
-                            1.0 - (-elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp();
-                        before + share * (now - before)
-                    }
-                    _ => now,
-                };
-                self.current = Some(next);
+                let next = self.percentile.scale(field, self.past(elapsed));
+                self.heed(next);
                 Scale::Fixed(next)
             }
         }
     }
 
-    /// The amplitude that all but [`CLIPPED`] of `field` stay under, to a bin.
-    fn percentile(&mut self, field: &[Complex32]) -> f32 {
-        self.histogram.fill(0);
-        let looked_at = field.iter().step_by(STEP);
-        let count = looked_at.len();
-        for value in looked_at {
-            let bin = value.norm() * (BINS as f32 / MOST);
-            self.histogram[(bin as usize).min(BINS - 1)] += 1;
-        }
-        let mut over = (count as f64 * CLIPPED) as u32;
-        let last = (self.histogram.iter().rposition(|n| {
-            let is = *n > over;
-            over = over.saturating_sub(*n);
-            is
-        }))
-        .unwrap_or(0);
-        (last + 1) as f32 * (MOST / BINS as f32)
+    /// Where the scale of a frame comes from that follows the last one after `elapsed`.
+    pub(super) fn past(&self, elapsed: Option<Duration>) -> Option<Past> {
+        let (scale, elapsed) = self.current.zip(elapsed)?;
+        let share = 1.0 - (-elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp();
+        Some(Past { scale, share })
+    }
+
+    /// Hears which scale a frame got elsewhere.
+    pub(super) fn heed(&mut self, scale: f32) {
+        self.current = Some(scale);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brightness::{LEAST, MOST, STEP};
 
     fn field(level: f32, spikes: usize) -> Vec<Complex32> {
         (0..34_000)

@@ -13,6 +13,20 @@ pub struct Rung {
     pub height: usize,
     /// Width of the hologram, pixels.
     pub width: usize,
+    /// Where it is computed; None for where all of the session is.
+    pub backend: Option<Backend>,
+}
+
+/// Where frames are computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Backend {
+    /// On the CPU.
+    #[default]
+    Cpu,
+    /// On the GPU, where this library was built for it (feature `gpu`), there is one, and it answers as the CPU does;
+    /// else on the CPU. Plane sweeps and levels over 8 bits are the CPU's. [`super::Statistics::backend`] says which it
+    /// is, and why.
+    Gpu,
 }
 
 /// Whether a session may change its quality.

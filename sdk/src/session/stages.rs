@@ -2,16 +2,13 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
+use super::engine::{Engine, Ground, Ready, Seat, Target};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use crate::depth::stream::DepthStream;
-use crate::encode::Scale;
 use crate::error::{Error, Result};
 use crate::frame::{CameraFrame, ColourPlan, ColourScratch, RgbdFrame};
-use crate::pipeline::{Pipeline, PipelineScratch};
-use crate::slm;
-use num_complex::Complex32;
 use rayon::ThreadPool;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,12 +18,8 @@ const LONGEST_GAP: Duration = Duration::from_secs(1);
 
 /// Plans and memory of one rung.
 struct RungPlan {
-    pipeline: Pipeline,
-    scratch: PipelineScratch,
+    engine: Engine,
     frame: RgbdFrame,
-    field: Vec<Complex32>,
-    /// Where the display has over 8 bits.
-    phases: Vec<f32>,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
 }
@@ -36,6 +29,7 @@ pub(super) struct Stages {
     options: SessionOptions,
     pool: ThreadPool,
     ladder: Ladder,
+    seat: Seat,
     /// None after a panic: it is made anew.
     plan: Option<RungPlan>,
     brightness: BrightnessTracker,
@@ -67,6 +61,7 @@ impl Stages {
         };
         let mut stages = Stages {
             ladder: Ladder::new(options.ladder.len(), start),
+            seat: Seat::default(),
             plan: None,
             brightness: BrightnessTracker::new(options.brightness),
             viewer: Arc::new(Viewer::new(&options)),
@@ -81,38 +76,27 @@ impl Stages {
         Ok(stages)
     }
 
-    fn plan_rung(&self) -> Result<RungPlan> {
-        let rung = &self.options.ladder[self.ladder.rung()];
-        let (height, width) = (rung.height, rung.width);
-        let depth = DepthStream::new(self.options.depth, (height, width))?;
-        self.pool.install(|| {
-            let mut pipeline = Pipeline::new(
-                height,
-                width,
-                rung.method.clone(),
-                &self.options.display,
-                self.options.encoding.clone(),
-                Scale::Max,
-                self.options.response.clone(),
-            )?;
-            if let Some(illumination) = &self.options.illumination {
-                pipeline = pipeline.with_illumination(illumination.clone());
-            }
-            if let Some(correction) = &self.options.correction {
-                pipeline = pipeline.with_correction(correction)?;
-            }
-            Ok(RungPlan {
-                scratch: pipeline.scratch(),
-                pipeline,
-                frame: RgbdFrame::black((height, width)),
-                field: vec![Complex32::ZERO; 3 * height * width],
-                phases: match self.options.display.bits() {
-                    0..=8 => Vec::new(),
-                    _ => vec![0.0; 3 * height * width],
-                },
-                depth,
-                colour: None,
-            })
+    fn plan_rung(&mut self) -> Result<RungPlan> {
+        let Stages {
+            options,
+            pool,
+            ladder,
+            seat,
+            ..
+        } = self;
+        let rung = &options.ladder[ladder.rung()];
+        let shape = (rung.height, rung.width);
+        let depth = DepthStream::new(options.depth, shape)?;
+        let mut ground = Ground {
+            options,
+            rung,
+            seat,
+        };
+        Ok(RungPlan {
+            engine: pool.install(|| Engine::new(&mut ground))?,
+            frame: RgbdFrame::black(shape),
+            depth,
+            colour: None,
         })
     }
 
@@ -126,27 +110,49 @@ impl Stages {
         self.ladder.rung()
     }
 
-    pub(super) fn backend(&self) -> BackendReport {
-        let plan = self.plan.as_ref();
-        let engine = plan.and_then(|plan| plan.pipeline.method().engine());
-        engine.map_or_else(BackendReport::default, |engine| BackendReport {
-            name: engine.name.into(),
-            why: engine.why.clone(),
-        })
+    /// What runs the frames, where that is not what it was when this was last asked.
+    pub(super) fn news(&mut self) -> Option<BackendReport> {
+        let engine = &mut self.plan.as_mut()?.engine;
+        std::mem::take(&mut engine.turned).then(|| engine.report())
+    }
+
+    #[cfg(feature = "gpu")]
+    pub(super) fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
+        self.seat.device()
     }
 
     /// Runs a black frame through all stages that do not need a camera's frame.
     pub(super) fn warm_up(&mut self) -> Result<()> {
         let mut plan = self.take_plan()?;
-        let size = plan.field.len();
-        let mut levels = self.levels.take(size);
-        let result = self.pool.install(|| {
-            plan.frame.planes_mut().0.fill(0.0);
-            plan.pipeline.process(
-                &plan.frame,
-                &mut plan.field,
-                &mut levels.values,
-                &mut plan.scratch,
+        let Stages {
+            pool,
+            levels,
+            options,
+            seat,
+            ladder,
+            ..
+        } = self;
+        let rung = &options.ladder[ladder.rung()];
+        let mut levels = levels.take(3 * rung.height * rung.width);
+        let mut brightness = BrightnessTracker::new(options.brightness);
+        plan.frame.planes_mut().0.fill(0.0);
+        let result = pool.install(|| {
+            plan.engine.process(
+                &mut Ground {
+                    options,
+                    rung,
+                    seat,
+                },
+                &Ready {
+                    camera: None,
+                    rgbd: &plan.frame,
+                    elapsed: None,
+                },
+                &mut brightness,
+                Target {
+                    levels: &mut levels.values,
+                    words: None,
+                },
             )
         });
         self.plan = Some(plan);
@@ -206,12 +212,15 @@ impl Stages {
             words,
             depths,
             options,
+            ladder,
+            seat,
             ..
         } = self;
-        let shape = plan.pipeline.shape();
+        let rung = &options.ladder[ladder.rung()];
+        let shape = (rung.height, rung.width);
         let mut levels = levels.take(3 * shape.0 * shape.1);
-        let bits = options.display.bits();
-        let mut words = (bits > 8).then(|| words.take(3 * shape.0 * shape.1));
+        let wide = options.display.bits() > 8;
+        let mut words = wide.then(|| words.take(3 * shape.0 * shape.1));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {
@@ -234,31 +243,27 @@ impl Stages {
                 *to = (d * 65535.0 + 0.5) as u16;
             }
             times.depth = start.elapsed();
-            (times.method, times.propagate) =
-                plan.pipeline
-                    .field(&plan.frame, &mut plan.field, &mut plan.scratch)?;
-            let start = Instant::now();
-            let scale = brightness.next(&plan.field, elapsed);
-            let RungPlan {
-                pipeline,
-                field,
-                phases,
-                scratch,
-                ..
-            } = plan;
-            let modulation = match &mut words {
-                None => pipeline.modulate_at(field, scale, &mut levels.values, scratch),
-                Some(words) => {
-                    let modulation = pipeline.phases_at(field, scale, phases, scratch);
-                    slm::linear_words(phases, bits, &mut words.values);
-                    for (level, word) in levels.values.iter_mut().zip(&words.values) {
-                        *level = (word >> (bits - 8)) as u8;
-                    }
-                    modulation
-                }
-            };
-            times.encode = start.elapsed();
-            Ok((report, modulation.scale))
+            let encoded = plan.engine.process(
+                &mut Ground {
+                    options,
+                    rung,
+                    seat,
+                },
+                &Ready {
+                    camera: Some(frame),
+                    rgbd: &plan.frame,
+                    elapsed,
+                },
+                brightness,
+                Target {
+                    levels: &mut levels.values,
+                    words: words.as_mut().map(|words| &mut words.values[..]),
+                },
+            )?;
+            times.method = encoded.method;
+            times.propagate = encoded.propagate;
+            times.encode = encoded.encode;
+            Ok((report, encoded.scale))
         })?;
         Ok(Hologram {
             timestamp_ns: frame.timestamp_ns,
@@ -270,7 +275,7 @@ impl Stages {
             times,
             range_m: report.range_m,
             valid_depth: report.valid,
-            rung: self.ladder.rung(),
+            rung: ladder.rung(),
             viewer: self.viewer.clone(),
         })
     }

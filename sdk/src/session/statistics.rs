@@ -63,7 +63,7 @@ pub struct FrameTimes {
     pub colour: Duration,
     /// Depth: read, aligned, steadied, refined.
     pub depth: Duration,
-    /// From the frame to the midpoint hologram.
+    /// From the frame to the midpoint hologram; on a GPU with the ways there and back.
     pub method: Duration,
     /// From the midpoint to the modulator.
     pub propagate: Duration,
@@ -92,7 +92,7 @@ impl FrameTimes {
 /// What runs the frames.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct BackendReport {
-    /// Its name: an instruction set, or "tract".
+    /// Its name: an instruction set, "tract", or that of a GPU.
     pub name: String,
     /// Why this one.
     pub why: String,

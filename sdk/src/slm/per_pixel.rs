@@ -302,6 +302,7 @@ impl PerPixel {
     ///
     /// # Panics
     /// If the lengths differ or the row ends before them.
+    #[inline(always)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         let (colour, y, x) = self.place(first);

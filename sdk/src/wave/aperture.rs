@@ -1,7 +1,7 @@
 //! The circular aperture in the Fourier plane, Eq. 8–9: it lets the first diffraction order pass
 //! and turns a double-phase pattern back into a complex field.
 
-use super::fft::{Fft2, Scratch};
+use super::fft::{ConvolveScratch, Fft2};
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 
@@ -44,15 +44,15 @@ impl Aperture {
     }
 
     /// Working memory for one call at a time.
-    pub fn scratch(&self) -> Scratch {
-        self.fft.scratch()
+    pub fn scratch(&self) -> ConvolveScratch {
+        self.fft.convolve_scratch()
     }
 
     /// Replaces `plane`, (H, W), by F⁻¹(F(plane)·M). Allocates nothing.
     ///
     /// # Panics
     /// If `plane` has not H·W values or `scratch` is another plan's.
-    pub fn filter(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
+    pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         let (height, width) = self.fft.padded_shape();
         let scale = 1.0 / (height * width) as f32;
         self.fft.convolve(

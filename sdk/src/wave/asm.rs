@@ -10,7 +10,7 @@
 //! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
 //! phase zero here, and both agree at z = 0.
 
-use super::fft::{Fft2, Scratch, smooth_size};
+use super::fft::{ConvolveScratch, Fft2, fast_size};
 use super::zernike::Aberration;
 use crate::error::{Error, Result};
 use num_complex::{Complex32, Complex64};
@@ -88,7 +88,7 @@ pub fn padded_shape(
     }
     Ok(match padding {
         Padding::Circular => (height, width),
-        _ => (smooth_size(h as usize), smooth_size(w as usize)),
+        _ => (fast_size(h as usize), fast_size(w as usize)),
     })
 }
 
@@ -186,6 +186,7 @@ impl Transfer {
     }
 
     /// Multiplies column `x` of a spectrum by the transfer function.
+    #[inline(always)]
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
         if !self.even {
             let factors = &self.factors[x * self.padded_height..][..self.padded_height];
@@ -365,15 +366,15 @@ impl Propagator {
     }
 
     /// Working memory for one call at a time, sized for the current thread pool.
-    pub fn scratch(&self) -> Scratch {
-        self.fft.scratch()
+    pub fn scratch(&self) -> ConvolveScratch {
+        self.fft.convolve_scratch()
     }
 
     /// Replaces `plane`, (H, W), by the field at the planned distance. Allocates nothing.
     ///
     /// # Panics
     /// If `plane` has not H·W values or `scratch` is another plan's.
-    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut Scratch) {
+    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         self.fft
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
     }

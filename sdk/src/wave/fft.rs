@@ -8,6 +8,7 @@
 //! a filter carries the 1/(H·W).
 
 use num_complex::Complex32;
+use phasefront_kernels::{TILE, TILE_VALUES, each_tile_rows, wide};
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
@@ -18,20 +19,40 @@ const BLOCK: usize = 8;
 /// Parts of a pass for each thread, so that a delayed thread leaves the others work to take.
 const PARTS_PER_THREAD: usize = 4;
 
-/// The smallest 2^a·3^b·5^c that is at least `n`: the lengths that transform fast.
-pub fn smooth_size(n: usize) -> usize {
-    let mut best = n.next_power_of_two();
-    let mut five = 1;
-    while five < best {
-        let mut three = five;
-        while three < best {
-            let two = n.div_ceil(three).next_power_of_two();
-            best = best.min(three * two);
-            three *= 3;
+/// A length of at least `n` that transforms fast: of all 2^a·3^b·5^c·7^d the one that costs the least. Powers of two are
+/// so much faster than others that a few more values are worth it.
+pub fn fast_size(n: usize) -> usize {
+    // What rustfft takes for a value and a prime factor, measured, in units of a factor 2; the constant is what the
+    // rest of a pass takes.
+    const THREE: f64 = 2.2;
+    const FIVE: f64 = 4.6;
+    const SEVEN: f64 = 4.8;
+    const PASS: f64 = 20.0;
+    let limit = n.next_power_of_two();
+    // The powers of `factor` with what they cost.
+    let powers = |factor: usize, cost: f64| {
+        let powers = (0..).map(move |k| (factor.pow(k), cost * f64::from(k)));
+        powers.take_while(move |(power, _)| *power <= limit)
+    };
+    let mut best = (f64::INFINITY, n);
+    for (three, cost_three) in powers(3, THREE) {
+        for (five, cost_five) in powers(5, FIVE) {
+            if three * five > limit {
+                break;
+            }
+            for (seven, cost_seven) in powers(7, SEVEN) {
+                let odd = three * five * seven;
+                let two = n.div_ceil(odd).next_power_of_two();
+                let units = f64::from(two.ilog2()) + cost_three + cost_five + cost_seven + PASS;
+                let size = two * odd;
+                let cost = size as f64 * units;
+                if cost < best.0 {
+                    best = (cost, size);
+                }
+            }
         }
-        five *= 5;
     }
-    best
+    best.1
 }
 
 /// The transforms of an (H, W) frame inside a padded (H', W') plane. Immutable; share it freely.
@@ -59,6 +80,23 @@ pub struct Work {
     buffer: Vec<Complex32>,
     piece: usize,
     parts: usize,
+}
+
+/// The working memory of [`Fft2::convolve`] for one call at a time.
+pub struct ConvolveScratch {
+    /// The tiles of the row spectra.
+    tiles: Vec<Complex32>,
+    /// A row of tiles, or a column of them, and the 1D transforms' own, for each part of a pass.
+    work: Vec<Complex32>,
+    piece: usize,
+}
+
+/// Parts of a pass on the current thread pool.
+fn parts() -> usize {
+    match rayon::current_num_threads() {
+        1 => 1,
+        threads => threads * PARTS_PER_THREAD,
+    }
 }
 
 impl Fft2 {
@@ -100,15 +138,7 @@ impl Fft2 {
 
     /// Memory for the 1D transforms alone, for the current thread pool.
     pub fn work(&self) -> Work {
-        let piece = (self.row.iter().chain(&self.column))
-            .map(|fft| fft.get_inplace_scratch_len())
-            .max()
-            .unwrap_or(0)
-            .max(1);
-        let parts = match rayon::current_num_threads() {
-            1 => 1,
-            threads => threads * PARTS_PER_THREAD,
-        };
+        let (piece, parts) = (self.work_values(), parts());
         Work {
             buffer: vec![Complex32::new(0.0, 0.0); piece * parts],
             piece,
@@ -116,22 +146,119 @@ impl Fft2 {
         }
     }
 
+    /// What one 1D transform works in.
+    fn work_values(&self) -> usize {
+        (self.row.iter().chain(&self.column))
+            .map(|fft| fft.get_inplace_scratch_len())
+            .max()
+            .unwrap_or(0)
+            .max(1)
+    }
+
+    /// Working memory of [`Self::convolve`], for the current thread pool.
+    pub fn convolve_scratch(&self) -> ConvolveScratch {
+        let zero = Complex32::new(0.0, 0.0);
+        let (rows, columns) = self.tiles();
+        let piece = TILE * self.padded_width.max(self.padded_height) + self.work_values();
+        ConvolveScratch {
+            tiles: vec![zero; rows * columns * TILE_VALUES],
+            work: vec![zero; piece * parts()],
+            piece,
+        }
+    }
+
+    /// Rows and columns of tiles that the frame's rows of the padded plane take.
+    fn tiles(&self) -> (usize, usize) {
+        (self.height.div_ceil(TILE), self.padded_width.div_ceil(TILE))
+    }
+
     /// Replaces `plane`, (H, W), by itself filtered: padded with zeros, transformed, each column of
     /// the spectrum handed to `filter` with its index 0..W', transformed back, cropped.
-    pub fn convolve<F>(&self, plane: &mut [Complex32], filter: F, scratch: &mut Scratch)
+    ///
+    /// Tiles of the row spectra lie column by column, so that all passes read and write memory in long runs.
+    pub fn convolve<F>(&self, plane: &mut [Complex32], filter: F, scratch: &mut ConvolveScratch)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
     {
-        assert_eq!(plane.len(), self.height * self.width);
-        let Scratch {
-            rows,
-            columns,
-            work,
-        } = scratch;
-        self.rows_forward(plane, rows, work);
-        self.columns(rows, columns, filter, work);
-        self.rows_inverse(columns, rows, work);
-        self.crop(rows, plane);
+        let (height, width) = (self.height, self.width);
+        let (padded_height, padded_width) = (self.padded_height, self.padded_width);
+        assert_eq!(plane.len(), height * width);
+        let zero = Complex32::new(0.0, 0.0);
+        let ConvolveScratch { tiles, work, piece } = scratch;
+        let shape @ (tile_rows, tile_columns) = self.tiles();
+        let parts = work.len() / *piece;
+        let [forward, inverse] = &self.row;
+        each_tile_rows(tiles, shape, work, *piece, |mut tiles, work| {
+            let (rows, work) = work.split_at_mut(TILE * padded_width);
+            for tile_row in tiles.rows() {
+                let there = &plane[tile_row * TILE * width..];
+                let sources = there.chunks_exact(width).take(TILE);
+                for (row, source) in rows.chunks_exact_mut(padded_width).zip(sources) {
+                    row[..width].copy_from_slice(source);
+                    row[width..].fill(zero);
+                    forward.process_with_scratch(row, work);
+                }
+                wide(|| {
+                    for column in 0..tile_columns {
+                        let tile = tiles.tile(tile_row, column);
+                        turn(rows, padded_width, column * TILE, tile);
+                    }
+                });
+            }
+        });
+        let column_values = tile_rows * TILE_VALUES;
+        let part_columns = tile_columns.div_ceil(parts);
+        let [column_forward, column_inverse] = &self.column;
+        tiles
+            .par_chunks_mut(part_columns * column_values)
+            .zip(work.par_chunks_exact_mut(*piece))
+            .enumerate()
+            .for_each(|(part, (tiles, work))| {
+                let (columns, work) = work.split_at_mut(TILE * padded_height);
+                for (i, tiles) in tiles.chunks_exact_mut(column_values).enumerate() {
+                    let first = (part * part_columns + i) * TILE;
+                    for (k, column) in columns.chunks_exact_mut(padded_height).enumerate() {
+                        if first + k >= padded_width {
+                            break;
+                        }
+                        let (frame, padding) = column.split_at_mut(height);
+                        let tiles = tiles.chunks_exact(TILE_VALUES);
+                        for (run, tile) in frame.chunks_mut(TILE).zip(tiles) {
+                            run.copy_from_slice(&tile[k * TILE..][..run.len()]);
+                        }
+                        padding.fill(zero);
+                        column_forward.process_with_scratch(column, work);
+                        wide(|| filter(first + k, column));
+                        column_inverse.process_with_scratch(column, work);
+                    }
+                    wide(|| {
+                        for (tile_row, tile) in tiles.chunks_exact_mut(TILE_VALUES).enumerate() {
+                            turn(columns, padded_height, tile_row * TILE, tile);
+                        }
+                    });
+                }
+            });
+        let tiles = &*tiles;
+        let part_rows = tile_rows.div_ceil(parts);
+        plane
+            .par_chunks_mut(part_rows * TILE * width)
+            .zip(work.par_chunks_exact_mut(*piece))
+            .enumerate()
+            .for_each(|(part, (plane, work))| {
+                let (rows, work) = work.split_at_mut(TILE * padded_width);
+                for (i, plane) in plane.chunks_mut(TILE * width).enumerate() {
+                    let tile_row = part * part_rows + i;
+                    for (k, out) in plane.chunks_exact_mut(width).enumerate() {
+                        let row = &mut rows[k * padded_width..][..padded_width];
+                        for (column, run) in row.chunks_mut(TILE).enumerate() {
+                            let at = (column * tile_rows + tile_row) * TILE_VALUES + k * TILE;
+                            run.copy_from_slice(&tiles[at..][..run.len()]);
+                        }
+                        inverse.process_with_scratch(row, work);
+                        out.copy_from_slice(&row[..width]);
+                    }
+                }
+            });
     }
 
     /// The frame's part of `rows`, (H, W'), into `plane`, (H, W).
@@ -301,6 +428,27 @@ impl Fft2 {
     }
 }
 
+/// Fills a tile with columns `first..` of rows of `stride` values, transposed; where the rows end early, what is left
+/// of the tile means nothing.
+#[inline(always)]
+fn turn(rows: &[Complex32], stride: usize, first: usize, tile: &mut [Complex32]) {
+    let count = TILE.min(stride - first);
+    for (j, row) in rows.chunks_exact(stride).take(TILE).enumerate() {
+        match row[first..].first_chunk::<TILE>() {
+            Some(row) => {
+                for (i, value) in row.iter().enumerate() {
+                    tile[i * TILE + j] = *value;
+                }
+            }
+            None => {
+                for (i, value) in row[first..first + count].iter().enumerate() {
+                    tile[i * TILE + j] = *value;
+                }
+            }
+        }
+    }
+}
+
 /// Transposes a strip: `to[i][j] = from[j][first + i]` for j < `count`, rows of `to_stride` and
 /// `from_stride` values.
 fn gather(
@@ -335,24 +483,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn smooth_sizes_are_the_least() {
-        let smooth = |mut n: usize| {
-            for p in [2, 3, 5] {
-                while n.is_multiple_of(p) {
-                    n /= p;
+    fn fast_sizes_are_smooth_and_little_larger() {
+        for n in 1..3000 {
+            let size = fast_size(n);
+            let mut rest = size;
+            for p in [2, 3, 5, 7] {
+                while rest.is_multiple_of(p) {
+                    rest /= p;
                 }
             }
-            n == 1
-        };
-        for n in 1..3000 {
-            let expected = (n..).find(|&m| smooth(m));
-            assert_eq!(Some(smooth_size(n)), expected);
+            assert!(rest == 1 && size >= n, "{n}: {size}");
+            assert!(n < 64 || size <= n + n / 7, "{n}: {size}");
         }
+        assert_eq!((fast_size(1950), fast_size(1110)), (2048, 1152));
     }
 
     #[test]
     fn an_all_pass_filter_returns_the_plane() {
-        for (h, w, hp, wp) in [(1, 1, 1, 1), (3, 5, 4, 8), (17, 9, 17, 9), (61, 47, 75, 64)] {
+        for (h, w, hp, wp) in [
+            (1, 1, 1, 1),
+            (3, 5, 4, 8),
+            (17, 9, 17, 9),
+            (61, 47, 75, 64),
+            (33, 90, 40, 100),
+        ] {
             let fft = Fft2::new(h, w, hp, wp);
             let plane: Vec<_> = (0..h * w)
                 .map(|i| Complex32::new((i as f32 * 0.7).sin(), (i as f32 * 0.3).cos()))
@@ -362,7 +516,7 @@ mod tests {
             fft.convolve(
                 &mut out,
                 |_, column| column.iter_mut().for_each(|v| *v *= scale),
-                &mut fft.scratch(),
+                &mut fft.convolve_scratch(),
             );
             for (a, b) in plane.iter().zip(&out) {
                 assert!((a - b).norm() < 1e-5, "{h}×{w}: {a} {b}");

@@ -79,21 +79,28 @@ class ConformanceTest {
     private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
         "network" -> Method.Trained(network)
         "sweep" -> Method.Sweep
-        else -> error(name)
+        else -> Method.Trained(model(name))
     }
+
+    private fun model(file: String): Network = Network.fromFile(folder.resolve("../../models/$file").path)
 
     private fun options(case: JSONObject): SessionOptions = sessionOptions(method(case), displayFromToml(case.getString("display"))).copy(
         encoding = when (val name = case.getString("encoding")) {
             "double-phase" -> Encoding.DoublePhase
             "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
             "band-limit" -> Encoding.BandLimit(1.0f)
-            else -> error(name)
+            else -> Encoding.Deep(model(name))
         },
         response = case.optJSONArray("lut")?.let { lut -> Response.Lut(ByteArray(lut.length()) { lut.getInt(it).toByte() }) }
             ?: Response.Linear,
         brightness = if (case.isNull("brightness")) Brightness.Steady else Brightness.Fixed(case.getDouble("brightness").toFloat()),
         depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
             ?: DepthRange.Percentiles,
+        calibration = if (case.isNull("calibration")) {
+            null
+        } else {
+            CalibratedDisplay.fromFile(folder.resolve(case.getString("calibration")).path)
+        },
     )
 
     private fun levels(case: JSONObject): ByteArray =
@@ -118,7 +125,7 @@ class ConformanceTest {
         for ((case, levels) in cases zip got) {
             val differ = levels.indices.count { levels[it] != expected[from + it] }
             assertTrue(differ * 200 <= levels.size, "${case.getString("name")}: $differ of ${levels.size} levels differ")
-            if (case.isNull("lut")) {
+            if (case.isNull("lut") && case.isNull("calibration")) {
                 val n = case.getInt("levels")
                 val most = levels.indices.maxOf {
                     val apart = abs(levels[it].toUByte().toInt() - expected[from + it].toUByte().toInt())

@@ -41,7 +41,7 @@ class MainActivity : Activity() {
     private var session: Session? = null
     private var source: FrameSource? = null
     private var output: PhaseOutput? = null
-    private val display = Display(width = 960u, height = 540u)
+    private val hologramDisplay = Display(width = 960u, height = 540u)
 
     /** Written on the main thread, read on the session's. */
     @Volatile private var zMm = 0.0
@@ -61,7 +61,7 @@ class MainActivity : Activity() {
             progress = FOCUS_STEPS / 2
             setOnSeekBarChangeListener(object : SeekBar.OnSeekBarChangeListener {
                 override fun onProgressChanged(bar: SeekBar, progress: Int, fromUser: Boolean) {
-                    zMm = display.volumeDepthMm * (progress.toDouble() / FOCUS_STEPS - 0.5)
+                    zMm = hologramDisplay.volumeDepthMm * (progress.toDouble() / FOCUS_STEPS - 0.5)
                 }
 
                 override fun onStartTrackingTouch(bar: SeekBar) = Unit
@@ -96,7 +96,7 @@ class MainActivity : Activity() {
     private fun run() {
         if (session != null) return
         try {
-            session = Session(sessionOptions(Network.builtIn(), display).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
+            session = Session(sessionOptions(Network.builtIn(), hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
         } catch (refused: PhasefrontException) {
             return say(refused.message.orEmpty())
         }
@@ -122,7 +122,7 @@ class MainActivity : Activity() {
     private fun heard(event: SessionEvent) {
         if (event !is SessionEvent.Made) return
         val hologram = event.hologram
-        val view = hologram.preview(zMm, display.width.toInt() / 2, display.height.toInt() / 2).use { it.toBitmap() }
+        val view = hologram.preview(zMm, hologramDisplay.width.toInt() / 2, hologramDisplay.height.toInt() / 2).use { it.toBitmap() }
         val levels: Bitmap? = output?.let { hologram.output().use { image -> image.toBitmap() } }
         runOnUiThread {
             latest?.close()
@@ -147,7 +147,7 @@ class MainActivity : Activity() {
 
     private fun tapped(view: View, event: MotionEvent): Boolean {
         val z = latest?.zAt(event.x.toDouble() / view.width, event.y.toDouble() / view.height) ?: return false
-        focus.progress = ((z / display.volumeDepthMm + 0.5) * FOCUS_STEPS).toInt()
+        focus.progress = ((z / hologramDisplay.volumeDepthMm + 0.5) * FOCUS_STEPS).toInt()
         view.performClick()
         return true
     }

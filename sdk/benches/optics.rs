@@ -1,0 +1,66 @@
+//! What follows the network on a 960×540 frame, one thread: propagation, filters and encoders.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use divan::{Bencher, counter::ItemsCount};
+use num_complex::Complex32;
+use phasefront::encode::{Encoder, Encoding, Scale};
+use phasefront::slm::Response;
+use phasefront::wave::aperture::Aperture;
+use phasefront::wave::asm::{Padding, Propagator};
+
+const SIZE: (usize, usize) = (540, 960);
+
+fn main() {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+    pool.build().unwrap().install(divan::main);
+}
+
+/// `planes` planes of a field that bends.
+fn field(planes: usize) -> Vec<Complex32> {
+    (0..planes * SIZE.0 * SIZE.1)
+        .map(|i| Complex32::from_polar(0.6 + 0.3 * (i as f32 * 0.01).sin(), i as f32 * 1e-4))
+        .collect()
+}
+
+fn pixels(planes: usize) -> ItemsCount {
+    ItemsCount::new(planes * SIZE.0 * SIZE.1)
+}
+
+#[divan::bench(args = [1.0, 6.0, 20.0])]
+fn propagate_mm(bencher: Bencher<'_, '_>, mm: f64) {
+    let plan = Propagator::new(SIZE.0, SIZE.1, 8e-6, 638e-9, mm * 1e-3, Padding::Reach).unwrap();
+    let (mut plane, mut scratch) = (field(1), plan.scratch());
+    let run = || plan.propagate(&mut plane, &mut scratch);
+    bencher.counter(pixels(1)).bench_local(run);
+}
+
+#[divan::bench]
+fn aperture(bencher: Bencher<'_, '_>) {
+    let plan = Aperture::new(SIZE.0, SIZE.1, 1.0).unwrap();
+    let (mut plane, mut scratch) = (field(1), plan.scratch());
+    let run = || plan.filter(&mut plane, &mut scratch);
+    bencher.counter(pixels(1)).bench_local(run);
+}
+
+#[divan::bench]
+fn remove_mean_phase(bencher: Bencher<'_, '_>) {
+    let mut field = field(3);
+    let run = || phasefront::modulator::remove_mean_phase(&mut field);
+    bencher.counter(pixels(3)).bench_local(run);
+}
+
+#[divan::bench(args = ["double", "anti-alias", "band-limit"])]
+fn encode(bencher: Bencher<'_, '_>, name: &str) {
+    let encoding = match name {
+        "anti-alias" => Encoding::ANTI_ALIAS,
+        "band-limit" => Encoding::BAND_LIMIT,
+        _ => Encoding::DoublePhase,
+    };
+    let encoder = Encoder::new(SIZE.0, SIZE.1, encoding).unwrap();
+    let response = Response::linear(8).unwrap();
+    let (mut field, mut scratch) = (field(3), encoder.scratch());
+    let mut levels = vec![0; field.len()];
+    let scale = Scale::Fixed(1.0);
+    let run = || encoder.encode_levels(&mut field, scale, &response, &mut levels, &mut scratch);
+    bencher.counter(pixels(3)).bench_local(run);
+}

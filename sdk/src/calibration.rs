@@ -1,0 +1,221 @@
+//! A calibrated display in one file, for an app to carry: its physics, what its modulator answers, its laser, what
+//! corrects its optics. `phasefront calibrate pack` writes it from what calibration found.
+//!
+//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the laser's gains as f32, (3, Gh, Gw), then the
+//! bytes of the per-pixel table; numbers little-endian.
+
+use crate::display::Display;
+use crate::error::{Error, Result};
+use crate::illumination::Illumination;
+use crate::slm::Response;
+use crate::slm::per_pixel::PerPixel;
+use crate::wave::zernike::{Aberration, Coefficients};
+use ndarray::ArrayView3;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+const MAGIC: &[u8; 8] = b"PFCALIB1";
+/// Most nodes of a laser's map along an axis.
+const MOST_NODES: usize = 65536;
+
+/// A display as it was calibrated.
+#[derive(Debug, Clone)]
+pub struct Calibration {
+    /// The physics.
+    pub display: Display,
+    /// What the modulator answers to a phase.
+    pub response: Response,
+    /// The laser's light over the modulator.
+    pub illumination: Option<Illumination>,
+    /// What corrects the optics, one for all depths.
+    pub correction: Option<Aberration>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lut: Option<Vec<u8>>,
+    /// Gh, Gw.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    laser: Option<[usize; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    correction: Option<[Coefficients; 3]>,
+    display: Display,
+}
+
+fn refuse(what: impl std::fmt::Display) -> Error {
+    Error::Plan(format!("calibration file: {what}"))
+}
+
+impl Calibration {
+    /// Reads the file's bytes.
+    ///
+    /// # Errors
+    /// Bytes that are not such a file, or not all of it; values that cannot be; a table for another display.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let short = || refuse("is cut short");
+        let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or_else(|| {
+            refuse("does not begin with PFCALIB1; `phasefront calibrate pack` writes one")
+        })?;
+        let (length, rest) = rest.split_first_chunk().ok_or_else(short)?;
+        let length = u32::from_le_bytes(*length) as usize;
+        let (text, rest) = rest.split_at_checked(length).ok_or_else(short)?;
+        let text = std::str::from_utf8(text).map_err(refuse)?;
+        let header: Header =
+            toml::from_str(text).map_err(|e| refuse(e.message().trim().replace('\n', " ")))?;
+        let [rows, columns] = header.laser.unwrap_or_default();
+        if rows > MOST_NODES || columns > MOST_NODES {
+            return Err(refuse(format!("holds a laser's map of {columns}×{rows}")));
+        }
+        let (laser, table) = rest
+            .split_at_checked(12 * rows * columns)
+            .ok_or_else(short)?;
+        let illumination = match header.laser {
+            None => None,
+            Some(_) => {
+                let amplitude: Vec<f32> = (laser.chunks_exact(4))
+                    .map(|b| 1.0 / f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+                    .collect();
+                let amplitude =
+                    ArrayView3::from_shape((3, rows, columns), &amplitude).map_err(refuse)?;
+                Some(Illumination::new(amplitude)?)
+            }
+        };
+        let response = match (header.lut, table) {
+            (None, []) => Response::linear(header.display.bits().min(8))?,
+            (Some(levels), []) => {
+                let count = levels.len();
+                Response::lut(levels.try_into().map_err(|_| {
+                    refuse(format!(
+                        "holds {count} levels of a look-up table; there are 256"
+                    ))
+                })?)
+            }
+            (None, table) => Response::PerPixel(Arc::new(PerPixel::from_bytes(table)?)),
+            (Some(_), _) => return Err(refuse("holds both a table and one for each pixel")),
+        };
+        let shape = (header.display.height(), header.display.width());
+        if let Some(other) = response.shape()
+            && other != shape
+        {
+            return Err(refuse(format!(
+                "its table is for {}×{} pixels, its display has {}×{}",
+                other.1, other.0, shape.1, shape.0
+            )));
+        }
+        Ok(Calibration {
+            display: header.display,
+            response,
+            illumination,
+            correction: header.correction.map(Aberration::new).transpose()?,
+        })
+    }
+
+    /// The file's bytes.
+    ///
+    /// # Errors
+    /// None for values that were checked when they were made.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        let (lut, table) = match &self.response {
+            Response::Linear { .. } => (None, vec![]),
+            Response::Lut { level, .. } => (Some(level.to_vec()), vec![]),
+            Response::PerPixel(table) => (None, table.to_bytes()),
+        };
+        let header = Header {
+            lut,
+            laser: (self.illumination.as_ref()).map(|light| [light.nodes().0, light.nodes().1]),
+            correction: self.correction.map(|correction| *correction.coefficients()),
+            display: self.display.clone(),
+        };
+        let text = toml::to_string(&header).map_err(refuse)?;
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend((text.len() as u32).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        let gains = self.illumination.iter().flat_map(Illumination::gains);
+        bytes.extend(gains.flat_map(|gain| gain.to_le_bytes()));
+        bytes.extend(table);
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::slm::per_pixel::nodes;
+    use ndarray::Array3;
+
+    fn calibration() -> Calibration {
+        let display = Display::from_toml("width = 40\nheight = 24\noffset_mm = 3.5").unwrap();
+        let (rows, columns) = nodes(24, 40, 16);
+        let levels: Vec<f32> = (0..3 * rows * columns)
+            .flat_map(|node| (0..=4).map(move |k| (node % 7) as f32 + 50.0 * k as f32))
+            .collect();
+        let turns = vec![6.0; 3 * rows * columns];
+        let table = PerPixel::new(24, 40, 16, 4, &levels, &turns).unwrap();
+        let amplitude =
+            Array3::from_shape_fn((3, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
+        Calibration {
+            display,
+            response: Response::PerPixel(Arc::new(table)),
+            illumination: Some(Illumination::new(amplitude.view()).unwrap()),
+            correction: Some(Aberration::new([[0.1, -2.0, 0.0, 0.25, 1e-9]; 3]).unwrap()),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let want = calibration();
+        let bytes = want.to_bytes().unwrap();
+        let got = Calibration::from_bytes(&bytes).unwrap();
+        assert_eq!(got.display, want.display);
+        assert_eq!(got.response, want.response);
+        assert_eq!(got.correction, want.correction);
+        let gains = |of: &Calibration| of.illumination.as_ref().unwrap().gains().to_vec();
+        for (got, want) in gains(&got).iter().zip(gains(&want)) {
+            assert!((got / want - 1.0).abs() < 1e-6);
+        }
+        for response in [
+            Response::lut(std::array::from_fn(|i| 255 - i as u8)),
+            Response::linear(8).unwrap(),
+        ] {
+            let plain = Calibration {
+                response: response.clone(),
+                illumination: None,
+                correction: None,
+                ..want.clone()
+            };
+            let got = Calibration::from_bytes(&plain.to_bytes().unwrap()).unwrap();
+            assert_eq!(got.response, response);
+            assert!(got.illumination.is_none() && got.correction.is_none());
+        }
+    }
+
+    #[test]
+    fn damaged_files_are_refused() {
+        let bytes = calibration().to_bytes().unwrap();
+        for length in 0..bytes.len() {
+            assert!(
+                Calibration::from_bytes(&bytes[..length]).is_err(),
+                "{length}"
+            );
+        }
+        let mut long = bytes.clone();
+        long.push(0);
+        assert!(Calibration::from_bytes(&long).is_err());
+        // A header that promises a laser's map beyond any memory.
+        let text = "laser = [60000, 60000]\n[display]\n";
+        let mut huge = MAGIC.to_vec();
+        huge.extend((text.len() as u32).to_le_bytes());
+        huge.extend(text.as_bytes());
+        let error = Calibration::from_bytes(&huge).unwrap_err().to_string();
+        assert!(error.contains("cut short"), "{error}");
+        let other = Calibration {
+            display: Display::default(),
+            ..calibration()
+        };
+        let error = Calibration::from_bytes(&other.to_bytes().unwrap()).unwrap_err();
+        assert!(error.to_string().contains("40×24"), "{error}");
+    }
+}

@@ -1,0 +1,385 @@
+//! Sessions on the GPU beside sessions on the CPU: the same frames, nearly the same levels; what the GPU does not do; and
+//! devices that go. Any device there is will do, Mesa's driver in software too.
+#![cfg(feature = "gpu")]
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+
+use camera::{Scene, colour_formats, depth, frame, options};
+use phasefront::depth::image::DepthFormat;
+use phasefront::frame::{CameraFrame, Orientation, Rotation};
+use phasefront::gpu::{ChainOptions, DeviceOptions, Float};
+use phasefront::session::{
+    Backend, Brightness, DropReason, Event, Quality, RunningMode, SessionOptions,
+};
+use phasefront::slm::Response;
+use phasefront::sweep::Sweep;
+use phasefront::{Display, Error, Method, Network, Session};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
+use std::time::Duration;
+
+const W: usize = 64;
+const H: usize = 48;
+
+/// The options of the tests on the GPU; none where there is no driver, which is said.
+fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
+    for name in [None, Some("llvmpipe".to_owned())] {
+        let device = DeviceOptions {
+            name,
+            programs: None,
+        };
+        if phasefront::gpu::Device::open(&device).is_ok() {
+            let mut options = options;
+            options.backend = Backend::Gpu;
+            options.gpu.device = device;
+            return Some(options);
+        }
+    }
+    println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
+    None
+}
+
+/// Compares levels around the circle of `steps`: gives the share that differs, and asserts that none does by over one
+/// step but for a share of `far`.
+fn differing(levels: &[u8], expected: &[u8], far: f64) -> f64 {
+    let apart = |(a, b): (&u8, &u8)| {
+        let d = a.abs_diff(*b);
+        d.min(255 - d + 1)
+    };
+    let count = |least: u8| {
+        let differ = (levels.iter().zip(expected)).filter(|pair| apart(*pair) >= least);
+        differ.count() as f64 / levels.len() as f64
+    };
+    assert_eq!(levels.len(), expected.len());
+    assert!(count(2) <= far, "{} differ by over one step", count(2));
+    count(1)
+}
+
+#[test]
+fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
+    let plain = options(W, H);
+    let Some(gpu) = on_gpu(plain.clone()) else {
+        return;
+    };
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    for brightness in [
+        Brightness::Steady,
+        Brightness::Fixed(0.9),
+        Brightness::FrameMax,
+    ] {
+        let (mut plain, mut gpu) = (plain.clone(), gpu.clone());
+        (plain.brightness, gpu.brightness) = (brightness, brightness);
+        if brightness == Brightness::FrameMax {
+            let lut = Response::lut(std::array::from_fn(|i| 255 - i as u8));
+            (plain.response, gpu.response) = (lut.clone(), lut);
+        }
+        let cpu = Session::new(plain, RunningMode::Image).unwrap();
+        let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+        gpu.warm_up().unwrap();
+        let frame = frame(7, &scene, &metres);
+        let expected = cpu.process(&frame).unwrap();
+        let made = gpu.process(&frame).unwrap();
+        assert!((made.scale() - expected.scale()).abs() < 1e-4 * expected.scale());
+        // In 8 bits the network has the bits of the CPU where its input has; colour that is converted on the GPU may be
+        // rounded the other way, and the field around it changes.
+        let share = differing(made.levels(), expected.levels(), 0.002);
+        assert!(share < 0.01, "{brightness:?}: {share}");
+        assert_eq!(made.range_m(), expected.range_m());
+        assert_eq!(made.z_at(0.3, 0.4), expected.z_at(0.3, 0.4));
+        let z_m = made.z_at(0.3, 0.4);
+        let (mut a, mut b) = (vec![0; 4 * 24 * 32], vec![0; 4 * 24 * 32]);
+        made.preview(z_m, 24, 32, &mut a).unwrap();
+        expected.preview(z_m, 24, 32, &mut b).unwrap();
+        assert!(a.iter().zip(&b).all(|(a, b)| a.abs_diff(*b) <= 2));
+        let (there, here) = (gpu.statistics(), cpu.statistics());
+        let device = gpu.gpu().unwrap();
+        assert_eq!(there.backend.name, device.name());
+        assert!(there.backend.why.contains("int8"), "{:?}", there.backend);
+        assert_ne!(there.backend.name, here.backend.name);
+        assert!(cpu.gpu().is_none());
+        // Times of stages add up to no more than the frame took.
+        assert!(made.times().method > Duration::ZERO);
+    }
+}
+
+/// f32 networks: in 32 bits nearly the CPU's levels, in 16 bits near it.
+#[test]
+fn images_of_an_f32_network_are_near_the_cpus() {
+    let mut plain = options(W, H);
+    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    plain.ladder[0].method = Method::Network(Arc::new(network));
+    let Some(gpu) = on_gpu(plain.clone()) else {
+        return;
+    };
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let frame = frame(7, &scene, &metres);
+    let cpu = Session::new(plain, RunningMode::Image).unwrap();
+    let expected = cpu.process(&frame).unwrap();
+    for (float, far, most) in [(Float::F32, 0.001, 0.02), (Float::Fastest, 0.2, 0.6)] {
+        let mut options = gpu.clone();
+        options.gpu.chain = ChainOptions {
+            float,
+            ..Default::default()
+        };
+        let session = Session::new(options, RunningMode::Image).unwrap();
+        let made = session.process(&frame).unwrap();
+        let share = differing(made.levels(), expected.levels(), far);
+        println!("{float:?}: {share} differ");
+        assert!(share < most, "{float:?}: {share}");
+    }
+}
+
+/// Each colour format, turned and not, as frames of one session: only its input is planned again.
+#[test]
+fn cameras_may_change_their_format() {
+    let plain = options(W, H);
+    let Some(gpu) = on_gpu(plain.clone()) else {
+        return;
+    };
+    let cpu = Session::new(plain, RunningMode::Image).unwrap();
+    let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+    let turned = Orientation {
+        rotation: Rotation::Half,
+        mirrored: true,
+    };
+    let metres = Scene::new(24, 32, 9).depth_bytes(DepthFormat::MetresF32);
+    for (seed, format) in colour_formats().into_iter().enumerate() {
+        for (shape, orientation) in [((H, W), Orientation::default()), ((75, 101), turned)] {
+            let noise = camera::Noise::new(seed as u64, format, shape, 3);
+            let depth = depth(&metres, DepthFormat::MetresF32, 32, 24);
+            let mut frame = CameraFrame::new(1, noise.image().unwrap(), depth);
+            frame.orientation = orientation;
+            let expected = cpu.process(&frame).unwrap();
+            let made = gpu.process(&frame).unwrap();
+            let share = differing(made.levels(), expected.levels(), 0.02);
+            assert!(share < 0.05, "{format:?} {shape:?}: {share}");
+        }
+    }
+    assert!(gpu.statistics().backend.name.contains('('));
+}
+
+#[test]
+fn video_is_as_steady_as_on_the_cpu() {
+    let plain = options(W, H);
+    let Some(gpu) = on_gpu(plain.clone()) else {
+        return;
+    };
+    let cpu = Session::new(plain, RunningMode::Video).unwrap();
+    let gpu = Session::new(gpu, RunningMode::Video).unwrap();
+    let mut scales = Vec::new();
+    for i in 0..8u64 {
+        let mut scene = Scene::new(H, W, 4 + 3 * i as usize);
+        // It grows dark at once.
+        if i > 3 {
+            scene.rgba.iter_mut().for_each(|v| *v /= 2);
+        }
+        let metres = scene.depth_bytes(DepthFormat::MetresF32);
+        let frame = frame(33_000_000 * (i + 1), &scene, &metres);
+        let expected = cpu.process(&frame).unwrap();
+        let made = gpu.process(&frame).unwrap();
+        // A bin of the histogram, should an amplitude lie on its bound.
+        assert!(
+            (made.scale() - expected.scale()).abs() < 4.0 / 2048.0,
+            "{} {}",
+            made.scale(),
+            expected.scale()
+        );
+        let share = differing(made.levels(), expected.levels(), 0.01);
+        assert!(share < 0.05, "{i}: {share}");
+        scales.push(made.scale());
+    }
+    let late = gpu.process(&frame_at(1)).unwrap_err();
+    assert!(matches!(late, Error::Timestamp { .. }));
+    // Brightness follows slowly.
+    let step = |i: usize| (scales[i + 1] - scales[i]).abs();
+    assert!(step(3) < 0.05 * scales[3], "{scales:?}");
+    assert!(scales[7] < scales[3], "{scales:?}");
+    assert_eq!(gpu.statistics().processed, 8);
+}
+
+fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
+    static SCENE: std::sync::OnceLock<(Scene, Vec<u8>)> = std::sync::OnceLock::new();
+    let (scene, metres) = SCENE.get_or_init(|| {
+        let scene = Scene::new(H, W, 10);
+        let metres = scene.depth_bytes(DepthFormat::MetresF32);
+        (scene, metres)
+    });
+    frame(timestamp_ns, scene, metres)
+}
+
+/// The device goes in mid-stream, again and again: frames on it fail as lost, all others are answered.
+#[test]
+fn a_live_session_outlives_its_device() {
+    let Some(options) = on_gpu(options(W, H)) else {
+        return;
+    };
+    let (sender, events) = mpsc::channel();
+    let listener = move |event| sender.send(event).unwrap();
+    let session = Session::new(options, RunningMode::Live(Box::new(listener))).unwrap();
+    let (mut made, mut lost, mut timestamp) = (0, 0, 0);
+    let mut levels = None;
+    for round in 0..3 {
+        for i in 0..3 {
+            timestamp += 1;
+            let device = session.gpu();
+            session.submit(&frame_at(timestamp)).unwrap();
+            if let (1, Some(device)) = (i, device) {
+                // Sooner or later into the frame.
+                std::thread::sleep(Duration::from_millis(2 * round));
+                device.wgpu().0.destroy();
+            }
+            match events.recv().unwrap() {
+                Event::Hologram(hologram) => {
+                    assert_eq!(hologram.timestamp_ns(), timestamp);
+                    let first = levels.get_or_insert_with(|| hologram.levels().to_vec());
+                    assert!(differing(hologram.levels(), first, 0.0) < 0.01);
+                    made += 1;
+                }
+                Event::Failed {
+                    timestamp_ns,
+                    error: Error::Lost(why),
+                } => {
+                    assert_eq!(timestamp_ns, timestamp);
+                    assert!(why.contains("lost") && !why.contains('\n'), "{why}");
+                    lost += 1;
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+    let statistics = session.statistics();
+    assert_eq!((statistics.processed, statistics.failed), (made, lost));
+    assert_eq!(made + lost, 9);
+    assert!(made >= 6, "{made}");
+    // Each loss was followed by a frame that came through, so the GPU is still in use.
+    assert!(statistics.backend.why.contains("opened again after"));
+    session.close();
+}
+
+/// What the GPU does not do goes to the CPU, which says why; the levels are the CPU's to the bit.
+#[test]
+fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
+    let cpu = |mut options: SessionOptions| {
+        options.backend = Backend::Cpu;
+        let session = Session::new(options, RunningMode::Image).unwrap();
+        session.process(&frame_at(1)).unwrap().levels().to_vec()
+    };
+    let mut missing = options(W, H);
+    missing.backend = Backend::Gpu;
+    missing.gpu.device.name = Some("no such card".into());
+    let mut cases = vec![(missing, "no such card")];
+    if let Some(gpu) = on_gpu(options(W, H)) {
+        let mut sweep = gpu.clone();
+        sweep.ladder[0].method = Method::Sweep(Sweep::for_display(&sweep.display));
+        cases.push((sweep, "plane sweeps"));
+        let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
+        let mut ten = SessionOptions::new(
+            Display::from_toml(text).unwrap(),
+            gpu.ladder[0].method.clone(),
+        )
+        .unwrap();
+        (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
+        cases.push((ten, "8 bits"));
+        // A line that no workgroup's memory holds.
+        let mut long = gpu.clone();
+        let text = "width = 9000\nheight = 4\noffset_mm = 2";
+        long.display = Display::from_toml(text).unwrap();
+        (long.ladder[0].height, long.ladder[0].width) = (4, 9000);
+        cases.push((long, "workgroup"));
+        if let Some(mut half) = on_gpu(options(W, H)) {
+            let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+            half.ladder[0].method = Method::Network(Arc::new(network));
+            half.gpu.chain.float = Float::F16;
+            let device = phasefront::gpu::Device::open(&half.gpu.device).unwrap();
+            if !device.has_half() {
+                cases.push((half, "shader-f16"));
+            }
+        }
+    }
+    for (options, word) in cases {
+        let expected = cpu(options.clone());
+        let session = Session::new(options, RunningMode::Image).unwrap();
+        let backend = session.statistics().backend;
+        assert!(backend.why.contains(word), "{word}: {backend:?}");
+        assert!(!backend.name.is_empty() && !backend.why.contains('\n'));
+        assert_eq!(session.process(&frame_at(1)).unwrap().levels(), expected);
+        assert!(session.gpu().is_none() || word != "no such card");
+    }
+    // What the CPU refuses too is an error.
+    let mut wrong = options(W, H);
+    wrong.backend = Backend::Gpu;
+    wrong.gpu.device.name = Some("no such card".into());
+    wrong.display = Display::from_toml("width = 64\nheight = 48\npitch_um = 4").unwrap();
+    assert!(Session::new(wrong, RunningMode::Image).is_err());
+}
+
+/// A ladder whose rungs lie on the GPU and on the CPU.
+#[test]
+fn rungs_say_where_they_are_computed() {
+    let Some(mut options) = on_gpu(options(W, H)) else {
+        return;
+    };
+    let mut low = options.ladder[0].clone();
+    low.backend = Some(Backend::Cpu);
+    (low.height, low.width) = (H / 2, W / 2);
+    let mut middle = low.clone();
+    middle.backend = None;
+    options.ladder.extend([middle, low]);
+    options.quality = Quality::Fixed(0);
+    let session = Session::new(options, RunningMode::Video).unwrap();
+    let device = session.gpu().unwrap();
+    let mut names = Vec::new();
+    for (i, rung) in [0, 1, 2, 2, 0].into_iter().enumerate() {
+        session.set_quality(Quality::Fixed(rung)).unwrap();
+        session.process(&frame_at(2 * i as u64 + 1)).unwrap();
+        let hologram = session.process(&frame_at(2 * i as u64 + 2)).unwrap();
+        assert_eq!(hologram.rung(), rung);
+        names.push(session.statistics().backend.name);
+    }
+    assert_eq!((&names[0], &names[1]), (&device.name(), &device.name()));
+    assert_ne!(names[2], names[0]);
+    assert_eq!((&names[3], &names[4]), (&names[2], &names[0]));
+    // One device for all of them.
+    assert!(Arc::ptr_eq(&device, &session.gpu().unwrap()));
+}
+
+#[test]
+fn sessions_close_at_any_moment() {
+    let Some(options) = on_gpu(options(W, H)) else {
+        return;
+    };
+    for round in 0..6 {
+        let closed = Arc::new(AtomicBool::new(false));
+        let (sender, events) = mpsc::channel();
+        let late = closed.clone();
+        let listener = move |event| {
+            assert!(!late.load(Ordering::SeqCst), "told after it was closed");
+            sender.send(event).unwrap();
+        };
+        let session = Session::new(options.clone(), RunningMode::Live(Box::new(listener)));
+        let session = session.unwrap();
+        for timestamp in 1..=round {
+            session.submit(&frame_at(timestamp)).unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(3 * round));
+        session.close();
+        closed.store(true, Ordering::SeqCst);
+        let statistics = session.statistics();
+        assert_eq!(statistics.pending, 0);
+        assert_eq!(statistics.failed, 0);
+        drop(session);
+        let told: Vec<Event> = events.iter().collect();
+        assert_eq!(told.len() as u64, round);
+        assert!(told.iter().all(|event| matches!(
+            event,
+            Event::Hologram(_)
+                | Event::Dropped {
+                    reason: DropReason::Closed | DropReason::Superseded,
+                    ..
+                }
+        )));
+    }
+}
