@@ -38,7 +38,7 @@ pub fn make(
     let place = dir.join("seeds.json");
     let description = serde_json::json!({
         "format": FORMAT, "scale": SCALE, "planes": sweep.planes, "taps": sweep.taps,
-        "hidden_layers": sweep.hidden_layers,
+        "hidden_layers": sweep.hidden_layers, "between_planes": sweep.between_planes,
     });
     match std::fs::read(&place) {
         Ok(bytes) => {

@@ -9,6 +9,7 @@ use phasefront_lab::ldi::Ldi;
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Scenes};
 use phasefront_lab::{evaluate, metrics, scene, sm_lbm, sweep_study};
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -86,43 +87,55 @@ fn planes_are_compared_with_the_finest() {
     assert!(study::layers(&none, 12, &|_| {}).is_err());
 }
 
+/// Runs `phasefront study` on one scene of 40 planes and reads NAME.json; the folder holds the plot, too.
+fn run(what: &str, size: &str, folder: &Path) -> serde_json::Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+        .args(["study", what, "--scenes", "1", "--planes", "40"])
+        .args(["--size", size, "-o"])
+        .arg(folder)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let text = std::fs::read_to_string(folder.join(format!("{what}.json"))).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
 #[test]
 fn the_command_writes_figures_and_a_plot() {
     let folder = tempfile::tempdir().unwrap();
-    for what in ["layers", "planes", "sweep", "displays"] {
-        let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
-            .args([
-                "study", what, "--scenes", "1", "--size", "24", "--planes", "40", "-o",
-            ])
-            .arg(folder.path().join("out"))
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        let text = std::fs::read_to_string(folder.path().join(format!("out/{what}.json"))).unwrap();
-        let result: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let out = folder.path().join("out");
+    for what in ["layers", "planes"] {
+        let result = run(what, "24", &out);
         let rows = result["rows"].as_array().unwrap();
-        match what {
-            "sweep" => assert_eq!(rows.len(), 27),
-            "displays" => assert_eq!(rows.len(), sweep_study::DISPLAYS.len()),
-            _ => {}
-        }
-        if what == "sweep" {
-            let svg = std::fs::read_to_string(folder.path().join("out/sweep.svg")).unwrap();
-            assert_eq!(svg.matches("<circle").count(), 8 + 8 + 6 + 3);
-        }
-        if matches!(what, "sweep" | "displays") {
-            continue;
-        }
         assert_eq!(rows.len(), if what == "layers" { 9 } else { 1 });
         assert_eq!(result["finest"], if what == "layers" { 10 } else { 40 });
-        let svg = std::fs::read_to_string(folder.path().join(format!("out/{what}.svg"))).unwrap();
+        let svg = std::fs::read_to_string(out.join(format!("{what}.svg"))).unwrap();
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"));
         let finite = rows.iter().filter(|row| row["psnr"].is_f64()).count();
         assert_eq!(svg.matches("<circle").count(), rows.len() + finite);
+    }
+}
+
+#[test]
+fn the_command_studies_the_sweep() {
+    let folder = tempfile::tempdir().unwrap();
+    // In smaller scenes a sensor's depth would be all holes.
+    let result = run("sweep", "64", folder.path());
+    let rows = result["rows"].as_array().unwrap();
+    let count = |part: &str| rows.iter().filter(|row| row["part"] == part).count();
+    let svg = std::fs::read_to_string(folder.path().join("sweep.svg")).unwrap();
+    // The usual sweep stands on all four curves, and planes have two.
+    let points = 4 + 2 * count("planes") + count("taps") + count("hidden");
+    assert_eq!(svg.matches("<circle").count(), points);
+    let result = run("displays", "24", folder.path());
+    let rows = result["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), sweep_study::DISPLAYS.len());
+    for row in rows {
+        assert!(row["sweep"]["psnr"].as_f64().unwrap() > 15.0, "{row}");
     }
 }
 
@@ -158,8 +171,8 @@ fn the_sweep_is_studied_beside_exact_waves() {
     let done = || {
         work.fetch_add(1, Ordering::Relaxed);
     };
-    let rows = sweep_study::ablation(&scenes, 48, &done).unwrap();
-    assert_eq!(work.into_inner(), sweep_study::ablation_work(&scenes, 48));
+    let rows = sweep_study::ablation(&scenes, 200, &done).unwrap();
+    assert_eq!(work.into_inner(), sweep_study::ablation_work(&scenes, 200));
     let of = |part: &str, value: usize| {
         let found = rows.iter().find(|r| r.part == part && r.value == value);
         found.unwrap_or_else(|| panic!("no {part} {value}: {rows:?}"))
@@ -177,7 +190,7 @@ fn the_sweep_is_studied_beside_exact_waves() {
         usual.clean.psnr > of("hidden", 0).clean.psnr + 0.5,
         "{rows:?}"
     );
-    assert!(usual.clean.psnr > of("between", 0).clean.psnr + 0.3);
+    assert!(usual.clean.psnr > of("between", 0).clean.psnr + 0.05);
     assert!(of("planes", 64).clean.psnr > of("planes", 16).clean.psnr + 1.0);
     assert!(usual.clean.psnr > usual.degraded.psnr, "{usual:?}");
     assert!(of("exact", 2).clean.psnr > usual.clean.psnr, "{rows:?}");
@@ -200,12 +213,12 @@ fn the_sweep_is_studied_beside_exact_waves() {
             let mut field = Array3::zeros((3, 64, 64));
             plan.field(&frame, field.as_slice_mut().unwrap(), &mut plan.scratch())
                 .unwrap();
-            let truth = sm_lbm::hologram(&ldi, display, 48, &|_, _| {}).unwrap();
+            let truth = sm_lbm::hologram(&ldi, display, 200, &|_, _| {}).unwrap();
             let [a, b] = [field, truth].map(|u| u.mapv(|u: Complex32| u.norm()));
             metrics::compare(a.view(), b.view()).unwrap().psnr_overall / 2.0
         })
         .iter()
         .sum();
     assert!((of("hidden", 0).clean.psnr - by_hand).abs() < 1e-6);
-    assert!(sweep_study::ablation(&Scenes { size: 66, ..scenes }, 48, &|| ()).is_err());
+    assert!(sweep_study::ablation(&Scenes { size: 66, ..scenes }, 200, &|| ()).is_err());
 }

@@ -27,7 +27,7 @@ pub struct SeededScratch {
 
 impl SeededPlan {
     /// Plans `network`, whose input is [`crate::network::InputKind::Seeded`], for (`height`, `width`) frames. The seed is
-    /// [`Sweep::for_display`]'s at the midpoint, as in training.
+    /// [`Sweep::for_display`]'s at the midpoint.
     ///
     /// # Errors
     /// A network or a sweep that cannot be planned.

@@ -115,7 +115,9 @@ mod tests {
             let around = |at: usize, i: usize| (at + i).saturating_sub(ramp / 2);
             let places = (0..ramp * ramp).map(|i| (around(y, i / ramp), around(x, i % ramp)));
             let hits = places.filter(|(y, x)| inside(*y, x.saturating_sub(shift)));
-            let random = ((y * 31 + x * 17 + x * y * 5) % 101) as f32 / 50.0 - 1.0;
+            let mixed = (y as u32 * 7919 + x as u32).wrapping_mul(0x9e37_79b9);
+            let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b);
+            let random = (mixed >> 8) as f32 / (1 << 23) as f32 - 1.0;
             0.8 - 0.5 * hits.count() as f32 / (ramp * ramp) as f32 + noise * random
         });
         measure(&RgbdFrame::new(rgb, depth).unwrap())
