@@ -328,27 +328,24 @@ impl PerPixel {
         // Knots of the left node beside the way to the right one: one place to load from.
         let mut pairs = [(0.0, 0.0); MAX_INTERVALS + 1];
         let (mut phases, mut levels, mut x) = (phases, levels, x);
-        let per_radian = self.intervals as f32 / TAU;
-        let last = self.intervals as i32 - 1;
         while !phases.is_empty() {
             let right_turn = column(j + 1, &mut right);
-            for (pair, (left, right)) in pairs.iter_mut().zip(left.iter().zip(&right)) {
+            for (pair, (left, right)) in pairs.iter_mut().zip(left.iter().zip(&right)).take(knots) {
                 *pair = (*left, right - left);
             }
             let count = phases.len().min((j + 1) * self.spacing - x);
             let (run, rest) = phases.split_at(count);
             let (shown, others) = std::mem::take(&mut levels).split_at_mut(count);
-            let step = self.spacing as f32;
             let start = x - j * self.spacing;
-            for (n, (phase, level)) in run.iter().zip(shown).enumerate() {
-                let fx = (start + n) as f32 / step;
-                let turn = left_turn + (right_turn - left_turn) * fx;
-                let phase = if *phase >= turn { 0.0 } else { *phase };
-                let t = phase * per_radian;
-                let k = (t as i32).min(last);
-                let (here, next) = (pairs[k as usize & 63], pairs[(k as usize & 63) + 1]);
-                let (here, next) = (here.0 + here.1 * fx, next.0 + next.1 * fx);
-                *level = rounded(here + (next - here) * (t - k as f32));
+            let node = Between {
+                pairs: &pairs,
+                turn: (left_turn, right_turn - left_turn),
+                intervals: self.intervals,
+                step: self.spacing as f32,
+            };
+            let blocks = run.chunks(LANES).zip(shown.chunks_mut(LANES));
+            for (n, (run, shown)) in blocks.enumerate() {
+                node.levels(run, (start + n * LANES) as f32, shown);
             }
             (phases, levels) = (rest, others);
             x += count;
@@ -379,9 +376,78 @@ impl PerPixel {
     }
 }
 
+/// Values that are looked up at a time.
+const LANES: usize = 32;
+
+/// The curves between two nodes of a row.
+struct Between<'a> {
+    /// Knots of the left node, and the way to the right one's.
+    pairs: &'a [(f32, f32); MAX_INTERVALS + 1],
+    /// The turn likewise.
+    turn: (f32, f32),
+    intervals: usize,
+    /// Pixels from node to node.
+    step: f32,
+}
+
+impl Between<'_> {
+    /// The levels of at most [`LANES`] phases, the first of which is `first` pixels from the left node.
+    // Index loops over arrays of one fixed length: only the middle one, which looks knots up, does not run on vectors.
+    #[allow(clippy::needless_range_loop)]
+    fn levels(&self, phases: &[f32], first: f32, levels: &mut [u8]) {
+        let mut wanted = [0.0; LANES];
+        wanted[..phases.len()].copy_from_slice(phases);
+        let per_radian = self.intervals as f32 / TAU;
+        let last = (self.intervals - 1) as f32;
+        let (mut along, mut part, mut interval) = ([0.0; LANES], [0.0; LANES], [0; LANES]);
+        for i in 0..LANES {
+            let fx = (first + i as f32) / self.step;
+            let turn = self.turn.0 + self.turn.1 * fx;
+            let phase = if wanted[i] >= turn { 0.0 } else { wanted[i] };
+            let t = phase * per_radian;
+            let k = whole(t).min(last);
+            (along[i], part[i], interval[i]) = (fx, t - k, bits(k) & 63);
+        }
+        let (mut here, mut way) = ([0.0; LANES], [0.0; LANES]);
+        let (mut next, mut next_way) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            let k = interval[i] as usize;
+            (here[i], way[i]) = self.pairs[k];
+            (next[i], next_way[i]) = self.pairs[k + 1];
+        }
+        let mut shown = [0; LANES];
+        for i in 0..LANES {
+            let here = here[i] + way[i] * along[i];
+            let next = next[i] + next_way[i] * along[i];
+            let level = here + (next - here) * part[i] + 0.5;
+            shown[i] = bits(whole(level.clamp(0.0, 255.0))) as u8;
+        }
+        levels.copy_from_slice(&shown[..levels.len()]);
+    }
+}
+
 /// To a level: the fraction is dropped after adding ½.
 fn rounded(level: f32) -> u8 {
     (level + 0.5) as u8
+}
+
+/// 2²³: from here on floats have no fraction.
+const WHOLE: f32 = 8_388_608.0;
+
+/// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly where it has to
+/// heed values out of range.
+fn whole(value: f32) -> f32 {
+    let nearest = value + WHOLE - WHOLE;
+    if nearest > value {
+        nearest - 1.0
+    } else {
+        nearest
+    }
+}
+
+/// A whole value below 2²³ in the low bits of an integer.
+fn bits(whole: f32) -> u32 {
+    (whole + WHOLE).to_bits()
 }
 
 #[cfg(test)]
