@@ -2,7 +2,7 @@
 //! pixel.
 #![allow(clippy::unwrap_used)]
 
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::encode::{Encoding, Scale};
@@ -15,8 +15,9 @@ use phasefront_lab::calibrate::rehearse;
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{DisplayFile, Hologram, HologramInfo};
+use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::simulated_display::{self, SimulatedDisplay};
-use phasefront_lab::{metrics, scene, sm_lbm};
+use phasefront_lab::{metrics, sm_lbm};
 use std::f64::consts::TAU;
 
 const SIZE: (usize, usize) = (80, 144);
@@ -71,11 +72,13 @@ fn per_pixel_calibration_brings_phases_and_black_back() {
             curves.silent.len()
         );
         assert!(before > 0.3, "{colour}: {before}");
-        // The goal is 0.05; what is left is mostly what the compact table leaves out.
-        assert!(after < 0.08, "{colour}: {after}");
-        assert!(grey - black > 10.0, "{colour}: {grey} {black}");
+        assert!(after < 0.02, "{colour}: {after}");
         assert!(
-            errors.between_rms < 0.06 && errors.compact_rms < 0.06,
+            grey - black > 10.0 && black < -35.0,
+            "{colour}: {grey} {black}"
+        );
+        assert!(
+            errors.between_rms < 0.02 && errors.compact_rms < 0.02,
             "{errors:?}"
         );
         assert!(errors.linear_rms > 0.3);
@@ -260,26 +263,48 @@ fn cylinder() -> Aberration {
     Aberration::new(coefficients).unwrap()
 }
 
+/// Three boards behind one another, each with soft bars of its own, upright ones, lying ones and slanted ones, six to nine pixels
+/// wide: what a double phase shows well, and what a cylinder washes out, as in the test pattern of the paper's figure.
+fn boards((h, w): (usize, usize), planes: usize, in_focus: [usize; 3]) -> Ldi {
+    let board = |x: usize| 3 * x / w;
+    let depth = |k: usize| (k as f32 + 0.5) / planes as f32;
+    let rgb = Array3::from_shape_fn((3, h, w), |(c, y, x)| {
+        let (x, y, c) = (x as f32, y as f32, c as f32);
+        let wave = |fx: f32, fy: f32| (std::f32::consts::TAU * (fx * x + fy * y) + c).cos();
+        // Fading between boards, so that no board's edge stands out.
+        let middle = (3.0 * x / w as f32).fract() - 0.5;
+        let fade = (std::f32::consts::PI * middle).cos().powi(2);
+        let bars = if y < h as f32 / 2.0 {
+            wave(1.0 / 6.0, 0.0)
+        } else {
+            wave(0.11, 0.06)
+        };
+        fade * (0.5 + 0.35 * bars)
+    });
+    let depth = Array2::from_shape_fn((h, w), |(_, x)| depth(in_focus[board(x)]));
+    Ldi::new(vec![LdiLayer { rgb, depth }]).unwrap()
+}
+
 #[test]
-#[ignore = "double phase shows this scene with 11 dB even without the lens: too roughly to see the correction"]
 fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let display = Display::default();
-    let size @ (h, w) = (128, 160);
-    let scene = scene::random_scene(4, h, w);
-    let ldi = scene::render_ldi_reference(&scene, h, w, 3).unwrap();
+    let size @ (h, w) = (128, 192);
+    const PLANES: usize = 24;
+    let in_focus = [4, 12, 20];
+    let ldi = boards(size, PLANES, in_focus);
     let all = Aberrations::new(vec![(0.0, cylinder())]).unwrap();
-    let plain = sm_lbm::hologram(&ldi, &display, 24, &|_, _| {}).unwrap();
-    let correction = Correction::of_aberrations(&all, size, 24, &display).unwrap();
-    let corrected = corrected::hologram(&ldi, &display, 24, &correction, &|_, _| {}).unwrap();
+    let plain = sm_lbm::hologram(&ldi, &display, PLANES, &|_, _| {}).unwrap();
+    let correction = Correction::of_aberrations(&all, size, PLANES, &display).unwrap();
+    let corrected = corrected::hologram(&ldi, &display, PLANES, &correction, &|_, _| {}).unwrap();
     let bare = DisplayFile::from(display.clone());
     let aberrated = DisplayFile {
         aberration: Some(AberrationFile::Uniform(all)),
         ..bare.clone()
     };
+    // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by a quarter.
+    let scale = Scale::Fixed(1.0);
     let encoded = |field: &Array3<Complex32>, correct: bool| {
-        let mut plan = bare
-            .modulator(size, Encoding::ANTI_ALIAS, Scale::Max)
-            .unwrap();
+        let mut plan = bare.modulator(size, Encoding::ANTI_ALIAS, scale).unwrap();
         if correct {
             plan = plan.with_correction(&cylinder()).unwrap();
         }
@@ -301,7 +326,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
         };
         (levels, info)
     };
-    let z_m = [2e-3, 0.0, -2e-3];
+    let z_m = in_focus.map(|k| sm_lbm::plane_z_m(k, PLANES, &display));
     let info = encoded(&plain, false).1;
     let truth = Hologram::Complex(plain.clone(), info).views(&z_m).unwrap();
     let quality = |(levels, info): (Array3<u8>, HologramInfo), file: &DisplayFile| -> f64 {
@@ -324,7 +349,8 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     eprintln!(
         "without {without:.2} dB, uncorrected {uncorrected:.2}, corrected {by_layers:.2} and {by_offset:.2}"
     );
+    assert!(without > 22.0, "{without}");
     assert!(by_layers > without - 1.0, "{without} {by_layers}");
     assert!(by_offset > without - 1.0, "{without} {by_offset}");
-    assert!(uncorrected < without - 3.0, "{without} {uncorrected}");
+    assert!(uncorrected < without - 5.0, "{without} {uncorrected}");
 }

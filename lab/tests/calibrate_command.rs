@@ -50,7 +50,6 @@ impl Folder {
 }
 
 #[test]
-#[ignore = "its outcome misses a bound; docs/calibration.md has none of its figures yet"]
 fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     let folder = Folder::new();
     let rehearse = [
@@ -77,7 +76,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
             number("unevenness", "after") < 0.5 * number("unevenness", "before"),
             "{outcome}"
         );
-        assert!(number("strehl", "after") > 0.9, "{outcome}");
+        assert!(number("strehl", "after") > 0.95, "{outcome}");
     }
     for name in [
         "curves.svg",
@@ -278,10 +277,9 @@ fn patterns_are_written_once() {
 }
 
 #[test]
-#[ignore = "the search leaves 0.3 rad of one coefficient, a Strehl ratio under 0.9"]
 fn an_aberration_is_searched_round_by_round() {
     let folder = Folder::new();
-    let wanted: Coefficients = [0.6, -0.9, 0.4, 0.5, -0.7];
+    let wanted: Coefficients = [0.9, -1.1, 0.6, 0.8, -0.9];
     let display = Display::from_toml("width = 80\nheight = 72").unwrap();
     fs::write(folder.path("display.toml"), "width = 80\nheight = 72").unwrap();
     let correction = Aberration::new([[0.0; 5], wanted, [0.0; 5]]).unwrap();
@@ -331,8 +329,10 @@ fn an_aberration_is_searched_round_by_round() {
     let left: Coefficients = std::array::from_fn(|i| wanted[i] - entries[0].green[i]);
     // The modulator itself is not calibrated here.
     assert!(
-        spot::strehl(&wanted) < 0.5 && spot::strehl(&left) > 0.9,
-        "{left:?}"
+        spot::strehl(&wanted) < 0.6 && spot::strehl(&left) > 0.95,
+        "{} {} {left:?}",
+        spot::strehl(&wanted),
+        spot::strehl(&left)
     );
     assert_eq!(entries[0].red, [0.0; 5]);
     assert!(folder.refuses(&search, 1).contains("--force"));

@@ -1,13 +1,15 @@
 //! The coefficients of an aberration from photographs of a focused spot, by search.
 //!
 //! A sub-hologram (Eq. 19) focuses light to a distance; the camera stands focused there. Each round shows the best
-//! coefficients so far, and each of the five terms a step to either side of them; the sharper the spot, the better.
-//! A parabola through the logarithm of the three sharpnesses of a term says where it is best, and all five move at once, as
-//! the terms are orthogonal over the pupil. The steps shrink from round to round, down to what noise leaves
-//! distinguishable. This is the sensorless adaptive optics of Booth (Opt. Express 14, 1339, 2006), with the paper's terms.
+//! coefficients so far, and steps to either side of them along five directions that are at right angles and turned from round
+//! to round. [`super::pupil`] finds the aberration that explains how sharp all spots of all rounds were; the next round
+//! begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is sharpest. Directions mix
+//! the terms because sharpness is the same for a pupil and its mirror images: steps of one term at a time hardly tell them apart.
 
 use super::photograph::{Photograph, SATURATED_SHARE};
+use super::pupil::{Pupil, Spot};
 use crate::error::{Error, Result};
+use crate::scene::dice::Dice;
 use ndarray::Array2;
 use num_complex::Complex32;
 use phasefront::Display;
@@ -19,23 +21,27 @@ use serde::{Deserialize, Serialize};
 /// Photographs of a round.
 pub const TRIALS: usize = 1 + 2 * TERMS.len();
 /// Rounds of a search.
-pub const ROUNDS: usize = 7;
-/// The first step, radians.
-const FIRST_STEP: f64 = 1.2;
-/// What a step is of the one before.
-const SHRINK: f64 = 0.75;
-/// The most that a term moves in a round, steps.
-const MOST: f64 = 1.5;
+pub const ROUNDS: usize = 3;
+/// A step, radians RMS of the wavefront: about where sharpness falls the fastest.
+const STEP: f64 = 0.6;
+/// The mean squares of the terms over the pupil.
+const MEAN_SQUARES: Coefficients = [1.0 / 3.0, 1.0 / 6.0, 1.0 / 6.0, 1.0 / 8.0, 1.0 / 8.0];
+/// From how many places around the best the first round looks for what explains it, and the others.
+const STARTS: [usize; 2] = [16, 2];
+/// How far around, radians.
+const AROUND: f64 = 2.0;
 
 /// A search under way.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Search {
     /// The best coefficients so far.
     pub best: Coefficients,
-    /// By how much terms are tried to either side, radians.
-    pub step: f64,
     /// Rounds done.
     pub round: usize,
+    /// What was shown so far, and how sharp it was.
+    pub seen: Vec<Spot>,
+    /// The root mean square of what the best leaves unexplained of that, as a part of it.
+    pub residual: f64,
 }
 
 impl Search {
@@ -43,8 +49,9 @@ impl Search {
     pub fn from(best: Coefficients) -> Self {
         Search {
             best,
-            step: FIRST_STEP,
             round: 0,
+            seen: Vec::new(),
+            residual: 0.0,
         }
     }
 
@@ -53,37 +60,56 @@ impl Search {
         self.round >= ROUNDS
     }
 
-    /// What the round shows: the best, then each term lower and higher.
+    /// What the round shows: the best, then a step to either side of it in each direction.
     pub fn trials(&self) -> [Coefficients; TRIALS] {
-        std::array::from_fn(|i| {
-            let mut trial = self.best;
-            if i > 0 {
-                let side = if i % 2 == 1 { -1.0 } else { 1.0 };
-                trial[(i - 1) / 2] += side * self.step;
+        let directions = directions(self.round as u64);
+        std::array::from_fn(|i| match i.checked_sub(1) {
+            None => self.best,
+            Some(i) => {
+                let step = if i % 2 == 0 { -STEP } else { STEP };
+                std::array::from_fn(|j| self.best[j] + step * directions[i / 2][j])
             }
-            trial
         })
     }
 
     /// The next round, from how sharp each trial's spot was.
     pub fn learn(&self, sharpness: &[f64; TRIALS]) -> Search {
-        let log = sharpness.map(|s| s.max(1e-12).ln());
-        let best = std::array::from_fn(|term| {
-            let (low, middle, high) = (log[1 + 2 * term], log[0], log[2 + 2 * term]);
-            let bend = low - 2.0 * middle + high;
-            let steps = match bend < 0.0 {
-                true => (0.5 * (low - high) / bend).clamp(-MOST, MOST),
-                false if high > low => 1.0,
-                false => -1.0,
-            };
-            self.best[term] + steps * self.step
-        });
+        let mut seen = self.seen.clone();
+        seen.extend(self.trials().into_iter().zip(*sharpness));
+        let sharpest = (seen.iter()).max_by(|a, b| a.1.total_cmp(&b.1));
+        let mut starts = vec![self.best];
+        starts.extend(sharpest.map(|(shown, _)| *shown));
+        let mut dice = Dice::new(self.round as u64);
+        starts.extend((0..STARTS[self.round.min(1)]).map(|_| {
+            let beside = |a: f64| a + dice.range(-AROUND, AROUND);
+            self.best.map(beside)
+        }));
+        let explained = Pupil::new().explain(&seen, &starts);
         Search {
-            best,
-            step: self.step * SHRINK,
+            best: explained.map_or(self.best, |e| e.correction),
             round: self.round + 1,
+            seen,
+            residual: explained.map_or(1.0, |e| e.residual),
         }
     }
+}
+
+/// Five wavefronts of 1 rad RMS at right angles: random ones, each less what it has of those before (Gram and Schmidt).
+fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
+    let mut dice = Dice::new(seed ^ 0x0044_4952);
+    let mut directions = [[0.0; TERMS.len()]; TERMS.len()];
+    for n in 0..TERMS.len() {
+        let mut new: Coefficients = std::array::from_fn(|_| dice.range(-1.0, 1.0));
+        let dot =
+            |a: &Coefficients, b: &Coefficients| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for before in &directions[..n] {
+            let along = dot(&new, before);
+            (new.iter_mut().zip(before)).for_each(|(v, b)| *v -= along * b);
+        }
+        let length = dot(&new, &new).sqrt();
+        directions[n] = new.map(|v| v / length);
+    }
+    directions.map(|d| std::array::from_fn(|j| d[j] / MEAN_SQUARES[j].sqrt()))
 }
 
 /// The middle of the frame, as a place of a spot.
@@ -238,7 +264,6 @@ pub fn strehl(a: &Coefficients) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::scene::dice::Dice;
     use crate::simulated_display::SimulatedDisplay;
     use phasefront::wave::zernike::Aberration;
 
@@ -248,6 +273,28 @@ mod tests {
         // exp(−σ²), σ² = a²/6 for astigmatism.
         let a = 0.3f64;
         assert!((strehl(&[0.0, a, 0.0, 0.0, 0.0]) - (-a * a / 6.0).exp()).abs() < 2e-3);
+    }
+
+    #[test]
+    fn directions_are_wavefronts_at_right_angles() {
+        for seed in 0..5 {
+            let all = directions(seed);
+            for (i, a) in all.iter().enumerate() {
+                for (j, b) in all.iter().enumerate() {
+                    let (mut sum, mut count) = (0.0, 0.0);
+                    for n in 0..120 * 120 {
+                        let at = |n: usize| (2 * n + 1) as f64 / 120.0 - 1.0;
+                        let (x, y) = (at(n % 120), at(n / 120));
+                        if x * x + y * y <= 1.0 {
+                            sum += zernike::terms(a, x, y) * zernike::terms(b, x, y);
+                            count += 1.0;
+                        }
+                    }
+                    let expected = if i == j { 1.0 } else { 0.0 };
+                    assert!((sum / count - expected).abs() < 2e-2, "{seed} {i} {j}");
+                }
+            }
+        }
     }
 
     #[test]
