@@ -36,6 +36,9 @@ pub struct Calibration {
 struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     lut: Option<Vec<u8>>,
+    /// Bytes of the per-pixel table.
+    #[serde(default)]
+    per_pixel: usize,
     /// Gh, Gw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     laser: Option<[usize; 2]>,
@@ -71,6 +74,13 @@ impl Calibration {
         let (laser, table) = rest
             .split_at_checked(12 * rows * columns)
             .ok_or_else(short)?;
+        if table.len() != header.per_pixel {
+            return Err(refuse(format!(
+                "holds {} bytes of a table, its header says {}",
+                table.len(),
+                header.per_pixel
+            )));
+        }
         let illumination = match header.laser {
             None => None,
             Some(_) => {
@@ -124,6 +134,7 @@ impl Calibration {
         };
         let header = Header {
             lut,
+            per_pixel: table.len(),
             laser: (self.illumination.as_ref()).map(|light| [light.nodes().0, light.nodes().1]),
             correction: self.correction.map(|correction| *correction.coefficients()),
             display: self.display.clone(),

@@ -27,6 +27,7 @@ from .stage1 import Stage1
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
+SILENT = 1.0  # the range of a tensor that is 0 everywhere: any finer and the layer before it scales beyond all bounds
 
 
 def tensors(architecture):
@@ -69,9 +70,9 @@ class Quantized(nn.Module):
         low, high = self.ranges[name]
         if name in ("input", "concat"):
             low, high = min(low, 0.0), max(high, 0.0)
-            scale = float(np.float32(max(high - low, 1e-6) / 254))
+            scale = float(np.float32((high - low if high > low else SILENT) / 254))
             return scale, round(-low / scale)
-        return float(np.float32(max(high, 1e-6) / 255)), 0
+        return float(np.float32((high if high > 0 else SILENT) / 255)), 0
 
     def activation(self, name, x):
         scale, zero = self.parameters_of(name)
