@@ -270,7 +270,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut missing = options(W, H);
     missing.backend = Backend::Gpu;
     missing.gpu.device.name = Some("no such card".into());
-    let mut cases = vec![(missing, "no such card")];
+    let mut cases = vec![(missing, "no GPU")];
     if let Some(gpu) = on_gpu(options(W, H)) {
         let mut sweep = gpu.clone();
         sweep.ladder[0].method = Method::Sweep(Sweep::for_display(&sweep.display));
@@ -306,7 +306,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         assert!(backend.why.contains(word), "{word}: {backend:?}");
         assert!(!backend.name.is_empty() && !backend.why.contains('\n'));
         assert_eq!(session.process(&frame_at(1)).unwrap().levels(), expected);
-        assert!(session.gpu().is_none() || word != "no such card");
+        assert!(session.gpu().is_none() || word != "no GPU");
     }
     // What the CPU refuses too is an error.
     let mut wrong = options(W, H);

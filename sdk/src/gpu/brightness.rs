@@ -1,4 +1,4 @@
-//! The scale of a frame where brightness is steady, found without leaving the GPU. The twin of [`crate::brightness`].
+//! The scale of a frame where brightness is steady, found without leaving the GPU. The twin of the core's `brightness.rs`.
 
 use super::Result;
 use super::device::{Constants, Device, Dispatch};
