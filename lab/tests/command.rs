@@ -737,7 +737,7 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
     let folder = Folder::new().with_frame();
     let hologram_network = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/rgbd-8.onnx");
     let deep = with(&["-o", "h.png", "--encoder", "deep"]);
-    folder.refuses(&deep, 1, &["--prefilter"]);
+    folder.refuses(&deep, 2, &["--prefilter"]);
     let pair = ["--prefilter", hologram_network];
     folder.refuses(&[&deep[..], &pair].concat(), 1, &["'field'", "'rgbd'"]);
     let other = with(&["-o", "h.png", "--encoder", "double"]);
