@@ -12,7 +12,7 @@ mkdir -p "$build/Headers/PhasefrontFFI" "$build/simulator"
 
 rustup target add "${targets[@]}"
 for target in "${targets[@]}"; do
-    cargo rustc --profile mobile --package phasefront-ffi --target "$target" --crate-type staticlib
+    cargo rustc --profile mobile --package phasefront-ffi --features gpu --target "$target" --crate-type staticlib
 done
 library() { echo "${CARGO_TARGET_DIR:-target}/$1/mobile/libphasefront_ffi.a"; }
 

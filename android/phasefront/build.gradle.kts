@@ -26,6 +26,7 @@ val buildRust by tasks.registering(Exec::class) {
     commandLine(
         "cargo", "ndk", "--target", "arm64-v8a", "--target", "x86_64", "--platform", "26",
         "--output-dir", libraries.get().asFile.path, "build", "--profile", "mobile", "--package", "phasefront-ffi",
+        "--features", "gpu",
     )
 }
 

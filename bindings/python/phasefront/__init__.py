@@ -21,6 +21,7 @@ import numpy
 
 from .ffi import phasefront_ffi as _ffi
 from .ffi.phasefront_ffi import (
+    Backend,
     Brightness,
     CalibratedDisplay,
     Cameras,
@@ -60,7 +61,7 @@ from .ffi.phasefront_ffi import (
 )
 
 __all__ = [
-    "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
+    "Backend", "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
     "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
     "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
     "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",
