@@ -34,7 +34,7 @@ const TURN: f32 = 0.1;
 /// The same for a turn that is taken only if the curve that follows from it explains the light better: one just beyond π.
 const FINE_TURN: f32 = 0.015;
 /// And of the noise that the mean of nine levels has.
-const FINE_TURN_NOISE: f32 = 6.0;
+const FINE_TURN_NOISE: f32 = 4.0;
 
 /// Cubic B-splines over the levels 0..=255, nine equal intervals, clamped at both ends.
 pub struct Basis {
@@ -407,9 +407,11 @@ fn unfolded_at(
         } else {
             *value > extreme
         };
+        // Minima lie low and maxima high; what turns elsewhere is noise where the light is flat.
+        let is_low = extreme - least < 0.5 * range;
         if beyond {
             (extreme, at) = (*value, k);
-        } else if (value - extreme).abs() > enough {
+        } else if (value - extreme).abs() > enough && is_low == falls {
             turns.push(at);
             (extreme, at, falls) = (*value, k, !falls);
         }
