@@ -640,6 +640,167 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
+ * A display as it was calibrated: its modulator, its laser, its optics. Immutable; one serves many sessions.
+ */
+public protocol CalibratedDisplayProtocol: AnyObject, Sendable {
+    
+    /**
+     * The display itself.
+     */
+    func display() throws  -> Display
+    
+}
+/**
+ * A display as it was calibrated: its modulator, its laser, its optics. Immutable; one serves many sessions.
+ */
+open class CalibratedDisplay: CalibratedDisplayProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_calibrateddisplay(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_calibrateddisplay(handle, $0) }
+    }
+
+    
+    /**
+     * Reads the file's bytes.
+     *
+     * # Errors
+     * What is not such a file, with what is not so.
+     */
+public static func fromBytes(file: Data)throws  -> CalibratedDisplay  {
+    return try  FfiConverterTypeCalibratedDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(file) { fileFb in
+    uniffi_phasefront_ffi_fn_constructor_calibrateddisplay_from_bytes(
+        fileFb,uniffiCallStatus
+    )
+        }
+})
+}
+    
+    /**
+     * Reads the file.
+     *
+     * # Errors
+     * A file that cannot be read; as [`Self::from_bytes`].
+     */
+public static func fromFile(path: String)throws  -> CalibratedDisplay  {
+    return try  FfiConverterTypeCalibratedDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_calibrateddisplay_from_file(
+        FfiConverterString.lower(path),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+    /**
+     * The display itself.
+     */
+open func display()throws  -> Display  {
+    return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_calibrateddisplay_display(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeCalibratedDisplay: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = CalibratedDisplay
+
+    public static func lift(_ handle: UInt64) throws -> CalibratedDisplay {
+        return CalibratedDisplay(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: CalibratedDisplay) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> CalibratedDisplay {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: CalibratedDisplay, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeCalibratedDisplay_lift(_ handle: UInt64) throws -> CalibratedDisplay {
+    return try FfiConverterTypeCalibratedDisplay.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeCalibratedDisplay_lower(_ value: CalibratedDisplay) -> UInt64 {
+    return FfiConverterTypeCalibratedDisplay.lower(value)
+}
+
+
+
+
+
+
+/**
  * Hears log messages, on any thread.
  */
 public protocol LogListener: AnyObject, Sendable {
@@ -3876,6 +4037,14 @@ public struct SessionOptions {
      * Threads to compute with; none for as many as the device has.
      */
     public var threads: UInt32?
+    /**
+     * The display's calibration, which brings its own response.
+     */
+    public var calibration: CalibratedDisplay?
+    /**
+     * Where frames are computed; none for the CPU.
+     */
+    public var backend: Backend?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -3909,7 +4078,13 @@ public struct SessionOptions {
          */leastConfidence: Float, 
         /**
          * Threads to compute with; none for as many as the device has.
-         */threads: UInt32?) {
+         */threads: UInt32?, 
+        /**
+         * The display's calibration, which brings its own response.
+         */calibration: CalibratedDisplay? = nil, 
+        /**
+         * Where frames are computed; none for the CPU.
+         */backend: Backend? = nil) {
         self.display = display
         self.ladder = ladder
         self.quality = quality
@@ -3920,6 +4095,8 @@ public struct SessionOptions {
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
         self.threads = threads
+        self.calibration = calibration
+        self.backend = backend
     }
 
     
@@ -3947,7 +4124,9 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
-                threads: FfiConverterOptionUInt32.read(from: &buf)
+                threads: FfiConverterOptionUInt32.read(from: &buf), 
+                calibration: FfiConverterOptionTypeCalibratedDisplay.read(from: &buf), 
+                backend: FfiConverterOptionTypeBackend.read(from: &buf)
         )
     }
 
@@ -3962,6 +4141,8 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
         FfiConverterOptionUInt32.write(value.threads, into: &buf)
+        FfiConverterOptionTypeCalibratedDisplay.write(value.calibration, into: &buf)
+        FfiConverterOptionTypeBackend.write(value.backend, into: &buf)
     }
 }
 
@@ -4148,6 +4329,82 @@ public func FfiConverterTypeStatistics_lift(_ buf: RustBuffer) throws -> Statist
 public func FfiConverterTypeStatistics_lower(_ value: Statistics) -> RustBuffer {
     return FfiConverterTypeStatistics.lower(value)
 }
+
+
+/**
+ * Where frames are computed.
+ */
+
+public enum Backend: Equatable, Hashable {
+    
+    /**
+     * On the CPU.
+     */
+    case cpu
+    /**
+     * On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
+     * The statistics' `backend` and `backend_why` say which it is, and why.
+     */
+    case gpu
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension Backend: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeBackend: FfiConverterRustBuffer {
+    typealias SwiftType = Backend
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Backend {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .cpu
+        
+        case 2: return .gpu
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: Backend, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .cpu:
+            writeInt(&buf, Int32(1))
+        
+        
+        case .gpu:
+            writeInt(&buf, Int32(2))
+        
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeBackend_lift(_ buf: RustBuffer) throws -> Backend {
+    return try FfiConverterTypeBackend.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeBackend_lower(_ value: Backend) -> RustBuffer {
+    return FfiConverterTypeBackend.lower(value)
+}
+
 
 
 /**
@@ -6003,6 +6260,30 @@ fileprivate struct FfiConverterOptionDouble: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeCalibratedDisplay: FfiConverterRustBuffer {
+    typealias SwiftType = CalibratedDisplay?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeCalibratedDisplay.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeCalibratedDisplay.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeLogListener: FfiConverterRustBuffer {
     typealias SwiftType = LogListener?
 
@@ -6115,6 +6396,30 @@ fileprivate struct FfiConverterOptionTypePose: FfiConverterRustBuffer {
         switch try readInt(&buf) as Int8 {
         case 0: return nil
         case 1: return try FfiConverterTypePose.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionTypeBackend: FfiConverterRustBuffer {
+    typealias SwiftType = Backend?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeBackend.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeBackend.read(from: &buf)
         default: throw UniffiInternalError.unexpectedOptionalTag
         }
     }
@@ -6282,6 +6587,9 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_calibrateddisplay_display() != 31939) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -6367,6 +6675,12 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 37847) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_calibrateddisplay_from_bytes() != 32039) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_calibrateddisplay_from_file() != 39488) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 58428) {
