@@ -41,6 +41,7 @@ impl From<Scale> for Brightness {
 
 /// Where a steady scale comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(not(feature = "gpu"), allow(unreachable_pub))] // `gpu` passes it on.
 pub struct Past {
     /// The scale of the frame before.
     pub scale: f32,
