@@ -425,7 +425,7 @@ mod twins {
     #[test]
     fn aperture_and_band_limit_agree_with_the_cpu() {
         let Some(device) = device() else { return };
-        for size in [(61, 47), (48, 96)] {
+        for size in [(61, 47), (48, 96), (384, 384), (540, 960)] {
             let plans = (
                 Aperture::new(size.0, size.1, 0.8).unwrap(),
                 BandLimit::new(size.0, size.1, 1.0).unwrap(),
