@@ -1,6 +1,9 @@
 //! `phasefront calibrate` as a user runs it, on photographs of a simulated display.
 #![allow(clippy::unwrap_used)]
 
+mod folder;
+
+use folder::Folder;
 use ndarray::Array2;
 use phasefront::Display;
 use phasefront::wave::zernike::{Aberration, Coefficients};
@@ -9,45 +12,6 @@ use phasefront_lab::calibrate::{spot, table};
 use phasefront_lab::simulated_display::SimulatedDisplay;
 use phasefront_lab::{files, metrics};
 use std::fs;
-use std::path::PathBuf;
-use std::process::{Command, Output};
-
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Folder(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn run(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_phasefront"))
-            .args(arguments)
-            .current_dir(self.0.path())
-            .env_remove("RUST_LOG")
-            .output()
-            .unwrap()
-    }
-
-    fn succeeds(&self, arguments: &[&str]) -> String {
-        let output = self.run(arguments);
-        let errors = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{arguments:?}: {errors}");
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    /// Fails with `code`; what it says.
-    fn refuses(&self, arguments: &[&str], code: i32) -> String {
-        let output = self.run(arguments);
-        let errors = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
-        assert!(!errors.contains("panicked"), "{errors}");
-        errors
-    }
-}
 
 #[test]
 fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
@@ -90,7 +54,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         assert!(folder.path("out").join(name).is_file(), "{name}");
     }
     // Nothing is written over.
-    assert!(folder.refuses(&rehearse, 1).contains("--force"));
+    assert!(folder.fails(&rehearse, 1).contains("--force"));
 
     // The same photographs by hand give the same files.
     fs::write(folder.path("bare.toml"), "width = 144\nheight = 64").unwrap();
@@ -117,7 +81,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
     assert_eq!(full.dim(), (64, 144, 256));
     assert!(full[(32, 72, 255)] > 150 && full[(32, 72, 0)] == 0);
-    assert!(folder.refuses(&lut, 1).contains("--force"));
+    assert!(folder.fails(&lut, 1).contains("--force"));
     folder.succeeds(&[
         "calibrate",
         "laser",
@@ -141,7 +105,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     .unwrap();
     fs::write(captures.join("blue/capture_001.png"), b"no picture").unwrap();
     let forced: Vec<_> = lut.iter().copied().chain(["--force"]).collect();
-    let said = folder.refuses(&forced, 1);
+    let said = folder.fails(&forced, 1);
     for words in [
         "green/capture_007: is missing",
         "red/capture_200: is missing",
@@ -183,7 +147,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     hologram(&["--display", "bare.toml", "-o", "plain.png"]);
     hologram(&["--display", "out/display.toml", "-o", "h.png"]);
     assert_ne!(bytes("plain.png"), bytes("h.png"));
-    let said = folder.refuses(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], 1);
+    let said = folder.fails(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], 1);
     assert!(
         said.contains("per_pixel, laser, aberration") && said.contains("--display"),
         "{said}"
@@ -219,7 +183,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         "width = 160\nheight = 64\nper_pixel = \"table.pfp\"",
     )
     .unwrap();
-    let said = folder.refuses(
+    let said = folder.fails(
         &[
             "hologram",
             "--rgb",
@@ -258,11 +222,11 @@ fn patterns_are_written_once() {
         (200, 0)
     );
     assert_eq!(fs::read_dir(folder.path("patterns")).unwrap().count(), 256);
-    assert!(folder.refuses(&write, 1).contains("--force"));
-    folder.refuses(&["calibrate", "lut"], 2);
-    folder.refuses(&["calibrate", "lut", "--captures", "x"], 2);
+    assert!(folder.fails(&write, 1).contains("--force"));
+    folder.fails(&["calibrate", "lut"], 2);
+    folder.fails(&["calibrate", "lut", "--captures", "x"], 2);
     fs::write(folder.path("small.toml"), "width = 64\nheight = 64").unwrap();
-    let said = folder.refuses(
+    let said = folder.fails(
         &[
             "calibrate",
             "lut",
@@ -306,7 +270,7 @@ fn an_aberration_is_searched_round_by_round() {
         folder.succeeds(&search);
         let here = folder.path("search").join(format!("round_{round}"));
         if round == 0 {
-            let said = folder.refuses(&search, 1);
+            let said = folder.fails(&search, 1);
             assert!(
                 said.contains("capture_00.png") && said.contains("missing"),
                 "{said}"
@@ -335,5 +299,5 @@ fn an_aberration_is_searched_round_by_round() {
         spot::strehl(&left)
     );
     assert_eq!(entries[0].red, [0.0; 5]);
-    assert!(folder.refuses(&search, 1).contains("--force"));
+    assert!(folder.fails(&search, 1).contains("--force"));
 }
