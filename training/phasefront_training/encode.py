@@ -72,10 +72,13 @@ class DeepDoublePhase(torch.nn.Module):
         self.hologram, self.prefilter = hologram, prefilter
         self.offset_m, self.display, self.bf16 = offset_m, display, bf16
 
+    def seen_by_prefilter(self, midpoint):
+        """The pre-filter's input (N, 6, H, W): the field at the modulator's plane."""
+        return channels(propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint)
+
     def filtered(self, midpoint):
         """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""
-        there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
-        x = channels(there).contiguous(memory_format=torch.channels_last)
+        x = self.seen_by_prefilter(midpoint).contiguous(memory_format=torch.channels_last)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
             output = self.prefilter(x)
         return head_field(self.prefilter.architecture, output, x)

@@ -21,20 +21,19 @@ from .networks import Architecture, Chain, head_field
 from .optics import propagate
 from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
 
-PREFILTER_LAYERS, PREFILTER_FILTERS = 8, 8
 STACK_WEIGHT = 20.0
 PHASE_WEIGHT = 0.07
 
 
-def prefilter_network():
-    """A pre-filter that is AA-DPM's blur so far."""
-    network = Chain(Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+def prefilter_network(layers=8, filters=8):
+    """A pre-filter that is AA-DPM's blur so far; 8 layers of 8 filters are the paper's."""
+    network = Chain(Architecture(layers, filters, "field"))
     last = network.convs[-1].weight
     with torch.no_grad():
         last.zero_()
         for c in range(6):
-            last[c, PREFILTER_FILTERS + c] = blur_kernel()
-            last[c, PREFILTER_FILTERS + c, 1, 1] -= 1  # the head adds the field itself
+            last[c, filters + c] = blur_kernel()
+            last[c, filters + c, 1, 1] -= 1  # the head adds the field itself
     return network
 
 
