@@ -190,7 +190,7 @@ def figures(chain, ranges, scenes):
 
 def encoded_figure(model, scenes):
     """Amplitude PSNR on scenes of what a DeepDoublePhase's holograms show."""
-    return encoding_figures(model, scenes, full=False)["deep double phase"]["amplitude_psnr"]
+    return encoding_figures(model, scenes, full=False, others=False)["deep double phase"]["amplitude_psnr"]
 
 
 def report(name, exact, rounded):

@@ -6,7 +6,7 @@ from conftest import asm
 from phasefront_training.__main__ import main
 from phasefront_training.checkpoint import Checkpoint
 from phasefront_training.encode import (
-    DeepDoublePhase, anti_alias, aperture, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, aperture, band_limit, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from phasefront_training.export import read_description
 from phasefront_training.networks import Architecture, Chain
@@ -84,6 +84,15 @@ def test_aperture_is_the_circle_inside_the_square():
 def test_blur_keeps_a_constant():
     field = torch.ones(1, 3, 9, 9, dtype=torch.complex64) * (0.5 + 0.5j)
     assert torch.allclose(anti_alias(field)[..., 1:-1, 1:-1], field[..., 1:-1, 1:-1])
+
+
+def test_band_limit_cuts_the_diagonals_alone():
+    y, x = torch.meshgrid(torch.arange(24), torch.arange(36), indexing="ij")
+    wave = lambda fy, fx: torch.polar(torch.ones(1, 3, 24, 36), (2 * np.pi * (fy * y + fx * x)).float().expand(1, 3, 24, 36))
+    for kept in (wave(1 / 3, 0), wave(0, -1 / 3), wave(1 / 6, 1 / 6)):
+        assert torch.allclose(band_limit(kept), kept, atol=1e-5)
+    assert band_limit(wave(1 / 3, 1 / 3)).abs().max() < 1e-5  # tan² = 3
+    assert band_limit(wave(1 / 6, -1 / 6), 0.3).abs().max() < 1e-5  # tan² = 1/3
 
 
 def test_a_new_prefilter_is_the_blur_and_learns():
