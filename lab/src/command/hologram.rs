@@ -159,9 +159,11 @@ impl Hologram {
             None => Method::Network,
         });
         let device = self.backend.device()?;
-        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+        if device.is_some()
+            && (matches!(method, Method::Layers | Method::Points) || self.complex.is_some())
+        {
             return Err(Error::Input(
-                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                "--backend gpu runs --method network, sweep, seeded and auto, without --complex; the rest is the CPU's"
                     .into(),
             ));
         }
@@ -184,15 +186,12 @@ impl Hologram {
                     Method::Seeded => phasefront::Method::Seeded(network),
                     _ => phasefront::Method::trained(network),
                 };
-                match &device {
-                    Some(options) => self.on_gpu(method, &display, encoding, options)?,
-                    None => self.by_pipeline(stage, method, &display, encoding)?,
-                }
+                self.by_core(stage, method, &display, encoding, device.as_ref())?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display, encoding)?
+                self.by_core("sweep", method, &display, encoding, device.as_ref())?
             }
             (Method::Auto, _) | (Method::Network | Method::Sweep | Method::Seeded, Some(_)) => {
                 return Err(Error::Input(
@@ -231,7 +230,21 @@ impl Hologram {
     }
 
     /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
-    fn by_pipeline(
+    fn by_core(
+        &self,
+        stage: &'static str,
+        method: phasefront::Method,
+        display: &DisplayFile,
+        encoding: Encoding,
+        device: Option<&DeviceOptions>,
+    ) -> Result<Made> {
+        match device {
+            Some(options) => self.on_gpu(stage, method, display, encoding, options),
+            None => self.on_cpu(stage, method, display, encoding),
+        }
+    }
+
+    fn on_cpu(
         &self,
         stage: &'static str,
         method: phasefront::Method,
@@ -277,9 +290,10 @@ impl Hologram {
         })
     }
 
-    /// By a network on a GPU that was tried out before.
+    /// On a GPU that was tried out before.
     fn on_gpu(
         &self,
+        stage: &'static str,
         method: phasefront::Method,
         display: &DisplayFile,
         encoding: Encoding,
@@ -313,7 +327,7 @@ impl Hologram {
             scale: report.scale,
             stages: vec![
                 ("input", times.input),
-                ("network", times.network),
+                (stage, times.method),
                 ("propagate", times.propagate),
                 ("encode", times.encode),
             ],
