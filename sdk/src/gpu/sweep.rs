@@ -1,8 +1,8 @@
 //! The plane sweep on the GPU, several planes a dispatch: the twin of [`crate::sweep`], whose filters it has.
 //!
 //! What it reads and writes stays on the device: red, green, blue and depth of each pixel in, the hologram's field out.
-//! Every step is done by itself, in the whole frame and a black border; what the CPU spares by tiles and merged steps,
-//! here those tiles spare in which there is neither light nor a point yet.
+//! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged steps,
+//! only the tiles are passed over here in which there is neither light nor a point yet.
 
 use super::device::{Device, Dispatch};
 use super::hidden::Search;
@@ -46,141 +46,70 @@ impl Sweeper {
         display: &Display,
         surfaces: &wgpu::Buffer,
     ) -> Result<Self> {
-        let (sweep, (height, width)) = (plan.sweep(), plan.shape());
-        let area = height * width;
-        let radius = sweep.taps / 2;
-        let planes = planes_together(radius).ok_or_else(|| {
+        let radius = plan.sweep().taps / 2;
+        let together = planes_together(radius).ok_or_else(|| {
             Error::Refused(format!(
                 "steps of {} taps do not fit the workgroup memory that every GPU has; {} taps at most, or more planes with fewer, are right",
-                sweep.taps,
+                plan.sweep().taps,
                 2 * MOST_RADIUS + 1
             ))
         })?;
-        let search = match sweep.hidden_layers {
+        let search = match plan.sweep().hidden_layers {
             0 => None,
             _ => {
                 let reach = sweep::hidden_reach(display);
                 Some(Search::new(device, surfaces, plan.shape(), reach)?)
             }
         };
-        // Without hidden layers nobody reads their sources.
-        let sources = search.as_ref().map_or(surfaces, |search| &search.sources);
-        let header = format!(
-            "const COUNT: u32 = {}u;\nconst HIDDEN: u32 = {}u;\n",
-            sweep.planes, sweep.hidden_layers
-        );
-        let frame = [width, height, area, 0].map(|n| n as u32);
-        let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
-        let points = device.buffer("points", 4 * area)?;
-        let find = device.program(
-            "points",
-            header.clone() + include_str!("sweep_points.wgsl"),
-            "find",
-        );
-        let arguments = [
-            (0, frame.buffer.as_entire_binding()),
-            (1, surfaces.as_entire_binding()),
-            (2, sources.as_entire_binding()),
-            (3, points.as_entire_binding()),
-        ];
-        let find = find.on(device, &arguments, [width.div_ceil(COLUMNS), height, 1])?;
-
+        let (height, width) = plan.shape();
+        let area = height * width;
         let border = border(plan, display)?;
-        let (high, wide) = (height + 2 * border, width + 2 * border);
-        let bytes = 24 * high * wide;
-        let fields = [
-            device.buffer("the swept field", bytes)?,
-            device.buffer("the swept field", bytes)?,
-        ];
-        let taps = plan.filters().iter().map(|f| (f.carry, &f.step[..]));
-        let taps = device.constants("steps", &packed(taps, radius))?;
-        let (columns, rows) = TILE;
-        let source = header
-            + &format!(
-                "const RADIUS: u32 = {radius}u;
-                const PLANES: u32 = {planes}u;
-                const COLUMNS: u32 = {columns}u;
-                const ROWS: u32 = {rows}u;
-                const EACH: u32 = {EACH}u;
-                const CARRY: bool = {};
-                ",
-                sweep.between_planes
-            )
-            + include_str!("sweep.wgsl");
-        let program = device.program("planes", source, "cross_planes");
-        let halo = 2 * radius * planes;
-        let grid = [wide.div_ceil(columns - halo), high.div_ceil(rows - halo), 3];
-        let count = sweep.planes.div_ceil(planes);
-        let steps = (0..count).map(|step| {
-            let first = (count - step) * planes - 1;
-            let frame = [width, height, border, first].map(|n| n as u32);
-            let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
-            let arguments = [
-                (0, frame.buffer.as_entire_binding()),
-                (1, taps.buffer.as_entire_binding()),
-                (2, surfaces.as_entire_binding()),
-                (3, sources.as_entire_binding()),
-                (4, points.as_entire_binding()),
-                (5, fields[step % 2].as_entire_binding()),
-                (6, fields[(step + 1) % 2].as_entire_binding()),
-            ];
-            program.on(device, &arguments, grid)
-        });
-        let steps = steps.collect::<Result<Vec<_>>>()?;
-
-        let radius = (plan.filters().iter())
-            .map(|f| f.home.len() - 1)
-            .max()
-            .unwrap_or(0);
-        let taps = plan.filters().iter().map(|f| (0.0, &f.home[..]));
-        let taps = device.constants("the way home", &packed(taps, radius))?;
-        let field = device.buffer("the field", 24 * area)?;
         let tiles = (width.div_ceil(COLUMNS), height.div_ceil(HOME_ROWS));
-        let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
-        let go = |down: bool, from: &wgpu::Buffer, to: &wgpu::Buffer| {
-            let way = match down {
-                false => [width, high, wide, high, border, tiles.0, 0, 0],
-                true => [width, height, width, high, border, tiles.0, 0, 0],
-            };
-            let grid = [tiles.0, way[1].div_ceil(HOME_ROWS), 3];
-            let way = way.map(|n| n as u32);
-            let way = device.constants("the way home", bytemuck::cast_slice(&way))?;
-            let header = format!("const RADIUS: u32 = {radius}u;\nconst DOWN: bool = {down};\n");
-            let source = header + include_str!("sweep_home.wgsl");
-            let arguments = [
-                (0, way.buffer.as_entire_binding()),
-                (1, taps.buffer.as_entire_binding()),
-                (2, from.as_entire_binding()),
-                (3, to.as_entire_binding()),
-                (4, partial.as_entire_binding()),
-            ];
-            let program = device.program("the way home", source, "go_home");
-            program.on(device, &arguments, grid)
+        let maker = Maker {
+            device,
+            plan,
+            surfaces,
+            // Without hidden layers nobody reads their sources.
+            sources: search.as_ref().map_or(surfaces, |search| &search.sources),
+            points: &device.buffer("points", 4 * area)?,
+            border,
+            padded: (height + 2 * border, width + 2 * border),
         };
-        let (last, other) = (&fields[count % 2], &fields[(count + 1) % 2]);
-        let home = [go(false, last, other)?, go(true, other, &field)?];
-        let (rows_home, found) = (24 * high * width, 4 * area + 16 * area);
+        let swept = 24 * maker.padded.0 * maker.padded.1;
+        let fields = [
+            device.buffer("the swept field", swept)?,
+            device.buffer("the swept field", swept)?,
+        ];
+        let steps = maker.steps(together, &fields)?;
+        let [last, other] = match steps.len() % 2 {
+            0 => [&fields[0], &fields[1]],
+            _ => [&fields[1], &fields[0]],
+        };
+        let field = device.buffer("the field", 24 * area)?;
+        let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
+        let home = maker.home([last, other, &field], &partial)?;
         let searched = match search {
-            // Each side reads depth; sources are written once, and where something is hidden.
-            Some(_) => 4 * 16 * area + 8 * area,
+            // Each side reads depth; what it finds is written once.
+            Some(_) => (4 * 16 + 8) * area,
             None => 0,
         };
+        let half_home = 24 * maker.padded.0 * width;
         Ok(Sweeper {
+            points: maker.points()?,
             search,
-            points: find,
-            steps,
             home,
-            together: planes,
+            together,
             z_m: plan.z_m(),
             field,
             partial,
             parts: tiles.0 * tiles.1,
             bytes: searched
-                + found
-                + count * (2 * bytes + 4 * area)
-                + bytes
-                + 2 * rows_home
+                + (16 + 4) * area
+                + steps.len() * (2 * swept + 4 * area)
+                + swept
+                + 2 * half_home
                 + 24 * area,
+            steps,
         })
     }
 
@@ -199,21 +128,139 @@ impl Sweeper {
     }
 }
 
-/// The longest radius of a step for which a tile is left.
+/// What the dispatches of a sweep share while they are made.
+struct Maker<'a> {
+    device: &'a Device,
+    plan: &'a SweepPlan,
+    surfaces: &'a wgpu::Buffer,
+    sources: &'a wgpu::Buffer,
+    points: &'a wgpu::Buffer,
+    border: usize,
+    /// (H, W) with the border.
+    padded: (usize, usize),
+}
+
+impl Maker<'_> {
+    fn header(&self) -> String {
+        let sweep = self.plan.sweep();
+        format!(
+            "const COUNT: u32 = {}u;\nconst HIDDEN: u32 = {}u;\n",
+            sweep.planes, sweep.hidden_layers
+        )
+    }
+
+    /// Which planes hold each pixel's points.
+    fn points(&self) -> Result<Dispatch> {
+        let (height, width) = self.plan.shape();
+        let frame = [width, height, height * width, 0].map(|n| n as u32);
+        let frame = (self.device).constants("frame", bytemuck::cast_slice(&frame))?;
+        let source = self.header() + include_str!("sweep_points.wgsl");
+        let arguments = [
+            (0, frame.buffer.as_entire_binding()),
+            (1, self.surfaces.as_entire_binding()),
+            (2, self.sources.as_entire_binding()),
+            (3, self.points.as_entire_binding()),
+        ];
+        let program = self.device.program("points", source, "find");
+        program.on(
+            self.device,
+            &arguments,
+            [width.div_ceil(COLUMNS), height, 1],
+        )
+    }
+
+    /// All planes, so many `together`, from the first field to the second and back. The first dispatch begins behind
+    /// the last plane where they do not divide.
+    fn steps(&self, together: usize, fields: &[wgpu::Buffer; 2]) -> Result<Vec<Dispatch>> {
+        let (device, sweep) = (self.device, self.plan.sweep());
+        let radius = sweep.taps / 2;
+        let taps = (self.plan.filters().iter()).map(|f| (f.carry, &f.step[..]));
+        let taps = device.constants("steps", &packed(taps, radius))?;
+        let (columns, rows) = TILE;
+        let source = self.header()
+            + &format!(
+                "const RADIUS: u32 = {radius}u;
+                const PLANES: u32 = {together}u;
+                const COLUMNS: u32 = {columns}u;
+                const ROWS: u32 = {rows}u;
+                const EACH: u32 = {EACH}u;
+                const CARRY: bool = {};
+                ",
+                sweep.between_planes
+            )
+            + include_str!("sweep.wgsl");
+        let program = device.program("planes", source, "cross_planes");
+        let halo = 2 * radius * together;
+        let (high, wide) = self.padded;
+        let grid = [wide.div_ceil(columns - halo), high.div_ceil(rows - halo), 3];
+        let count = sweep.planes.div_ceil(together);
+        let (height, width) = self.plan.shape();
+        (0..count)
+            .map(|step| {
+                let first = (count - step) * together - 1;
+                let frame = [width, height, self.border, first].map(|n| n as u32);
+                let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
+                let arguments = [
+                    (0, frame.buffer.as_entire_binding()),
+                    (1, taps.buffer.as_entire_binding()),
+                    (2, self.surfaces.as_entire_binding()),
+                    (3, self.sources.as_entire_binding()),
+                    (4, self.points.as_entire_binding()),
+                    (5, fields[step % 2].as_entire_binding()),
+                    (6, fields[(step + 1) % 2].as_entire_binding()),
+                ];
+                program.on(device, &arguments, grid)
+            })
+            .collect()
+    }
+
+    /// The way home: rows from the first of `fields` to the second, columns from there to the third, whose sums go to
+    /// `partial`.
+    fn home(&self, fields: [&wgpu::Buffer; 3], partial: &wgpu::Buffer) -> Result<[Dispatch; 2]> {
+        let device = self.device;
+        let filters = self.plan.filters();
+        let lengths = filters.iter().map(|f| f.home.len());
+        let radius = lengths.max().unwrap_or(1) - 1;
+        let taps = filters.iter().map(|f| (0.0, &f.home[..]));
+        let taps = device.constants("the way home", &packed(taps, radius))?;
+        let ((height, width), (high, wide)) = (self.plan.shape(), self.padded);
+        let go = |down: bool, written: usize, read: usize, from, to: &wgpu::Buffer| {
+            let tiles = [width.div_ceil(COLUMNS), written.div_ceil(HOME_ROWS), 3];
+            let way = [width, written, read, high, self.border, tiles[0], 0, 0];
+            let way = way.map(|n| n as u32);
+            let way = device.constants("the way home", bytemuck::cast_slice(&way))?;
+            let header = format!("const RADIUS: u32 = {radius}u;\nconst DOWN: bool = {down};\n");
+            let source = header + include_str!("sweep_home.wgsl");
+            let arguments = [
+                (0, way.buffer.as_entire_binding()),
+                (1, taps.buffer.as_entire_binding()),
+                (2, wgpu::Buffer::as_entire_binding(from)),
+                (3, to.as_entire_binding()),
+                (4, partial.as_entire_binding()),
+            ];
+            let program = device.program("the way home", source, "go_home");
+            program.on(device, &arguments, tiles)
+        };
+        Ok([
+            go(false, high, wide, fields[0], fields[1])?,
+            go(true, height, width, fields[1], fields[2])?,
+        ])
+    }
+}
+
+/// The longest radius of a step that leaves enough of a tile.
 const MOST_RADIUS: usize = TILE.1 / 4;
 
 /// How many planes a dispatch does: each costs a halo more, and saves that the field is read and written. As many as leave
-/// a quarter of the tile, one at least; None where one leaves too little.
+/// a quarter of the tile; None where one leaves less.
 fn planes_together(radius: usize) -> Option<usize> {
     let left = |planes: usize| {
         let halo = 2 * radius * planes;
         TILE.0.saturating_sub(halo) * TILE.1.saturating_sub(halo)
     };
-    let most = (1..).take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1);
-    match most.last() {
-        None if radius <= MOST_RADIUS => Some(1),
-        most => most,
-    }
+    (1..)
+        .take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1)
+        .last()
 }
 
 /// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from the
