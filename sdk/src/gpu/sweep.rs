@@ -13,7 +13,7 @@ use crate::sweep::{self, MARGIN, SweepPlan};
 /// Columns and rows of a tile with its halo: complex f32 that fit the workgroup memory of every GPU, 16 KiB.
 const TILE: (usize, usize) = (48, 40);
 /// Rows of a thread in sweep.wgsl.
-const EACH: usize = 10;
+const EACH: usize = 8;
 /// Pixels of a workgroup of the other programs.
 const COLUMNS: usize = 64;
 const HOME_ROWS: usize = 4;

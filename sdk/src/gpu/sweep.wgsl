@@ -1,8 +1,8 @@
 // Several planes of the sweep, the farthest first, for one colour in one tile: the step from the plane behind along rows
 // and columns, then the plane's points, which replace the field where they are, then the light of those that lie before or
 // behind the plane. A tile comes with a halo into workgroup memory, and what is right of it shrinks by RADIUS a step until
-// its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a
-// thread has EACH rows of a column.
+// its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a thread has EACH
+// rows of a column.
 
 struct Frame {
     width: u32, height: u32,
@@ -58,11 +58,12 @@ fn cross_planes(
     let at_y = group.y * (ROWS - 2u * HALO) + y;
     let in_field_x = at_x >= HALO && at_x < width + HALO;
     let in_frame_x = at_x >= HALO + frame.border && at_x < HALO + frame.border + frame.width;
+    // The thread's first pixel; where it lies beside the frame, nobody asks for it.
+    let own = (at_y - HALO - frame.border) * frame.width + at_x - HALO - frame.border;
 
     if (index == 0u) { atomicStore(&marks, 0u); }
     workgroupBarrier();
     var v: array<vec2f, EACH>;
-    var pixels: array<u32, EACH>;
     var planes: array<u32, EACH>;
     var own_marks = 0u;
     for (var i = 0u; i < EACH; i++) {
@@ -73,12 +74,10 @@ fn cross_planes(
         }
         if (any(v[i] != vec2f(0))) { own_marks |= LIT; }
         tile[(y + i) * COLUMNS + x] = v[i];
-        pixels[i] = 0u;
         // Beside the frame, a plane that is not done here.
         planes[i] = 0xfffffc00u | ((frame.first + 1u) & 1023u);
         if (in_frame_x && row >= HALO + frame.border && row < HALO + frame.border + frame.height) {
-            pixels[i] = (row - HALO - frame.border) * frame.width + at_x - HALO - frame.border;
-            planes[i] = points[pixels[i]];
+            planes[i] = points[own + i * frame.width];
             for (var layer = 0u; layer <= HIDDEN; layer++) {
                 let step = frame.first - plane_of(planes[i], layer);
                 if (step < PLANES) { own_marks |= 1u << step; }
@@ -128,8 +127,8 @@ fn cross_planes(
                     for (var l = 0u; l <= HIDDEN; l++) {
                         let layer = HIDDEN - l;
                         if (plane_of(planes[i], layer) != plane) { continue; }
-                        var source = pixels[i];
-                        if (layer > 0u) { source = sources[(layer - 1u) * area + pixels[i]]; }
+                        var source = own + i * frame.width;
+                        if (layer > 0u) { source = sources[(layer - 1u) * area + source]; }
                         let point = surfaces[source];
                         let amplitude = point[colour];
                         v[i] = vec2f(amplitude, 0.0);
