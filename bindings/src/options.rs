@@ -96,6 +96,12 @@ pub enum Method {
     },
     /// The plane sweep, for any display: slower, and nothing needs to be trained.
     Sweep,
+    /// For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained
+    /// network where it is ragged, as sensors' depth is.
+    BySharpness {
+        /// The network, for the session's display.
+        network: Arc<Network>,
+    },
 }
 
 /// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
@@ -239,6 +245,9 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let method = |rung: &Rung| match &rung.method {
             Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
             Method::Sweep => phasefront::Method::Sweep(sweep),
+            Method::BySharpness { network } => {
+                phasefront::Method::BySharpness(sweep, network.core.clone())
+            }
         };
         let mut to = session::SessionOptions::new(display, method(best))?;
         to.ladder = (options.ladder.iter())

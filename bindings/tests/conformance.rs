@@ -72,6 +72,9 @@ fn options(case: &Value) -> SessionOptions {
                     network: Network::built_in().unwrap(),
                 },
                 "sweep" => Method::Sweep,
+                "by-sharpness" => Method::BySharpness {
+                    network: Network::built_in().unwrap(),
+                },
                 file => Method::Trained {
                     network: model(file),
                 },
@@ -590,6 +593,10 @@ mod write {
 
         let mut one = case("a network seeded by the plane sweep", vec![plain.clone()]);
         one["method"] = json!("seeded-6-int8.onnx");
+        cases.push(one);
+
+        let mut one = case("what suits the depth", vec![plain.clone()]);
+        one["method"] = json!("by-sharpness");
         cases.push(one);
 
         let mut one = case(

@@ -1,5 +1,6 @@
 //! How the hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
 
+use crate::depth::sharpness;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
@@ -22,6 +23,9 @@ pub enum Method {
     Sweep(Sweep),
     /// The plane sweep, corrected by a network trained on it.
     Seeded(Arc<Network>),
+    /// For each frame what suits its depth ([`sharpness::measure`]): the plane sweep where it is sharp, the trained
+    /// network where it is ragged.
+    BySharpness(Sweep, Arc<Network>),
 }
 
 impl Method {
@@ -73,6 +77,7 @@ enum Way {
     Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
     Seeded(Box<SeededPlan>),
+    BySharpness(Box<SweepPlan>, Box<MethodPlan>),
 }
 
 /// Working memory of a [`MethodPlan`] for one frame at a time.
@@ -82,6 +87,7 @@ enum Scratch {
     Network(NetworkScratch),
     Sweep(SweepScratch),
     Seeded(SeededScratch),
+    BySharpness(SweepScratch, Box<MethodScratch>),
 }
 
 impl MethodPlan {
@@ -100,6 +106,12 @@ impl MethodPlan {
             Method::Sweep(sweep) => {
                 Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?))
             }
+            Method::BySharpness(sweep, network) => {
+                // Both end where the network does.
+                let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
+                let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
+                Way::BySharpness(Box::new(sweep), Box::new(trained))
+            }
         };
         Ok(MethodPlan {
             shape: (height, width),
@@ -116,7 +128,7 @@ impl MethodPlan {
     /// far away, all else ends at the midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.way {
-            Way::Network(_) | Way::Seeded(_) => 0.0,
+            Way::Network(_) | Way::Seeded(_) | Way::BySharpness(..) => 0.0,
             Way::Sweep(plan) => plan.z_m(),
         }
     }
@@ -126,6 +138,7 @@ impl MethodPlan {
         match &self.way {
             Way::Network(plan) => Some(plan.engine()),
             Way::Seeded(plan) => Some(plan.engine()),
+            Way::BySharpness(_, trained) => trained.engine(),
             Way::Sweep(_) => None,
         }
     }
@@ -136,6 +149,9 @@ impl MethodPlan {
             Way::Network(plan) => Scratch::Network(plan.scratch()),
             Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
             Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
+            Way::BySharpness(sweep, trained) => {
+                Scratch::BySharpness(sweep.scratch(), Box::new(trained.scratch()))
+            }
         })
     }
 
@@ -157,6 +173,12 @@ impl MethodPlan {
             (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
             (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
+            (Way::BySharpness(sweep, trained), Scratch::BySharpness(of_sweep, of_trained)) => {
+                match sharpness::measure(frame).is_sharp() {
+                    true => sweep.field(frame, field, of_sweep),
+                    false => trained.field(frame, field, of_trained),
+                }
+            }
             _ => panic!("the scratch is another plan's"),
         }
     }

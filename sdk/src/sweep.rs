@@ -88,10 +88,10 @@ impl Sweep {
     /// Planes that [`Sweep::for_display`] chooses from.
     pub const USUAL_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
 
-    /// The taps that a step between `planes` planes needs: light's reach and three more on each side.
+    /// The taps that a step between `planes` planes needs: light's reach and four more on each side.
     pub fn taps_for(display: &Display, planes: usize) -> usize {
         let step_m = display.volume_depth_m() / planes.max(1) as f64;
-        let radius = reach_px(display, step_m).ceil() as usize + 3;
+        let radius = reach_px(display, step_m).ceil() as usize + 4;
         (2 * radius + 1).min(MAX_TAPS)
     }
 

@@ -244,6 +244,38 @@ fn a_seeded_network_corrects_the_sweep() {
 }
 
 #[test]
+fn by_sharpness_each_frame_gets_what_suits_its_depth() {
+    let (height, width) = (40, 60);
+    // A modulator that a sweep alone would go on to.
+    let display = Display::default().with_offset_m(2e-3).unwrap();
+    let network = Arc::new(Network::from_onnx(&Model::new(4, 8).bytes()).unwrap());
+    let usual = Sweep::for_display(&display);
+    let square = |y: usize, x: usize| (10..30).contains(&y) && (15..40).contains(&x);
+    let frame = |ramp: usize| {
+        let rgb = Array3::from_shape_fn((3, height, width), |(_, y, x)| {
+            0.2 + 0.6 * f32::from(square(y, x))
+        });
+        let depth = Array2::from_shape_fn((height, width), |(y, x)| {
+            let inside = (0..ramp).filter(|i| square(y, x + i)).count();
+            0.8 - 0.5 * inside as f32 / ramp as f32
+        });
+        RgbdFrame::new(rgb, depth).unwrap()
+    };
+    let made = |plan: &MethodPlan, frame: &RgbdFrame| {
+        let mut field = vec![Complex32::ZERO; 3 * height * width];
+        plan.field(frame, &mut field, &mut plan.scratch()).unwrap();
+        field
+    };
+    let plan = |method| MethodPlan::new(height, width, method, &display).unwrap();
+    let either = plan(Method::BySharpness(usual, network.clone()));
+    assert!(either.z_m() == 0.0 && either.engine().is_some());
+    let midpoint = SweepPlan::new(height, width, &display, usual, 0.0).unwrap();
+    let (sharp, ragged) = (frame(1), frame(5));
+    assert!(made(&either, &sharp) == run(&midpoint, &sharp));
+    assert!(made(&either, &ragged) == made(&plan(Method::trained(network)), &ragged));
+}
+
+#[test]
 fn tiles_are_the_whole_frame() {
     let display = Display::default();
     let frame = frame(150, 170);

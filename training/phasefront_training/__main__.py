@@ -60,9 +60,12 @@ def parser():
     p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
     p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
     p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter the identity first, as in the paper (default 0: it begins as the blur of AA-DPM)")
+    p.add_argument("--prefilter-layers", type=int, default=8, help="convolution layers of the pre-filter (default 8)")
+    p.add_argument("--prefilter-filters", type=int, default=8, help="filters of each (default 8)")
 
     p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
-    p.add_argument("network", help="a checkpoint or a float32 .onnx")
+    p.add_argument("file", help="a checkpoint or a float32 .onnx")
+    p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="which, of a stage 2 checkpoint (default %(default)s)")
     p.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
     training_flags(p, output="the .onnx file; training goes on in FILE.qat", rate=1e-4)
 
@@ -78,6 +81,7 @@ def parser():
 
     p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
     p.add_argument("checkpoint")
+    p.add_argument("--prefilter", metavar="FILE", help="an .onnx to judge instead of the checkpoint's own pre-filter, such as its int8 form")
     evaluation_flags(p)
 
     p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
@@ -182,7 +186,7 @@ def run_stage2(args):
         if not args.init:
             raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
         hologram, _ = checkpoint.load_network(args.init)
-        prefilter = prefilter_network()
+        prefilter = prefilter_network(args.prefilter_layers, args.prefilter_filters)
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
     train, validation = load(args, hologram.architecture)
@@ -238,20 +242,52 @@ def go(task, args, workers, resume, folder=None):
 
 
 def run_quantize(args):
-    network, display = checkpoint.load_network(args.network)
+    if args.network == "prefilter":
+        return quantize_prefilter(args)
+    network, display = checkpoint.load_network(args.file)
     train, validation = load(args, network.architecture)
     ranges = quantize.calibrate(network, quantize.examples(train, network.architecture.coordinates))
     exact, rounded = quantize.figures(network, ranges, validation)
     quantize.report("after training", exact, rounded)
     quantized = quantize.Quantized(network, ranges)
-    if args.always_train or exact - rounded > quantize.ALLOWED_LOSS_DB:
-        if args.minutes is None and args.steps is None:
-            raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps")
+    if worth_training(args, exact - rounded):
         workers = loop.Workers.start(args.device)
         task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
         go(task, args, workers, None, folder=f"{args.output}.qat")
         quantize.report("trained through the rounding", exact, quantize.figures(network.cpu(), ranges, validation)[1])
     export.write(export_int8.int8_model(quantized.cpu(), display), args.output)
+
+
+def quantize_prefilter(args):
+    model = stage2_model(args.file, bf16=not args.f32)
+    train, validation = load(args, model.hologram.architecture)
+    ranges = quantize.calibrate(model.prefilter, quantize.prefilter_examples(model, train))
+    exact = quantize.encoded_figure(model, validation)
+    model.prefilter = quantize.Quantized(model.prefilter, ranges)
+    rounded = quantize.encoded_figure(model, validation)
+    quantize.report("after training", exact, rounded)
+    if worth_training(args, exact - rounded):
+        workers = loop.Workers.start(args.device)
+        task = quantize.PrefilterQuantizationAware(model, train, validation, workers, **sampling(args))
+        go(task, args, workers, None, folder=f"{args.output}.qat")
+        quantize.report("trained through the rounding", exact, quantize.encoded_figure(model, validation))
+    export.write(export_int8.int8_model(model.prefilter.cpu(), model.display, model.offset_m), args.output)
+
+
+def worth_training(args, loss_db):
+    """Whether to train through the rounding; it needs a budget then."""
+    if not args.always_train and loss_db <= quantize.ALLOWED_LOSS_DB:
+        return False
+    if args.minutes is None and args.steps is None:
+        raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps")
+    return True
+
+
+def stage2_model(path, **options):
+    """The DeepDoublePhase of a stage 2 checkpoint."""
+    if Path(path).suffix == ".onnx" or "prefilter" not in (last := Checkpoint.load(path)).networks:
+        raise ValueError(f"{path}: no checkpoint of stage 2")
+    return DeepDoublePhase(last.network("hologram"), last.network("prefilter"), last.extra["offset_m"], last.display, **options)
 
 
 def run_export(args):
@@ -287,19 +323,18 @@ def scenes_of(args, scenes):
 
 
 def run_evaluate_encoding(args):
-    last = Checkpoint.load(args.checkpoint)
-    if "prefilter" not in last.networks:
-        raise ValueError(f"{args.checkpoint}: no checkpoint of stage 2")
-    hologram, prefilter = last.network("hologram"), last.network("prefilter")
-    scenes = scenes_for(args, args.split, {hologram.architecture.input}, args.scenes)
-    model = DeepDoublePhase(hologram, prefilter, last.extra["offset_m"], scenes.display).to(args.device)
+    model = stage2_model(args.checkpoint).to(args.device)
+    if args.prefilter:
+        del model.prefilter  # a module, which the file is not
+        model.prefilter = evaluate.OnnxNetwork(args.prefilter)
+    scenes = scenes_for(args, args.split, {model.hologram.architecture.input}, args.scenes)
     results = encoding_figures(model, scenes)
     columns = list(next(iter(results.values())))
     print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
     for name, figures in results.items():
         print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
     if args.json:
-        evaluate.save({"data": scenes_of(args, scenes), "offset_mm": last.extra["offset_m"] * 1e3, "results": results}, args.json)
+        evaluate.save({"data": scenes_of(args, scenes), "offset_mm": model.offset_m * 1e3, "results": results}, args.json)
 
 
 def run_card(args):

@@ -21,6 +21,8 @@ def command(last, init):
         parts += ["--seeds", "SEEDS"]
     if last.kind == "stage2":
         parts += ["--offset-mm", f"{last.extra['offset_m'] * 1e3:g}", "--identity-steps", last.options["identity_steps"]]
+        prefilter, _ = last.networks["prefilter"]
+        parts += ["--prefilter-layers", prefilter.layers, "--prefilter-filters", prefilter.filters]
     if init:
         parts += ["--init", Path(init).name]
     for name in SAMPLING:

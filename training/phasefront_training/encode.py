@@ -72,10 +72,13 @@ class DeepDoublePhase(torch.nn.Module):
         self.hologram, self.prefilter = hologram, prefilter
         self.offset_m, self.display, self.bf16 = offset_m, display, bf16
 
+    def seen_by_prefilter(self, midpoint):
+        """The pre-filter's input (N, 6, H, W): the field at the modulator's plane."""
+        return channels(propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint)
+
     def filtered(self, midpoint):
         """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""
-        there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
-        x = channels(there).contiguous(memory_format=torch.channels_last)
+        x = self.seen_by_prefilter(midpoint).contiguous(memory_format=torch.channels_last)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.bf16):
             output = self.prefilter(x)
         return head_field(self.prefilter.architecture, output, x)
@@ -105,15 +108,24 @@ def wraps(phase):
     return float(((phase > math.pi) | (phase <= -math.pi)).float().mean())
 
 
-def blur_kernel():
-    """The 3x3 Gaussian of AA-DPM, σ = 0.7 pixels."""
-    weights = torch.exp(-torch.tensor([1.0, 0.0, 1.0]) / (2 * BLUR_SIGMA**2))
+def blur_kernel(sigma=BLUR_SIGMA, width=3):
+    """A Gaussian of σ pixels over `width` taps a side, its sum 1; AA-DPM's is 3x3."""
+    places = torch.arange(width) - width // 2
+    weights = torch.exp(-places.square() / (2 * sigma**2))
     weights = weights / weights.sum()
     return weights[:, None] * weights
 
 
-def anti_alias(field):
+def anti_alias(field, sigma=BLUR_SIGMA, width=3):
     """AA-DPM's filter: real and imaginary parts blurred; surroundings are black."""
-    kernel = blur_kernel().to(field.device).expand(6, 1, 3, 3)
-    blurred = F.conv2d(channels(field), kernel, padding=1, groups=6)
+    kernel = blur_kernel(sigma, width).to(field.device).expand(6, 1, width, width)
+    blurred = F.conv2d(channels(field), kernel, padding=width // 2, groups=6)
     return torch.complex(blurred[:, :3].contiguous(), blurred[:, 3:].contiguous())
+
+
+def band_limit(field, k=1.0):
+    """BL-DPM's filter (Sui et al. 2021): |tan(πfx)·tan(πfy)| ≤ k stays, f in cycles a pixel; the field is periodic."""
+    height, width = field.shape[-2:]
+    y, x = (torch.fft.fftfreq(n, dtype=torch.float64, device=field.device) for n in (height, width))
+    stays = (math.pi * y).tan()[:, None] * (math.pi * x).tan()
+    return torch.fft.ifft2(torch.fft.fft2(field) * (stays.abs() <= k))

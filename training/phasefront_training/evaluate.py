@@ -50,24 +50,38 @@ def torch_predictor(network, autocast=False):
     return predict
 
 
+class OnnxNetwork:
+    """A network file on ONNX Runtime, float32 or int8; called like a Chain, computing on the CPU.
+
+    Of `architecture` only what the input and the output mean is the file's.
+    """
+
+    def __init__(self, path, threads=None):
+        import onnxruntime
+
+        from .export import read_description
+
+        description = read_description(path)
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = threads or torch.get_num_threads()
+        self.session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        self.name = self.session.get_inputs()[0].name
+        self.architecture = Architecture(layers=3, input=description["input"], head=description["head"])
+
+    def __call__(self, x):
+        output = self.session.run(None, {self.name: x.cpu().contiguous().numpy()})[0]
+        return torch.from_numpy(output).to(x.device)
+
+
 def onnx_predictor(path, threads=None):
     """(predict, architecture's input and head) by ONNX Runtime, float32 or int8."""
-    import onnxruntime
-
-    from .export import read_description
-
-    description = read_description(path)
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = threads or torch.get_num_threads()
-    session = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    name = session.get_inputs()[0].name
-    meaning = Architecture(layers=3, input=description["input"], head=description["head"])
+    network = OnnxNetwork(path, threads)
+    meaning = network.architecture
 
     def predict(colour, depth, seed=None):
         seed = seed.cpu() if meaning.input == "seeded" else None
         x = network_input(colour.cpu(), depth.cpu(), seed, meaning.coordinates)[None]
-        output = torch.from_numpy(session.run(None, {name: x.numpy()})[0])
-        return head_field(meaning, output, x)[0]
+        return head_field(meaning, network(x), x)[0]
 
     return predict, meaning
 

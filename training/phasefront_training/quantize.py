@@ -24,6 +24,7 @@ from torch.nn import functional as F
 from .data import network_input
 from .evaluate import evaluate, scene_as_seen, torch_predictor
 from .stage1 import Stage1
+from .stage2 import Stage2, encoding_figures
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
@@ -89,6 +90,10 @@ class Quantized(nn.Module):
         return weight, _through(conv.bias, torch.round(conv.bias / unit) * unit)
 
     def forward(self, x):
+        with torch.autocast(x.device.type, enabled=False):  # bf16 is coarser than the steps
+            return self._rounded(x.float())
+
+    def _rounded(self, x):
         a = self.architecture
         last = a.layers - 1
         inputs, name = [], "input"
@@ -157,10 +162,35 @@ class QuantizationAware(Stage1):
         return super().extra() | {"ranges": self.network.ranges}
 
 
+class PrefilterQuantizationAware(Stage2):
+    """Stage 2 once more, through the rounding of the pre-filter alone; its ranges stay as calibrated."""
+
+    kind = "qat"
+
+    def __init__(self, model, *args, **options):
+        model.hologram.requires_grad_(False)
+        super().__init__(model, *args, **options)
+        self.networks = {"hologram": model.hologram, "prefilter": model.prefilter.chain}
+
+    def extra(self):
+        return super().extra() | {"ranges": self.model.prefilter.ranges}
+
+
+def prefilter_examples(model, scenes):
+    """Inputs of a DeepDoublePhase's pre-filter on the first scenes, for calibration."""
+    for x in examples(scenes, model.hologram.architecture.coordinates):
+        yield model.seen_by_prefilter(model.hologram.field(x[None]))[0]
+
+
 def figures(chain, ranges, scenes):
     """Amplitude PSNR (float32, int8) on scenes."""
     quantized = Quantized(copy.deepcopy(chain), ranges)
     return tuple(evaluate(torch_predictor(n), scenes, full=False)["amplitude_psnr"] for n in (chain, quantized))
+
+
+def encoded_figure(model, scenes):
+    """Amplitude PSNR on scenes of what a DeepDoublePhase's holograms show."""
+    return encoding_figures(model, scenes, full=False, others=False)["deep double phase"]["amplitude_psnr"]
 
 
 def report(name, exact, rounded):

@@ -12,7 +12,7 @@ import torch
 
 from .data import Sampler, network_input
 from .encode import (
-    DeepDoublePhase, anti_alias, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, band_limit, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from .evaluate import compare, scene_as_seen
 from .loop import Task
@@ -21,20 +21,21 @@ from .networks import Architecture, Chain, head_field
 from .optics import propagate
 from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
 
-PREFILTER_LAYERS, PREFILTER_FILTERS = 8, 8
 STACK_WEIGHT = 20.0
 PHASE_WEIGHT = 0.07
+STRONG_BLUR = (1.5, 7)  # σ in pixels and taps, and the bound of BL-DPM, that leave hardly any artefacts
+STRONG_BAND_LIMIT = 0.1
 
 
-def prefilter_network():
-    """A pre-filter that is AA-DPM's blur so far."""
-    network = Chain(Architecture(PREFILTER_LAYERS, PREFILTER_FILTERS, "field"))
+def prefilter_network(layers=8, filters=8):
+    """A pre-filter that is AA-DPM's blur so far; 8 layers of 8 filters are the paper's."""
+    network = Chain(Architecture(layers, filters, "field"))
     last = network.convs[-1].weight
     with torch.no_grad():
         last.zero_()
         for c in range(6):
-            last[c, PREFILTER_FILTERS + c] = blur_kernel()
-            last[c, PREFILTER_FILTERS + c, 1, 1] -= 1  # the head adds the field itself
+            last[c, filters + c] = blur_kernel()
+            last[c, filters + c, 1, 1] -= 1  # the head adds the field itself
     return network
 
 
@@ -100,13 +101,13 @@ class Stage2(_OnHolograms):
         return STACK_WEIGHT * (terms["focal"] + terms["variation"]) + PHASE_WEIGHT * terms["phase"], terms
 
     def validate(self):
-        figures = encoding_figures(self.model, self.validation, full=False)["deep double phase"]
+        figures = encoding_figures(self.model, self.validation, full=False, others=False)["deep double phase"]
         return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
 
 
-def encoding_figures(model, scenes, degraded=False, full=True):
-    """{method: mean figures} of what an encoded hologram shows: DDPM, and AA-DPM and plain double phase after the same
-    hologram network; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
+def encoding_figures(model, scenes, degraded=False, full=True, others=True):
+    """{method: mean figures} of what an encoded hologram shows: DDPM, and after the same hologram network AA-DPM and BL-DPM
+    with a weak and a strong filter, and plain double phase; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
     rows = {}
     device = next(model.parameters()).device
     with torch.no_grad():
@@ -116,11 +117,15 @@ def encoding_figures(model, scenes, degraded=False, full=True):
             x = network_input(colour, depth, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
             midpoint = model.hologram.field(x)
             there = propagate(midpoint, model.offset_m, model.display)
-            methods = {
-                "deep double phase": model.filtered(midpoint),
-                "anti-aliased double phase": anti_alias(there),
-                "double phase": there,
-            }
+            methods = {"deep double phase": model.filtered(midpoint)}
+            if others:
+                methods |= {
+                    "anti-aliased double phase": anti_alias(there),
+                    "anti-aliased, strong": anti_alias(there, *STRONG_BLUR),
+                    "band-limited double phase": band_limit(there),
+                    "band-limited, strong": band_limit(there, STRONG_BAND_LIMIT),
+                    "double phase": there,
+                }
             for name, field in methods.items():
                 centred = field * torch.exp(-1j * field.angle().mean((-1, -2), keepdim=True)) if "deep" not in name else field
                 scale = scale_of(centred)

@@ -6,7 +6,7 @@ from conftest import asm
 from phasefront_training.__main__ import main
 from phasefront_training.checkpoint import Checkpoint
 from phasefront_training.encode import (
-    DeepDoublePhase, anti_alias, aperture, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, aperture, band_limit, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from phasefront_training.export import read_description
 from phasefront_training.networks import Architecture, Chain
@@ -86,6 +86,15 @@ def test_blur_keeps_a_constant():
     assert torch.allclose(anti_alias(field)[..., 1:-1, 1:-1], field[..., 1:-1, 1:-1])
 
 
+def test_band_limit_cuts_the_diagonals_alone():
+    y, x = torch.meshgrid(torch.arange(24), torch.arange(36), indexing="ij")
+    wave = lambda fy, fx: torch.polar(torch.ones(1, 3, 24, 36), (2 * np.pi * (fy * y + fx * x)).float().expand(1, 3, 24, 36))
+    for kept in (wave(1 / 3, 0), wave(0, -1 / 3), wave(1 / 6, 1 / 6)):
+        assert torch.allclose(band_limit(kept), kept, atol=1e-5)
+    assert band_limit(wave(1 / 3, 1 / 3)).abs().max() < 1e-5  # tan² = 3
+    assert band_limit(wave(1 / 6, -1 / 6), 0.3).abs().max() < 1e-5  # tan² = 1/3
+
+
 def test_a_new_prefilter_is_the_blur_and_learns():
     prefilter = prefilter_network()
     x = torch.randn(1, 6, 20, 20)
@@ -102,6 +111,11 @@ def test_both_networks_learn_through_the_encoding():
     assert all(torch.isfinite(p.grad).all() and p.grad.abs().max() > 0 for p in model.parameters())
 
 
+def deep(table):
+    """The first figure of the deep double phase method."""
+    return float(table.split("| deep double phase |")[1].split("|")[0])
+
+
 def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, capsys):
     first, second = tmp_path / "first", tmp_path / "second"
     common = ["--data", str(data_folder), "--crop", "64"]
@@ -116,5 +130,19 @@ def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, 
     assert read_description(path)["input"] == "field" and read_description(path)["offset_mm"] == "1"
     capsys.readouterr()
     assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder)]) == 0
-    told = capsys.readouterr().out
-    assert "deep double phase" in told and "anti-aliased" in told
+    exact = capsys.readouterr().out
+    assert "deep double phase" in exact and "anti-aliased" in exact
+    int8 = tmp_path / "pre-int8.onnx"
+    before = last.networks["hologram"][1]
+    call = ["quantize", str(second / "checkpoint.pt"), "--network", "prefilter", *common, "-o", str(int8)]
+    assert main([*call, "--always-train", "--steps", "3", "--rate", "0.01"]) == 0
+    told = capsys.readouterr().err
+    assert "trained through the rounding" in told and read_description(int8)["offset_mm"] == "1"
+    trained = Checkpoint.load(tmp_path / "pre-int8.onnx.qat" / "checkpoint.pt")
+    assert all(torch.equal(w, before[name]) for name, w in trained.networks["hologram"][1].items())
+    assert not torch.equal(trained.networks["prefilter"][1]["convs.0.weight"], last.networks["prefilter"][1]["convs.0.weight"])
+    call = ["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder)]
+    assert main([*call, "--prefilter", str(int8)]) == 0
+    assert deep(capsys.readouterr().out) != deep(exact)
+    assert main([*call, "--prefilter", str(path)]) == 0
+    assert deep(capsys.readouterr().out) == pytest.approx(deep(exact), abs=0.02)

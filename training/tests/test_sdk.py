@@ -50,11 +50,7 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
         given = torch.from_numpy(channels)[None] - 0.5
         midpoint = hologram.field(given)
         if precision == "int8":
-            from phasefront_training.encode import channels as parts
-            from phasefront_training.optics import propagate
-
-            there = parts(propagate(midpoint, model.offset_m, display))
-            model.prefilter = Quantized(prefilter, calibrate(prefilter, there)).eval()
+            model.prefilter = Quantized(prefilter, calibrate(prefilter, model.seen_by_prefilter(midpoint))).eval()
         before = model.filtered(midpoint)
         scale = scale_of(before)
         phase = double_phase(before, scale)[0].numpy()

@@ -99,7 +99,7 @@ def levels_of(case, memory, network):
         changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
-    methods = {"network": network, "sweep": Method.SWEEP()}
+    methods = {"network": network, "sweep": Method.SWEEP(), "by-sharpness": Method.BY_SHARPNESS(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, display_from_toml(case["display"]), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]

@@ -89,6 +89,8 @@ enum MethodName {
     Sweep,
     /// The plane sweep corrected by a network
     Seeded,
+    /// For each frame the plane sweep where depth is sharp, the network where it is ragged
+    Auto,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -306,6 +308,10 @@ impl Video {
                 Method::Seeded(models::network(models::SEEDED, self.precision.is_int8())?)
             }
             MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
+            MethodName::Auto => Method::BySharpness(
+                Sweep::for_display(&display),
+                models::network(&self.network, self.precision.is_int8())?,
+            ),
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
         if display.bits() <= 8 {

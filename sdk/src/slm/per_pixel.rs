@@ -325,20 +325,20 @@ impl PerPixel {
         let mut left = [0.0; MAX_INTERVALS + 1];
         let mut right = left;
         let mut left_turn = column(j, &mut left);
-        // Knots of the left node beside the way to the right one: one place to load from.
-        let mut pairs = [(0.0, 0.0); MAX_INTERVALS + 1];
+        let mut ends = [[0.0; 4]; MAX_INTERVALS];
         let (mut phases, mut levels, mut x) = (phases, levels, x);
         while !phases.is_empty() {
             let right_turn = column(j + 1, &mut right);
-            for (pair, (left, right)) in pairs.iter_mut().zip(left.iter().zip(&right)).take(knots) {
-                *pair = (*left, right - left);
+            let curves = left.windows(2).zip(right.windows(2));
+            for (ends, (left, right)) in ends.iter_mut().zip(curves).take(self.intervals) {
+                *ends = [left[0], right[0] - left[0], left[1], right[1] - left[1]];
             }
             let count = phases.len().min((j + 1) * self.spacing - x);
             let (run, rest) = phases.split_at(count);
             let (shown, others) = std::mem::take(&mut levels).split_at_mut(count);
             let start = x - j * self.spacing;
             let node = Between {
-                pairs: &pairs,
+                ends: &ends,
                 turn: (left_turn, right_turn - left_turn),
                 intervals: self.intervals,
                 step: self.spacing as f32,
@@ -381,8 +381,9 @@ const LANES: usize = 32;
 
 /// The curves between two nodes of a row.
 struct Between<'a> {
-    /// Knots of the left node, and the way to the right one's.
-    pairs: &'a [(f32, f32); MAX_INTERVALS + 1],
+    /// Of each interval the left node's first knot, the way to the right node's, and both of the second knot: in one
+    /// place, for looking up is what takes the time.
+    ends: &'a [[f32; 4]; MAX_INTERVALS],
     /// The turn likewise.
     turn: (f32, f32),
     intervals: usize,
@@ -408,17 +409,12 @@ impl Between<'_> {
             let k = whole(t).min(last);
             (along[i], part[i], interval[i]) = (fx, t - k, bits(k) & 63);
         }
-        let (mut here, mut way) = ([0.0; LANES], [0.0; LANES]);
-        let (mut next, mut next_way) = ([0.0; LANES], [0.0; LANES]);
-        for i in 0..LANES {
-            let k = interval[i] as usize;
-            (here[i], way[i]) = self.pairs[k];
-            (next[i], next_way[i]) = self.pairs[k + 1];
-        }
+        let ends: [[f32; 4]; LANES] = interval.map(|k| self.ends[k as usize]);
         let mut shown = [0; LANES];
         for i in 0..LANES {
-            let here = here[i] + way[i] * along[i];
-            let next = next[i] + next_way[i] * along[i];
+            let [here, way, next, next_way] = ends[i];
+            let here = here + way * along[i];
+            let next = next + next_way * along[i];
             let level = here + (next - here) * part[i] + 0.5;
             shown[i] = bits(whole(level.clamp(0.0, 255.0))) as u8;
         }

@@ -5351,6 +5351,15 @@ public enum Method {
      * The plane sweep, for any display: slower, and nothing needs to be trained.
      */
     case sweep
+    /**
+     * For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained
+     * network where it is ragged, as sensors' depth is.
+     */
+    case bySharpness(
+        /**
+         * The network, for the session's display.
+         */network: Network
+    )
 
 
 
@@ -5377,6 +5386,9 @@ public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
         
         case 2: return .sweep
         
+        case 3: return .bySharpness(network: try FfiConverterTypeNetwork.read(from: &buf)
+        )
+        
         default: throw UniffiInternalError.unexpectedEnumCase
         }
     }
@@ -5393,6 +5405,11 @@ public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
         case .sweep:
             writeInt(&buf, Int32(2))
         
+        
+        case let .bySharpness(network):
+            writeInt(&buf, Int32(3))
+            FfiConverterTypeNetwork.write(network, into: &buf)
+            
         }
     }
 }

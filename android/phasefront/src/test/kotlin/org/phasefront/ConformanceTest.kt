@@ -79,6 +79,7 @@ class ConformanceTest {
     private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
         "network" -> Method.Trained(network)
         "sweep" -> Method.Sweep
+        "by-sharpness" -> Method.BySharpness(network)
         else -> Method.Trained(model(name))
     }
 
