@@ -46,6 +46,9 @@ impl Method {
             }
             Method::Network(network) => (network, InputKind::Rgbd),
             Method::Seeded(network) => (network, InputKind::Seeded),
+            Method::BySharpness(_, network) => {
+                return Method::trained(network.clone()).check(display);
+            }
         };
         check_input(network, input)?;
         check_display(network, display)

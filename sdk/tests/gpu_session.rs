@@ -306,6 +306,11 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
             ..Sweep::for_display(&sweep.display)
         });
         cases.push((sweep, "31 taps"));
+        let mut either = gpu.clone();
+        let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+        let sweep = Sweep::for_display(&either.display);
+        either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
+        cases.push((either, "sharpness"));
         let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
         let mut ten = SessionOptions::new(
             Display::from_toml(text).unwrap(),

@@ -243,7 +243,7 @@ impl ChainPlan {
 }
 
 /// The shortest of three runs, after one that is not counted.
-fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
+pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     let run = || {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());

@@ -1,10 +1,10 @@
 //! From a frame as it comes to the hologram's field, on the GPU: the twin of [`crate::method`].
 
-use super::Result;
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::Device;
 use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::sweep::Sweeper;
+use super::{Error, Result};
 use crate::display::Display;
 use crate::method::{Method, sweep_plan};
 use crate::network::Network;
@@ -68,7 +68,7 @@ impl Maker {
         let swept = |plan: SweepPlan| {
             let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
             let sweep = Sweeper::new(device, &plan, display, &packer.input.first)?;
-            Ok::<_, super::Error>((packer, sweep))
+            Ok::<_, Error>((packer, sweep))
         };
         let (height, width) = size;
         let (packer, way) = match method {
@@ -93,6 +93,12 @@ impl Maker {
                 let seeded = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, numbers, size, &seeded, options)?;
                 (packer, Way::Seeded(sweep, Box::new(seeded), trained))
+            }
+            Method::BySharpness(..) => {
+                return Err(Error::Refused(
+                    "the sharpness of depth, which chooses between sweep and network, is measured on the CPU only; one of them alone is right"
+                        .into(),
+                ));
             }
         };
         Ok(Maker { size, packer, way })

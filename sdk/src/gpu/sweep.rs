@@ -4,6 +4,7 @@
 //! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged steps,
 //! only the tiles are passed over here in which there is neither light nor a point yet.
 
+use super::chain::time;
 use super::device::{Device, Dispatch};
 use super::hidden::Search;
 use super::{Error, Result};
@@ -22,7 +23,7 @@ const HOME_ROWS: usize = 4;
 pub(super) struct Sweeper {
     /// None without hidden layers.
     search: Option<Search>,
-    points: Dispatch,
+    /// Which planes hold each pixel's points, then all planes.
     steps: Vec<Dispatch>,
     home: [Dispatch; 2],
     /// How many planes a dispatch does.
@@ -46,8 +47,19 @@ impl Sweeper {
         display: &Display,
         surfaces: &wgpu::Buffer,
     ) -> Result<Self> {
+        Self::planned(device, plan, display, surfaces, !device.is_software())
+    }
+
+    /// With as many planes a dispatch as are measured to be faster, or as there is room for.
+    fn planned(
+        device: &Device,
+        plan: &SweepPlan,
+        display: &Display,
+        surfaces: &wgpu::Buffer,
+        measured: bool,
+    ) -> Result<Self> {
         let radius = plan.sweep().taps / 2;
-        let together = planes_together(radius).ok_or_else(|| {
+        let most = most_together(radius).ok_or_else(|| {
             Error::Refused(format!(
                 "steps of {} taps do not fit the workgroup memory that every GPU has; {} taps at most, or more planes with fewer, are right",
                 plan.sweep().taps,
@@ -80,11 +92,12 @@ impl Sweeper {
             device.buffer("the swept field", swept)?,
             device.buffer("the swept field", swept)?,
         ];
-        let steps = maker.steps(together, &fields)?;
-        let [last, other] = match steps.len() % 2 {
-            0 => [&fields[0], &fields[1]],
-            _ => [&fields[1], &fields[0]],
+        let (steps, together) = match measured && most > 1 {
+            true => maker.faster(most, &fields)?,
+            false => (maker.steps(most, &fields)?, most),
         };
+        let crossings = plan.sweep().planes.div_ceil(together);
+        let (last, other) = (&fields[crossings % 2], &fields[(crossings + 1) % 2]);
         let field = device.buffer("the field", 24 * area)?;
         let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
         let home = maker.home([last, other, &field], &partial)?;
@@ -95,7 +108,6 @@ impl Sweeper {
         };
         let half_home = 24 * maker.padded.0 * width;
         Ok(Sweeper {
-            points: maker.points()?,
             search,
             home,
             together,
@@ -105,7 +117,7 @@ impl Sweeper {
             parts: tiles.0 * tiles.1,
             bytes: searched
                 + (16 + 4) * area
-                + steps.len() * (2 * swept + 4 * area)
+                + crossings * (2 * swept + 4 * area)
                 + swept
                 + 2 * half_home
                 + 24 * area,
@@ -117,14 +129,13 @@ impl Sweeper {
         if let Some(search) = &self.search {
             search.run(pass);
         }
-        self.points.run(pass);
         let way = self.steps.iter().chain(&self.home);
         way.for_each(|step| step.run(pass));
     }
 
     /// Dispatches a frame.
     pub(super) fn dispatches(&self) -> usize {
-        self.search.as_ref().map_or(0, Search::dispatches) + 1 + self.steps.len() + self.home.len()
+        self.search.as_ref().map_or(0, Search::dispatches) + self.steps.len() + self.home.len()
     }
 }
 
@@ -169,8 +180,26 @@ impl Maker<'_> {
         )
     }
 
-    /// All planes, so many `together`, from the first field to the second and back. The first dispatch begins behind
-    /// the last plane where they do not divide.
+    /// The faster of one plane and `most` planes a dispatch, on a frame that is lit everywhere from its last plane on:
+    /// white rows there, one in each tile at least.
+    fn faster(&self, most: usize, fields: &[wgpu::Buffer; 2]) -> Result<(Vec<Dispatch>, usize)> {
+        let (height, width) = self.plan.shape();
+        let row = vec![[1.0f32; 4]; width];
+        for y in (0..height).step_by(TILE.1 / 2) {
+            let at = (16 * y * width) as u64;
+            (self.device.queue).write_buffer(self.surfaces, at, bytemuck::cast_slice(&row));
+        }
+        let (single, several) = (self.steps(1, fields)?, self.steps(most, fields)?);
+        Ok(
+            match time(self.device, &single)? < time(self.device, &several)? {
+                true => (single, 1),
+                false => (several, most),
+            },
+        )
+    }
+
+    /// Each pixel's points, then all planes, so many `together`, from the first field to the second and back. The first
+    /// dispatch begins behind the last plane where they do not divide.
     fn steps(&self, together: usize, fields: &[wgpu::Buffer; 2]) -> Result<Vec<Dispatch>> {
         let (device, sweep) = (self.device, self.plan.sweep());
         let radius = sweep.taps / 2;
@@ -195,23 +224,22 @@ impl Maker<'_> {
         let grid = [wide.div_ceil(columns - halo), high.div_ceil(rows - halo), 3];
         let count = sweep.planes.div_ceil(together);
         let (height, width) = self.plan.shape();
-        (0..count)
-            .map(|step| {
-                let first = (count - step) * together - 1;
-                let frame = [width, height, self.border, first].map(|n| n as u32);
-                let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
-                let arguments = [
-                    (0, frame.buffer.as_entire_binding()),
-                    (1, taps.buffer.as_entire_binding()),
-                    (2, self.surfaces.as_entire_binding()),
-                    (3, self.sources.as_entire_binding()),
-                    (4, self.points.as_entire_binding()),
-                    (5, fields[step % 2].as_entire_binding()),
-                    (6, fields[(step + 1) % 2].as_entire_binding()),
-                ];
-                program.on(device, &arguments, grid)
-            })
-            .collect()
+        let crossings = (0..count).map(|step| {
+            let first = (count - step) * together - 1;
+            let frame = [width, height, self.border, first].map(|n| n as u32);
+            let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
+            let arguments = [
+                (0, frame.buffer.as_entire_binding()),
+                (1, taps.buffer.as_entire_binding()),
+                (2, self.surfaces.as_entire_binding()),
+                (3, self.sources.as_entire_binding()),
+                (4, self.points.as_entire_binding()),
+                (5, fields[step % 2].as_entire_binding()),
+                (6, fields[(step + 1) % 2].as_entire_binding()),
+            ];
+            program.on(device, &arguments, grid)
+        });
+        std::iter::once(self.points()).chain(crossings).collect()
     }
 
     /// The way home: rows from the first of `fields` to the second, columns from there to the third, whose sums go to
@@ -251,9 +279,9 @@ impl Maker<'_> {
 /// The longest radius of a step that leaves enough of a tile.
 const MOST_RADIUS: usize = TILE.1 / 4;
 
-/// How many planes a dispatch does: each costs a halo more, and saves that the field is read and written. As many as leave
-/// a quarter of the tile; None where one leaves less.
-fn planes_together(radius: usize) -> Option<usize> {
+/// The most planes of a dispatch: each costs a halo more, and saves that the field is read and written. As many as leave a
+/// quarter of the tile; None where one leaves less.
+fn most_together(radius: usize) -> Option<usize> {
     let left = |planes: usize| {
         let halo = 2 * radius * planes;
         TILE.0.saturating_sub(halo) * TILE.1.saturating_sub(halo)
@@ -344,20 +372,24 @@ mod tests {
         (mixed >> 8) as f32 / (1 << 24) as f32
     }
 
-    fn on_gpu(frame: &RgbdFrame, plan: &SweepPlan, display: &Display) -> Option<Vec<Complex32>> {
+    fn on_gpu(
+        frame: &RgbdFrame,
+        plan: &SweepPlan,
+        display: &Display,
+        measured: bool,
+    ) -> Option<Vec<Complex32>> {
         let device = device()?;
         let (height, width) = frame.shape();
         let (rgb, depth) = (frame.rgb(), frame.depth());
-        let surfaces: Vec<[f32; 4]> = depth
+        let values: Vec<[f32; 4]> = depth
             .indexed_iter()
             .map(|((y, x), &d)| [rgb[(0, y, x)], rgb[(1, y, x)], rgb[(2, y, x)], d])
             .collect();
-        let surfaces = device
-            .table("surfaces", bytemuck::cast_slice(&surfaces))
-            .unwrap();
+        let surfaces = device.buffer("surfaces", 16 * values.len()).unwrap();
         let sweeper = device
-            .guarded(|| Sweeper::new(&device, plan, display, &surfaces.buffer))
+            .guarded(|| Sweeper::planned(&device, plan, display, &surfaces, measured))
             .unwrap();
+        (device.queue).write_buffer(&surfaces, 0, bytemuck::cast_slice(&values));
         // Twice: what one frame leaves behind must not reach the next.
         run(&device, |pass| {
             sweeper.run(pass);
@@ -401,7 +433,7 @@ mod tests {
             },
             Sweep {
                 taps: 13,
-                planes: 2,
+                planes: 7,
                 ..sweep()
             },
             Sweep {
@@ -421,10 +453,10 @@ mod tests {
         for size in [(61, 47), (50, 7), (7, 50), (1, 29), (30, 1), (1, 1)] {
             cases.push((size, depths[0], sweep(), 2e-3));
         }
-        for (size, depth, sweep, z_m) in cases {
+        for (case, (size, depth, sweep, z_m)) in cases.into_iter().enumerate() {
             let frame = frame(size, depth);
             let plan = SweepPlan::new(size.0, size.1, &small(), sweep, z_m).unwrap();
-            let Some(field) = on_gpu(&frame, &plan, &small()) else {
+            let Some(field) = on_gpu(&frame, &plan, &small(), case % 2 == 1) else {
                 return;
             };
             let expected = reference::field(&frame, &small(), sweep, z_m).unwrap();
@@ -451,7 +483,7 @@ mod tests {
             let frame = frame(size, depth);
             let sweep = Sweep::for_display(display);
             let plan = SweepPlan::new(size.0, size.1, display, sweep, z_m).unwrap();
-            let Some(field) = on_gpu(&frame, &plan, display) else {
+            let Some(field) = on_gpu(&frame, &plan, display, false) else {
                 return;
             };
             let mut expected = vec![Complex32::ZERO; field.len()];
@@ -465,9 +497,10 @@ mod tests {
 
     #[test]
     fn steps_that_do_not_fit_are_refused() {
-        assert_eq!(planes_together(4), Some(2));
-        assert_eq!(planes_together(MOST_RADIUS), Some(1));
-        assert_eq!(planes_together(MOST_RADIUS + 1), None);
+        assert_eq!(most_together(2), Some(5));
+        assert_eq!(most_together(5), Some(2));
+        assert_eq!(most_together(MOST_RADIUS), Some(1));
+        assert_eq!(most_together(MOST_RADIUS + 1), None);
         let Some(device) = device() else { return };
         let wide = Sweep {
             taps: 2 * MOST_RADIUS + 3,
