@@ -292,19 +292,17 @@ fn most_together(radius: usize) -> Option<usize> {
 }
 
 /// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from the
-/// last plane, and matters if it comes back before plane 0 or on the way from there to the hologram.
+/// last plane, and must come back on the way to plane 0 and from there to the hologram to matter.
 fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
-    let (sweep, optics) = (
-        plan.sweep(),
-        sweep::optics(display, &plan.sweep(), plan.z_m())?,
-    );
+    let sweep = plan.sweep();
+    let optics = sweep::optics(display, &sweep, plan.z_m())?;
     let most = |colour: &sweep::Optics| {
-        let reach = |steps: usize| colour.reach(steps as f64 * colour.step_m);
-        let home = |k: usize| colour.reach(colour.home_m + k as f64 * colour.step_m);
-        let at = |k: usize| reach(sweep.planes - 1 - k).min(reach(k).max(home(k)));
-        (0..sweep.planes).map(at).max().unwrap_or(0)
+        let left = |k: usize| colour.reach((sweep.planes - 1 - k) as f64 * colour.step_m);
+        let back = |k: usize| colour.reach(colour.home_m.abs() + k as f64 * colour.step_m);
+        (0..sweep.planes).map(|k| left(k).min(back(k))).max()
     };
-    Ok(optics.iter().map(most).max().unwrap_or(0) + MARGIN)
+    let widest = optics.iter().filter_map(most).max();
+    Ok(widest.unwrap_or(0) + MARGIN)
 }
 
 /// Filters of three colours as programs read them, up to `radius`: four f32 a tap, what points carry in the first one's
