@@ -37,7 +37,7 @@ mod encode;
 mod fft;
 mod hidden;
 mod input;
-mod maker;
+mod method;
 mod peak;
 mod pipeline;
 mod preview;

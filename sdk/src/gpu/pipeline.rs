@@ -5,7 +5,7 @@ use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame};
-use super::maker::Maker;
+use super::method::MethodPlan;
 use super::peak::Peak;
 use super::{Error, Result};
 use crate::brightness::{Brightness, Past};
@@ -162,7 +162,7 @@ pub struct FrameReport {
 pub struct Pipeline {
     device: Arc<Device>,
     size: (usize, usize),
-    maker: Maker,
+    method: MethodPlan,
     /// None for an encoding that was trained on the field's phase as it is.
     mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
@@ -215,8 +215,8 @@ impl Pipeline {
 
     fn build(device: &Arc<Device>, job: &Job, size: (usize, usize)) -> Result<Self> {
         let (display, formats) = (&job.display, (job.colour, job.depth));
-        let maker = Maker::new(device, &job.method, size, display, formats, job.chain)?;
-        let (sums, parts) = maker.sums();
+        let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
+        let (sums, parts) = method.sums();
         let mean = match job.encoding {
             Encoding::Deep(_) => None,
             _ => Some(MeanPhase::new(device, sums, parts)?),
@@ -225,7 +225,7 @@ impl Pipeline {
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
         let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
         // The rest of the way.
-        let plans = match (display.offset_m() - maker.z_m(), &job.correction) {
+        let plans = match (display.offset_m() - method.z_m(), &job.correction) {
             (offset_m, Some(correction)) => Some(Propagator::for_colours_corrected(
                 size.0,
                 size.1,
@@ -250,7 +250,7 @@ impl Pipeline {
             Some(plans) => Some(Convolution::new(
                 device,
                 &Planes {
-                    field: maker.field(),
+                    field: method.field(),
                     size,
                     padded: plans[0].padded_shape(),
                     factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
@@ -265,7 +265,7 @@ impl Pipeline {
             .collect::<Result<Vec<_>>>()?;
         let encoder = Encoder::new(
             device,
-            maker.field(),
+            method.field(),
             size,
             &job.encoding,
             job.chain,
@@ -279,7 +279,7 @@ impl Pipeline {
         Ok(Pipeline {
             device: device.clone(),
             size,
-            maker,
+            method,
             mean,
             offset,
             encoder,
@@ -302,12 +302,12 @@ impl Pipeline {
     /// What the hologram is computed in, and how.
     pub fn describe(&self) -> String {
         let (numbers, device) = (self.numbers(), self.device.name());
-        format!("{numbers} on {device}, {}", self.maker.describe())
+        format!("{numbers} on {device}, {}", self.method.describe())
     }
 
     /// What the network, or a sweep by itself, is computed in: `f32`, `f16` or `int8`.
     pub fn numbers(&self) -> &'static str {
-        self.maker.numbers().name()
+        self.method.numbers().name()
     }
 
     /// What the device does at its best, measured now, in these numbers.
@@ -315,12 +315,12 @@ impl Pipeline {
     /// # Errors
     /// What the device refuses; [`Error::Lost`].
     pub fn peak(&self) -> Result<Peak> {
-        super::peak::measure(&self.device, self.maker.numbers())
+        super::peak::measure(&self.device, self.method.numbers())
     }
 
     /// Bytes that the method's dispatches read and write in a frame, each value once.
     pub fn method_bytes(&self) -> usize {
-        self.maker.bytes()
+        self.method.bytes()
     }
 
     /// Frames come so from now on: the input stage alone is planned again. Frames in flight are not harmed.
@@ -328,7 +328,7 @@ impl Pipeline {
     /// # Errors
     /// A format that the CPU refuses too, or what this device cannot do; frames then come as before.
     pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
-        self.maker.expect(&self.device, (colour, depth))
+        self.method.expect(&self.device, (colour, depth))
     }
 
     /// Sends a frame through. At most [`FLIGHTS`] may be in flight.
@@ -357,7 +357,7 @@ impl Pipeline {
         };
         let device = self.device.clone();
         let submission = device.guarded(|| {
-            self.maker.upload(&device, frame)?;
+            self.method.upload(&device, frame)?;
             self.encoder.heed(&device, past);
             Ok(device.queue.submit([self.commands(slot, deliver)]))
         })?;
@@ -389,9 +389,9 @@ impl Pipeline {
             });
             work(&mut pass);
         };
-        stage(0, &|pass| self.maker.read(pass));
+        stage(0, &|pass| self.method.read(pass));
         stage(1, &|pass| {
-            self.maker.run(pass);
+            self.method.run(pass);
             if let Some(mean) = &self.mean {
                 mean.run(pass);
             }

@@ -12,7 +12,7 @@ use crate::sweep::{Sweep, SweepPlan};
 use std::sync::Arc;
 
 /// A method for one frame size.
-pub(super) struct Maker {
+pub(super) struct MethodPlan {
     size: (usize, usize),
     /// From the frame to what the network or the sweep reads.
     packer: Packer,
@@ -53,7 +53,7 @@ impl Trained {
     }
 }
 
-impl Maker {
+impl MethodPlan {
     /// Plans `method` for frames of `size` (height, width) that come in `formats`.
     pub(super) fn new(
         device: &Device,
@@ -101,7 +101,7 @@ impl Maker {
                 ));
             }
         };
-        Ok(Maker { size, packer, way })
+        Ok(MethodPlan { size, packer, way })
     }
 
     /// Frames come in `formats` from now on.
