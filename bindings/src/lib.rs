@@ -28,7 +28,7 @@ pub use frame::{
 };
 pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener, set_log_listener};
-pub use network::{Network, NetworkInfo};
+pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
     Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
     RunningMode, SessionOptions, Thermal,

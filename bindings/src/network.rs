@@ -9,6 +9,30 @@ const BUILT_IN: Option<&[u8]> = Some(include_bytes!("../../models/rgbd-8-int8.on
 #[cfg(not(feature = "built-in-network"))]
 const BUILT_IN: Option<&[u8]> = None;
 
+/// The pairs that are built in with it, each for an offset in mm: hologram network and pre-filter.
+#[cfg(feature = "built-in-network")]
+const PAIRS: &[(f64, &[u8], &[u8])] = &[
+    (
+        0.0,
+        include_bytes!("../../models/ddpm-8-int8.onnx"),
+        include_bytes!("../../models/ddpm-8-prefilter-int8.onnx"),
+    ),
+    (
+        6.0,
+        include_bytes!("../../models/ddpm-8-6mm-int8.onnx"),
+        include_bytes!("../../models/ddpm-8-6mm-prefilter-int8.onnx"),
+    ),
+    (
+        12.0,
+        include_bytes!("../../models/ddpm-8-12mm-int8.onnx"),
+        include_bytes!("../../models/ddpm-8-12mm-prefilter-int8.onnx"),
+    ),
+];
+#[cfg(not(feature = "built-in-network"))]
+const PAIRS: &[(f64, &[u8], &[u8])] = &[];
+/// Farther from its offset, mm, a pair is not taken.
+const OFFSET_TOLERANCE_MM: f64 = 0.1;
+
 /// A hologram network. Immutable; one serves many sessions.
 #[derive(Debug, uniffi::Object)]
 pub struct Network {
@@ -28,6 +52,34 @@ pub struct NetworkInfo {
     pub pitch_um: f64,
     /// Depth of the volume, mm.
     pub volume_depth_mm: f64,
+}
+
+/// A hologram network and the pre-filter that was trained with it, for the deep double phase method.
+#[derive(Debug, Clone, uniffi::Record)]
+pub struct DeepPair {
+    /// Makes the hologram.
+    pub hologram: Arc<Network>,
+    /// Prepares it for its encoding.
+    pub prefilter: Arc<Network>,
+}
+
+/// The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default display's
+/// pitch, colours and volume.
+///
+/// # Errors
+/// Another offset, or a library that was built without them.
+#[uniffi::export]
+pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
+    let near = |offset: &f64| (offset - offset_mm).abs() <= OFFSET_TOLERANCE_MM;
+    match PAIRS.iter().find(|(offset, ..)| near(offset)) {
+        Some((_, hologram, prefilter)) => Ok(DeepPair {
+            hologram: Network::from_bytes(hologram)?,
+            prefilter: Network::from_bytes(prefilter)?,
+        }),
+        None => Err(PhasefrontError::Network(format!(
+            "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
+        ))),
+    }
 }
 
 #[uniffi::export]

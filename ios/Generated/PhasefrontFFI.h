@@ -576,6 +576,11 @@ RustBuffer uniffi_phasefront_ffi_fn_func_display_from_toml(RustBuffer text, Rust
 void uniffi_phasefront_ffi_fn_func_set_log_listener(RustBuffer level, RustBuffer listener, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_BUILT_IN_PAIR
+RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(double offset_mm, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_FFI_PHASEFRONT_FFI_RUSTBUFFER_ALLOC
 #define UNIFFI_FFIDEF_FFI_PHASEFRONT_FFI_RUSTBUFFER_ALLOC
 RustBuffer ffi_phasefront_ffi_rustbuffer_alloc(uint64_t size, RustCallStatus *_Nonnull out_status
@@ -851,6 +856,12 @@ uint16_t uniffi_phasefront_ffi_checksum_func_display_from_toml(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_LOG_LISTENER
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_LOG_LISTENER
 uint16_t uniffi_phasefront_ffi_checksum_func_set_log_listener(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_BUILT_IN_PAIR
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_BUILT_IN_PAIR
+uint16_t uniffi_phasefront_ffi_checksum_func_built_in_pair(void
     
 );
 #endif

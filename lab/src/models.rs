@@ -1,7 +1,8 @@
 //! The networks that come with the command, and those of files.
 
 use crate::error::{Error, Result};
-use phasefront::Network;
+use phasefront::method::check_display;
+use phasefront::{Display, Network};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -20,7 +21,75 @@ pub struct Built {
 /// The name of the seeded network that comes along.
 pub const SEEDED: &str = "seeded-6";
 
-/// What comes along.
+/// The name of the networks that come along with a pre-filter, for the deep double phase method.
+pub const DEEP: &str = "ddpm-8";
+
+/// A hologram network and the pre-filter that was trained with it, for modulators at one offset; each in float32, then
+/// in int8.
+#[derive(Debug)]
+pub struct Pair {
+    /// From the midpoint hologram to the modulator, mm.
+    pub offset_mm: f64,
+    hologram: [&'static [u8]; 2],
+    prefilter: [&'static [u8]; 2],
+}
+
+/// A pair by the name of its files.
+macro_rules! pair {
+    ($offset_mm:literal, $name:literal) => {
+        Pair {
+            offset_mm: $offset_mm,
+            hologram: [
+                include_bytes!(concat!("../../models/", $name, ".onnx")),
+                include_bytes!(concat!("../../models/", $name, "-int8.onnx")),
+            ],
+            prefilter: [
+                include_bytes!(concat!("../../models/", $name, "-prefilter.onnx")),
+                include_bytes!(concat!("../../models/", $name, "-prefilter-int8.onnx")),
+            ],
+        }
+    };
+}
+
+/// The pairs that come along.
+pub const PAIRS: &[Pair] = &[
+    pair!(0.0, "ddpm-8"),
+    pair!(6.0, "ddpm-8-6mm"),
+    pair!(12.0, "ddpm-8-12mm"),
+];
+
+/// Farther from its offset, mm, a pair is not taken.
+const OFFSET_TOLERANCE_MM: f64 = 0.1;
+
+impl Pair {
+    /// (hologram network, pre-filter).
+    ///
+    /// # Errors
+    /// Never, for the files in `models/` are tested.
+    pub fn read(&self, int8: bool) -> Result<(Arc<Network>, Arc<Network>)> {
+        let read = |files: [&[u8]; 2]| Network::from_onnx(files[usize::from(int8)]).map(Arc::new);
+        Ok((read(self.hologram)?, read(self.prefilter)?))
+    }
+}
+
+/// The hologram network and the pre-filter that come along for `display`, if any do.
+///
+/// # Errors
+/// As [`Pair::read`].
+pub fn pair_for(display: &Display, int8: bool) -> Result<Option<(Arc<Network>, Arc<Network>)>> {
+    let away = |pair: &&Pair| (pair.offset_mm - display.offset_m() * 1e3).abs();
+    let near = |pair: &&Pair| away(pair) <= OFFSET_TOLERANCE_MM;
+    let Some(pair) = PAIRS.iter().find(near) else {
+        return Ok(None);
+    };
+    let (hologram, prefilter) = pair.read(int8)?;
+    Ok(match check_display(&hologram, display) {
+        Ok(()) => Some((hologram, prefilter)),
+        Err(_) => None,
+    })
+}
+
+/// What comes along by itself.
 pub const BUILT_IN: &[Built] = &[
     Built {
         name: "8",

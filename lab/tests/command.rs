@@ -737,12 +737,33 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
     let folder = Folder::new().with_frame();
     let hologram_network = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/rgbd-8.onnx");
     let deep = with(&["-o", "h.png", "--encoder", "deep"]);
-    folder.refuses(&deep, 2, &["--prefilter"]);
+    let alone = [&deep[..], &["--network", "8"]].concat();
+    folder.refuses(&alone, 1, &["--encoder deep needs --prefilter"]);
+    let far = [&deep[..], &["--offset-mm", "3"]].concat();
+    folder.refuses(
+        &far,
+        1,
+        &["offsets of 0, 6, 12 mm", "--network 8 --encoder anti-alias"],
+    );
     let pair = ["--prefilter", hologram_network];
     folder.refuses(&[&deep[..], &pair].concat(), 1, &["'field'", "'rgbd'"]);
     let other = with(&["-o", "h.png", "--encoder", "double"]);
     folder.refuses(&[&other[..], &pair].concat(), 1, &["--encoder deep"]);
+    let whole = [&other[..], &["--network", "ddpm-8"]].concat();
+    folder.refuses(&whole, 1, &["brings its own --encoder"]);
     assert!(!folder.path("h.png").exists());
+    for (more, encoder) in [
+        (&[][..], "deep"),
+        (&["--network", "ddpm-8"], "deep"),
+        (&["--offset-mm", "6"], "deep"),
+        (&["--offset-mm", "3"], "anti-alias"),
+        (&["--network", "8"], "anti-alias"),
+        (&["--method", "sweep"], "anti-alias"),
+    ] {
+        let call = [&with(&["-o", "h.png", "--json"])[..], more].concat();
+        let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&call)).unwrap();
+        assert_eq!(made["encoder"], encoder, "{more:?}: {made}");
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! The networks that come along: they load, and the fast path gives what tract gives.
 #![allow(clippy::unwrap_used)]
 
+use phasefront::Display;
 use phasefront::network::{InputKind, Precision};
-use phasefront_lab::models::{self, BUILT_IN};
+use phasefront_lab::models::{self, BUILT_IN, PAIRS};
 use phasefront_lab::scene;
 
 /// A rendered frame as network input, planes of `kind`; a seed is its colours, turned.
@@ -17,6 +18,31 @@ fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
         planes.extend(layer.rgb.iter().map(|v| 0.5 * v * 0.6));
     }
     planes
+}
+
+#[test]
+fn pairs_are_for_their_offset_and_display() {
+    for pair in PAIRS {
+        let display = Display::default()
+            .with_offset_m(pair.offset_mm * 1e-3)
+            .unwrap();
+        for int8 in [false, true] {
+            let (hologram, prefilter) = models::pair_for(&display, int8).unwrap().unwrap();
+            assert_eq!(hologram.precision() == Precision::Int8, int8);
+            assert_eq!(prefilter.precision() == Precision::Int8, int8);
+            assert!((prefilter.display().offset_m - display.offset_m()).abs() < 1e-9);
+            let plan = hologram.plan(40, 64).unwrap();
+            assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
+            let plan = prefilter.filter_plan(40, 64).unwrap();
+            assert_eq!(
+                plan.engine().name,
+                hologram.plan(40, 64).unwrap().engine().name
+            );
+        }
+    }
+    let none = |display: Display| models::pair_for(&display, true).unwrap().is_none();
+    assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
+    assert!(none(Display::from_toml("pitch_um = 6.4").unwrap()));
 }
 
 #[test]

@@ -203,13 +203,14 @@ impl Network {
         })
     }
 
-    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels.
+    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels. A blur that
+    /// it asks for ([`InputKind::BlurredField`]) is the caller's.
     ///
     /// # Errors
     /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
     /// empty field or one too large.
     pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
-        if self.input != InputKind::Field {
+        if !self.input.is_field() {
             return Err(Error::Network(format!(
                 "a pre-filter takes 'field', this network '{}'",
                 self.input

@@ -101,7 +101,11 @@ fn hot_calls_allocate_nothing() {
     let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
     let mut levels = vec![0; 3 * h * w];
     let display = Display::default().with_offset_m(6e-3).unwrap();
-    let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    let prefilter = Model {
+        input: "blurred-field",
+        ..Model::prefilter("6")
+    };
+    let prefilter = Arc::new(Network::from_onnx(&prefilter.bytes()).unwrap());
     let seeded = Model {
         inputs: 10,
         input: "seeded",

@@ -607,6 +607,11 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
             input: "field",
             ..Model::int8(5, 8)
         },
+        Model {
+            inputs: 6,
+            input: "blurred-field",
+            ..Model::new(4, 8)
+        },
     ];
     for model in models {
         let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());

@@ -303,7 +303,17 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
 
 #[test]
 fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
-    let network = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
+    for input in ["field", "blurred-field"] {
+        deep_encoding(input);
+    }
+}
+
+fn deep_encoding(input: &'static str) {
+    let model = Model {
+        input,
+        ..Model::prefilter("6")
+    };
+    let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
     let display = Display::default().with_offset_m(6e-3).unwrap();
     let (h, w) = (40, 33);
     let response = || Response::linear(8).unwrap();
@@ -317,6 +327,10 @@ fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
         .map(|i| Complex32::from_polar(0.5 + 0.3 * (i as f32).sin(), i as f32 * 0.01))
         .collect();
     let mut filtered = field.clone();
+    if input == "blurred-field" {
+        let blur = AntiAlias::new(0.7, 3).unwrap();
+        (filtered.chunks_exact_mut(h * w)).for_each(|plane| blur.filter(plane, w));
+    }
     let filter = network.filter_plan(h, w).unwrap();
     filter.filter(&mut filtered, &mut filter.scratch());
     let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();

@@ -59,7 +59,7 @@ def parser():
     resume_flag(p)
     p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
     p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
-    p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter the identity first, as in the paper (default 0: it begins as the blur of AA-DPM)")
+    p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter first to give true holograms as they are, as in the paper (default 0: it begins as the blur of AA-DPM)")
     p.add_argument("--prefilter-layers", type=int, default=8, help="convolution layers of the pre-filter (default 8)")
     p.add_argument("--prefilter-filters", type=int, default=8, help="filters of each (default 8)")
 

@@ -73,8 +73,9 @@ class DeepDoublePhase(torch.nn.Module):
         self.offset_m, self.display, self.bf16 = offset_m, display, bf16
 
     def seen_by_prefilter(self, midpoint):
-        """The pre-filter's input (N, 6, H, W): the field at the modulator's plane."""
-        return channels(propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint)
+        """The pre-filter's input (N, 6, H, W): the field at the modulator's plane, blurred where it asks for that."""
+        there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
+        return channels(anti_alias(there) if self.prefilter.architecture.input == "blurred-field" else there)
 
     def filtered(self, midpoint):
         """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""
@@ -117,9 +118,9 @@ def blur_kernel(sigma=BLUR_SIGMA, width=3):
 
 
 def anti_alias(field, sigma=BLUR_SIGMA, width=3):
-    """AA-DPM's filter: real and imaginary parts blurred; surroundings are black."""
+    """AA-DPM's filter: real and imaginary parts blurred; edges are repeated."""
     kernel = blur_kernel(sigma, width).to(field.device).expand(6, 1, width, width)
-    blurred = F.conv2d(channels(field), kernel, padding=width // 2, groups=6)
+    blurred = F.conv2d(F.pad(channels(field), [width // 2] * 4, mode="replicate"), kernel, groups=6)
     return torch.complex(blurred[:, :3].contiguous(), blurred[:, 3:].contiguous())
 
 

@@ -34,7 +34,7 @@ def input_name(architecture):
 
 def output_name(architecture):
     """The name of the graph's output; a graph cannot use one name twice."""
-    return "filtered" if architecture.input == "field" else "field"
+    return "filtered" if architecture.of_fields else "field"
 
 
 def metadata(architecture, display, offset_m=0.0):

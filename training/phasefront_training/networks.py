@@ -13,8 +13,10 @@ Two heads turn the last layer's six channels into a field :
 Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``rgbdxy`` (the same, then x and y over the frame from
 -0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (4·N channels: rgb0,
 depth0, rgb1, ..., each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of
-rgbd, then the plane sweep's field as data.network_input lays it; the field is the base) and ``field`` (6 channels: the
-real parts of the three colours, then the imaginary ones; this is the pre-filter of the deep double phase method).
+rgbd, then the plane sweep's field as data.network_input lays it; the field is the base), ``field`` (6 channels: the
+real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method) and
+``blurred-field`` (the same of a field that AA-DPM's blur has gone over: what is left for the network is small, so that
+its rounding is too).
 """
 
 import math
@@ -57,7 +59,12 @@ class Architecture:
         count = self.input.removeprefix("ldi")
         if self.input.startswith("ldi") and count.isdigit() and int(count) > 0:
             return int(count)
-        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...) or field, not '{self.input}'")
+        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...), field or blurred-field, not '{self.input}'")
+
+    @property
+    def of_fields(self):
+        """Whether it is a pre-filter: what it takes is a field."""
+        return self.input in ("field", "blurred-field")
 
     @property
     def coordinates(self):
@@ -66,7 +73,7 @@ class Architecture:
 
     @property
     def input_channels(self):
-        return {"field": 6, "rgbdxy": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
+        return {"field": 6, "blurred-field": 6, "rgbdxy": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
 
     def channels(self, i):
         """(input, output) channels of layer i."""
@@ -133,7 +140,7 @@ def head_field(architecture, output, x):
     if architecture.input == "seeded":
         real, imaginary = seed_of_input(base)
         return torch.complex(real + output[:, :3], imaginary + output[:, 3:])
-    if architecture.input == "field":
+    if architecture.of_fields:
         return torch.complex(base[:, :3] + output[:, :3], base[:, 3:] + output[:, 3:])
     return torch.complex(base[:, :3] + 0.5 + output[:, :3], output[:, 3:].contiguous())
 

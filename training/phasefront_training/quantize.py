@@ -136,7 +136,7 @@ def calibrate(chain, examples):
                 if i < last - 1 or a.has_skip(last):
                     see(f"relu_{i}", h)
             see("concat", h + inputs[last - 2] if a.has_skip(last) else h, x)
-    if a.input != "field":  # colours, depths and seeds have a range of their own, whatever the scenes hold
+    if not a.of_fields:  # colours, depths and seeds have a range of their own, whatever the scenes hold
         ranges["input"] = (-0.5, 0.5)
         ranges["concat"] = (min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5))
     return ranges

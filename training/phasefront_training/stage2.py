@@ -1,8 +1,8 @@
 """Stage 2, the deep double phase method: hologram network and pre-filter learn together what survives encoding.
 
-The pre-filter begins as AA-DPM's blur, which its last layer holds exactly, for it reads the field itself as well; so
-training starts from that method's quality. (The paper's start, the pre-filter alone learning to be the identity on true
-holograms at the modulator's plane, is there too, by a number of steps.) Then both are trained
+The pre-filter works on a field that AA-DPM's blur has gone over, and begins by leaving it alone: so training starts from
+that method's quality. (The paper's start, the pre-filter alone learning to give true holograms at the modulator's plane as
+they are, is there too, by a number of steps.) Then both are trained
 through encoding, aperture and back propagation by the focal-stack loss against the true midpoint hologram, plus 0.07
 times the phase regulariser; the truth of the field itself is left out on purpose.
 """
@@ -12,7 +12,7 @@ import torch
 
 from .data import Sampler, network_input
 from .encode import (
-    DeepDoublePhase, anti_alias, band_limit, blur_kernel, channels, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
+    DeepDoublePhase, anti_alias, band_limit, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
 from .evaluate import compare, scene_as_seen
 from .loop import Task
@@ -28,14 +28,9 @@ STRONG_BAND_LIMIT = 0.1
 
 
 def prefilter_network(layers=8, filters=8):
-    """A pre-filter that is AA-DPM's blur so far; 8 layers of 8 filters are the paper's."""
-    network = Chain(Architecture(layers, filters, "field"))
-    last = network.convs[-1].weight
-    with torch.no_grad():
-        last.zero_()
-        for c in range(6):
-            last[c, filters + c] = blur_kernel()
-            last[c, filters + c, 1, 1] -= 1  # the head adds the field itself
+    """A pre-filter that leaves a blurred field as it is so far; 8 layers of 8 filters are the paper's."""
+    network = Chain(Architecture(layers, filters, "blurred-field"))
+    torch.nn.init.zeros_(network.convs[-1].weight)
     return network
 
 
@@ -69,7 +64,7 @@ class Identity(_OnHolograms):
 
     def loss(self, module, batch, step):
         there = propagate(batch.target, self.model.offset_m, self.display)
-        x = channels(there).contiguous(memory_format=torch.channels_last)
+        x = self.model.seen_by_prefilter(batch.target).contiguous(memory_format=torch.channels_last)
         with torch.autocast(self.device.type, torch.bfloat16, enabled=self.model.bf16):
             output = module(x)
         error = (head_field(self.model.prefilter.architecture, output, x) - there).abs().mean()

@@ -2,7 +2,7 @@
 
 >>> import numpy, phasefront
 >>> display = phasefront.Display(width=64, height=48)
->>> session = phasefront.Session(phasefront.session_options(phasefront.Network.built_in(), display))
+>>> session = phasefront.Session(phasefront.session_options(display=display))
 >>> colour = numpy.full((48, 64, 3), 128, numpy.uint8)
 >>> metres = numpy.full((24, 32), 0.5, numpy.float32)
 >>> session.process(phasefront.Frame(colour, metres)).levels.shape
@@ -29,6 +29,7 @@ from .ffi.phasefront_ffi import (
     ConfidenceFormat,
     DepthFormat,
     DepthRange,
+    DeepPair,
     Display,
     DropReason,
     Drops,
@@ -56,16 +57,17 @@ from .ffi.phasefront_ffi import (
     Statistics,
     Thermal,
     YuvMatrix,
+    built_in_pair,
     display_from_toml,
     version,
 )
 
 __all__ = [
-    "Backend", "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DepthFormat", "DepthRange", "Display", "DropReason",
+    "Backend", "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display", "DropReason",
     "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
     "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
     "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",
-    "YuvMatrix", "display_from_toml", "send_log", "session_options", "version",
+    "YuvMatrix", "built_in_pair", "display_from_toml", "send_log", "session_options", "version",
 ]  # fmt: skip
 
 _DEPTH_FORMATS = {
@@ -305,10 +307,14 @@ class _Listener(_ffi.SessionListener):
         self._tell(QualityChanged(timestamp_ns, change))
 
 
-def session_options(method: Network | Method, display: Display | None = None, **changes) -> SessionOptions:
-    """What is usual: holograms of the display's resolution by a network or another method; AA-DPM, levels in equal steps, steady
-    brightness, near and far by percentiles. `changes` are fields of `SessionOptions`."""
+def session_options(method: Network | Method | None = None, display: Display | None = None, **changes) -> SessionOptions:
+    """What is usual: holograms of the display's resolution by the pair of networks that is built in for its offset, or by a
+    network or another method and AA-DPM; levels in equal steps, steady brightness, near and far by percentiles. `changes` are
+    fields of `SessionOptions`."""
     display = display or Display()
+    if method is None:
+        pair = built_in_pair(display.offset_mm)
+        return session_options(pair.hologram, display, **({"encoding": Encoding.DEEP(prefilter=pair.prefilter)} | changes))
     method = Method.TRAINED(network=method) if isinstance(method, Network) else method
     usual = {
         "display": display,

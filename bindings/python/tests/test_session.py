@@ -12,6 +12,7 @@ from phasefront import (
     ColourFormat,
     DropReason,
     Dropped,
+    Encoding,
     Failed,
     Frame,
     LogLevel,
@@ -243,6 +244,18 @@ def test_networks_that_are_none_are_named(tmp_path):
         Network.from_bytes(b"")
     info = Network.built_in().info()
     assert (info.layers, info.pitch_um) == (8, 8.0)
+
+
+def test_the_pair_that_is_built_in_is_usual():
+    for offset_mm in (0, 6, 12):
+        display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
+        options = session_options(display=display)
+        assert isinstance(options.encoding, Encoding.DEEP)
+        with Session(options) as session:
+            frame = Frame(numpy.full((48, 64, 3), 200, numpy.uint8), numpy.ones((48, 64), numpy.float32))
+            assert session.process(frame).levels.shape == (3, 48, 64)
+    with pytest.raises(PhasefrontError.Network, match="pairs for 0, 6 and 12"):
+        session_options(display=phasefront.Display(offset_mm=3))
 
 
 def test_settings_that_cannot_be_meant_are_named(network, display):

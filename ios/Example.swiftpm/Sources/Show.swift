@@ -18,7 +18,7 @@ final class Show: ObservableObject {
     func run() async {
         do {
             try Log.sendToSystem()
-            var options = SessionOptions(display: display, network: try Network.builtIn())
+            var options = try SessionOptions(display: display)
             options.targetRateHz = 30
             let session = try Session(options, mode: .liveStream)
             let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()

@@ -4,7 +4,7 @@ import Foundation
 /// ``close()`` wait for a frame: not for the main thread.
 ///
 /// ```swift
-/// let session = try Session(SessionOptions(network: Network.builtIn()), mode: .image)
+/// let session = try Session(SessionOptions(), mode: .image)
 /// let hologram = try session.process(frame)
 /// try hologram.withPlane(.green) { levels in print(levels.count) }
 /// ```
@@ -90,13 +90,20 @@ public final class Session: Sendable {
 }
 
 extension SessionOptions {
-    /// What is usual: holograms of `display`'s resolution by `network`; AA-DPM, levels in equal steps, steady brightness,
-    /// near and far by percentiles. Change what is not.
+    /// What is usual: holograms of `display`'s resolution by the pair of networks that is built in for its offset; levels in
+    /// equal steps, steady brightness, near and far by percentiles. Change what is not.
+    public init(display: Display = Display()) throws {
+        let pair = try builtInPair(offsetMm: display.offsetMm)
+        self.init(display: display, network: pair.hologram)
+        encoding = .deep(prefilter: pair.prefilter)
+    }
+
+    /// The same by `network` alone, and AA-DPM.
     public init(display: Display = Display(), network: Network) {
         self.init(display: display, method: .trained(network: network))
     }
 
-    /// The same by `method`.
+    /// The same by `method`, and AA-DPM.
     public init(display: Display = Display(), method: Method) {
         self.init(
             display: display,

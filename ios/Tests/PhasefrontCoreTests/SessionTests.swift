@@ -257,6 +257,15 @@ final class SessionTests: XCTestCase {
         assertRefused("line 1") { try displayFromToml(text: "width = ") }
     }
 
+    func testThePairThatIsBuiltInIsUsual() throws {
+        for offset in [0.0, 6, 12] {
+            let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
+            guard case .deep = usual.encoding else { return XCTFail("\(usual.encoding)") }
+            _ = try Session(usual, mode: .image).process(still())
+        }
+        assertRefused("pairs for 0, 6 and 12") { try SessionOptions(display: Display(offsetMm: 3)) }
+    }
+
     func testMessagesReachTheLog() throws {
         let messages = Locked<[(LogLevel, String)]>([])
         try Log.send(.info) { level, message in messages.withLock { $0.append((level, message)) } }

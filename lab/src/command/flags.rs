@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use phasefront::depth::DepthUnit;
 use phasefront::encode::Encoding;
 use phasefront::gpu::DeviceOptions;
-use phasefront::{Network, RgbdFrame};
+use phasefront::{Display, Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::rgbd::{self, DepthOptions};
 use phasefront_lab::{Error, Result, gpu, models};
@@ -39,25 +39,65 @@ impl DisplayFlags {
 /// How the field becomes phases.
 #[derive(Args)]
 pub(crate) struct EncoderFlags {
-    /// How the field becomes phases
-    #[arg(long, value_enum, default_value_t = EncoderName::AntiAlias)]
-    encoder: EncoderName,
-    /// ONNX file of the pre-filter of --encoder deep, trained for the offset
-    #[arg(long, value_name = "FILE", required_if_eq("encoder", "deep"))]
+    /// How the field becomes phases [default: deep by the networks that come along, where they are for the display, its
+    /// offset, and no other network or method is asked for; else anti-alias]
+    #[arg(long, value_enum)]
+    encoder: Option<EncoderName>,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: the one of --network ddpm-8]
+    #[arg(long, value_name = "FILE")]
     prefilter: Option<String>,
 }
 
+/// How a field becomes phases, and what it is called.
+pub(crate) struct Encoder {
+    pub(crate) encoding: Encoding,
+    pub(crate) name: &'static str,
+}
+
 impl EncoderFlags {
-    pub(crate) fn read(&self) -> Result<Encoding> {
+    /// For fields that no network of a pair makes.
+    pub(crate) fn read(&self) -> Result<Encoder> {
         let prefilter = match &self.prefilter {
             Some(file) => Some(models::network(file, false)?),
             None => None,
         };
-        self.encoder.encoding(prefilter)
+        let name = self.encoder.unwrap_or(EncoderName::AntiAlias);
+        Ok(Encoder {
+            encoding: name.encoding(prefilter)?,
+            name: name.name(),
+        })
     }
 
-    pub(crate) fn name(&self) -> &'static str {
-        self.encoder.name()
+    /// The network called `network`, and the encoder that belongs to it or is asked for: with neither named, the pair that
+    /// comes along for `display`.
+    pub(crate) fn with_network(
+        &self,
+        network: Option<&str>,
+        int8: bool,
+        display: &Display,
+    ) -> Result<(Arc<Network>, Encoder)> {
+        let by_name = network == Some(models::DEEP);
+        let deep = matches!(self.encoder, None | Some(EncoderName::Deep));
+        if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
+            if let Some((hologram, prefilter)) = models::pair_for(display, int8)? {
+                let name = EncoderName::Deep.name();
+                let encoding = Encoding::Deep(prefilter);
+                return Ok((hologram, Encoder { encoding, name }));
+            }
+            if by_name || self.encoder.is_some() {
+                let offsets = models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+                return Err(Error::Input(format!(
+                    "networks for the deep encoder come along for offsets of {} mm and the usual display; train a pair for this one, or take --network 8 --encoder anti-alias",
+                    offsets.collect::<Vec<_>>().join(", ")
+                )));
+            }
+        } else if by_name {
+            return Err(Error::Input(format!(
+                "--network {} brings its own --encoder, deep, and --prefilter; leave them out",
+                models::DEEP
+            )));
+        }
+        Ok((models::network(network.unwrap_or("8"), int8)?, self.read()?))
     }
 }
 

@@ -1,11 +1,11 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{BackendFlags, DisplayFlags, EncoderFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, FrameFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::depth::sharpness;
-use phasefront::encode::{Encoding, Scale};
+use phasefront::encode::Scale;
 use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
 use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
@@ -30,8 +30,8 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along, or an ONNX file [default: 8; seeded-6 with --method seeded]
-    #[arg(long, value_name = "8|15|seeded-6|FILE")]
+    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder); seeded-6 with --method seeded]
+    #[arg(long, value_name = "ddpm-8|8|15|seeded-6|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -135,6 +135,7 @@ pub(super) fn sweep_for(
 struct Made {
     field: Option<Array3<Complex32>>,
     levels: Array3<u8>,
+    encoder: &'static str,
     scale: f32,
     stages: Vec<(&'static str, Duration)>,
     engine: Option<String>,
@@ -152,7 +153,6 @@ impl Hologram {
                 ));
             }
         }
-        let encoding = self.encoder.read()?;
         let display = self.display.read()?;
         let method = self.method.unwrap_or(match self.ldi {
             Some(_) => Method::Layers,
@@ -175,23 +175,26 @@ impl Hologram {
             (method, _) => method,
         };
         let made = match (method, &self.ldi) {
-            (Method::Network | Method::Seeded, None) => {
-                let (stage, usual) = match method {
-                    Method::Seeded => ("seeded", models::SEEDED),
-                    _ => ("network", "8"),
-                };
-                let name = self.network.as_deref().unwrap_or(usual);
+            (Method::Network, None) => {
+                let int8 = self.precision.is_int8();
+                let name = self.network.as_deref();
+                let (network, encoder) =
+                    (self.encoder).with_network(name, int8, &display.display)?;
+                let method = phasefront::Method::trained(network);
+                self.by_core("network", method, &display, encoder, device.as_ref())?
+            }
+            (Method::Seeded, None) => {
+                let name = self.network.as_deref().unwrap_or(models::SEEDED);
                 let network = models::network(name, self.precision.is_int8())?;
-                let method = match method {
-                    Method::Seeded => phasefront::Method::Seeded(network),
-                    _ => phasefront::Method::trained(network),
-                };
-                self.by_core(stage, method, &display, encoding, device.as_ref())?
+                let method = phasefront::Method::Seeded(network);
+                let encoder = self.encoder.read()?;
+                self.by_core("seeded", method, &display, encoder, device.as_ref())?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_core("sweep", method, &display, encoding, device.as_ref())?
+                let encoder = self.encoder.read()?;
+                self.by_core("sweep", method, &display, encoder, device.as_ref())?
             }
             (Method::Auto, _) | (Method::Network | Method::Sweep | Method::Seeded, Some(_)) => {
                 return Err(Error::Input(
@@ -204,13 +207,13 @@ impl Hologram {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display, encoding)?
+                self.by_physics(method, &ldi, &display, self.encoder.read()?)?
             }
         };
         let info = HologramInfo {
             calibrated: display.calibrated(true),
             display: display.display.clone(),
-            encoder: Some(self.encoder.name().into()),
+            encoder: Some(made.encoder.into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
         };
@@ -235,12 +238,12 @@ impl Hologram {
         stage: &'static str,
         method: phasefront::Method,
         display: &DisplayFile,
-        encoding: Encoding,
+        encoder: Encoder,
         device: Option<&DeviceOptions>,
     ) -> Result<Made> {
         match device {
-            Some(options) => self.on_gpu(stage, method, display, encoding, options),
-            None => self.on_cpu(stage, method, display, encoding),
+            Some(options) => self.on_gpu(stage, method, display, encoder, options),
+            None => self.on_cpu(stage, method, display, encoder),
         }
     }
 
@@ -249,7 +252,7 @@ impl Hologram {
         stage: &'static str,
         method: phasefront::Method,
         display: &DisplayFile,
-        encoding: Encoding,
+        encoder: Encoder,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
@@ -258,7 +261,7 @@ impl Hologram {
             width,
             method,
             &display.display,
-            encoding,
+            encoder.encoding,
             self.scale(),
             display.response()?,
         )?;
@@ -280,6 +283,7 @@ impl Hologram {
         Ok(Made {
             field: kept.map(|values| stack(values, height, width)),
             levels,
+            encoder: encoder.name,
             scale: modulation.scale,
             stages: vec![
                 (stage, predict),
@@ -296,7 +300,7 @@ impl Hologram {
         stage: &'static str,
         method: phasefront::Method,
         display: &DisplayFile,
-        encoding: Encoding,
+        encoder: Encoder,
         options: &DeviceOptions,
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
@@ -307,7 +311,7 @@ impl Hologram {
             width,
             method,
             &display.display,
-            encoding,
+            encoder.encoding,
             scale,
             response,
         );
@@ -324,6 +328,7 @@ impl Hologram {
         Ok(Made {
             field: None,
             levels,
+            encoder: encoder.name,
             scale: report.scale,
             stages: vec![
                 ("input", times.input),
@@ -341,11 +346,11 @@ impl Hologram {
         method: Method,
         ldi: &Ldi,
         file: &DisplayFile,
-        encoding: Encoding,
+        encoder: Encoder,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
         let display = &file.display;
-        let mut modulator = file.modulator((height, width), encoding, self.scale())?;
+        let mut modulator = file.modulator((height, width), encoder.encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (constant, varying) = match (method, file.constant_correction()) {
             (_, Ok(constant)) => (constant, None),
@@ -397,6 +402,7 @@ impl Hologram {
         Ok(Made {
             field: kept.map(|values| stack(values, height, width)),
             levels,
+            encoder: encoder.name,
             scale: modulation.scale,
             stages: vec![
                 (stage, waved - start),
@@ -425,7 +431,7 @@ impl Hologram {
             json,
             &json!({
                 "output": self.output, "complex": self.complex, "width": width, "height": height,
-                "scale": made.scale, "engine": made.engine, "stage_ms": stages, "total_ms": ms(&total),
+                "encoder": made.encoder, "scale": made.scale, "engine": made.engine, "stage_ms": stages, "total_ms": ms(&total),
             }),
             format!(
                 "{}: {width}×{height}, {}",

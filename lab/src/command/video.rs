@@ -38,9 +38,9 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = MethodName::Network)]
     method: MethodName,
-    /// Layers of a network that comes along (8, 15), or an ONNX file
-    #[arg(long, value_name = "8|15|FILE", default_value = "8")]
-    network: String,
+    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder)]
+    #[arg(long, value_name = "ddpm-8|8|15|FILE")]
+    network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
@@ -300,18 +300,22 @@ impl Video {
             )));
         }
         let display: Display = file.display.clone().with_size(height, width)?;
-        let method = match self.method {
+        let (name, int8) = (self.network.as_deref(), self.precision.is_int8());
+        let sweep = Sweep::for_display(&display);
+        let (method, encoder) = match self.method {
             MethodName::Network => {
-                Method::trained(models::network(&self.network, self.precision.is_int8())?)
+                let (network, encoder) = self.encoder.with_network(name, int8, &display)?;
+                (Method::trained(network), encoder)
             }
             MethodName::Seeded => {
-                Method::Seeded(models::network(models::SEEDED, self.precision.is_int8())?)
+                let network = models::network(name.unwrap_or(models::SEEDED), int8)?;
+                (Method::Seeded(network), self.encoder.read()?)
             }
-            MethodName::Sweep => Method::Sweep(Sweep::for_display(&display)),
-            MethodName::Auto => Method::BySharpness(
-                Sweep::for_display(&display),
-                models::network(&self.network, self.precision.is_int8())?,
-            ),
+            MethodName::Sweep => (Method::Sweep(sweep), self.encoder.read()?),
+            MethodName::Auto => {
+                let network = models::network(name.unwrap_or("8"), int8)?;
+                (Method::BySharpness(sweep, network), self.encoder.read()?)
+            }
         };
         let mut options = SessionOptions::new(display.clone(), method)?;
         if display.bits() <= 8 {
@@ -319,7 +323,7 @@ impl Video {
         }
         options.illumination = file.laser.clone();
         options.correction = file.constant_correction()?;
-        options.encoding = self.encoder.read()?;
+        options.encoding = encoder.encoding;
         options.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
             BrightnessName::Max => Brightness::FrameMax,
@@ -352,7 +356,7 @@ impl Video {
         }
         let info = HologramInfo {
             display,
-            encoder: Some(self.encoder.name().into()),
+            encoder: Some(encoder.name.into()),
             scale: None,
             lut: file.lut.map(Vec::from),
             calibrated: file.calibrated(true),

@@ -42,8 +42,8 @@ impl AntiAlias {
 
     /// Working memory for rows of `width` values, one call at a time: some rows for each part of a plane.
     pub fn scratch(&self, width: usize) -> AntiAliasScratch {
-        // Rows blurred along themselves, in a ring, and one blurred both ways.
-        let rows = 2 * (self.taps.len() - 1) + 2;
+        // Rows blurred along themselves, in a ring and behind a part's end, and one blurred both ways.
+        let rows = 3 * (self.taps.len() - 1) + 2;
         AntiAliasScratch {
             rows: vec![Complex32::ZERO; 2 * rayon::current_num_threads() * rows * width],
             part: rows * width,
@@ -81,25 +81,87 @@ impl AntiAlias {
                             self.blur_row(&plane[next * width..][..width], ring);
                             next += 1;
                         }
-                        let row = |y: usize| &ring[y % count * width..][..width];
-                        // Here, for a store to the row could change what is read anew in each turn.
-                        let tap = self.taps[0];
-                        let centre = values(row(y));
-                        for (to, from) in values_mut(blurred).iter_mut().zip(centre) {
-                            *to = from * tap;
-                        }
-                        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
-                            let up = values(row(y.saturating_sub(i)));
-                            let down = values(row((y + i).min(height - 1)));
-                            let sums = values_mut(blurred).iter_mut();
-                            for ((to, up), down) in sums.zip(up).zip(down) {
-                                *to += (up + down) * tap;
-                            }
-                        }
+                        self.blur_down(ring, y, height, blurred);
                     });
                     then(y, blurred, out);
                 }
             });
+    }
+
+    /// Replaces `plane`, (H, W), by itself blurred. The bits of [`Self::rows`]; allocates nothing.
+    pub fn in_place(&self, plane: &mut [Complex32], width: usize, scratch: &mut AntiAliasScratch) {
+        let height = plane.len() / width;
+        let half = self.taps.len() - 1;
+        let count = 2 * half + 1;
+        let AntiAliasScratch { rows, part } = scratch;
+        let band = height.div_ceil(rows.len() / *part);
+        // What parts read of their neighbours, before anyone writes.
+        let before = &*plane;
+        rows.par_chunks_exact_mut(*part)
+            .zip(before.par_chunks(band * width))
+            .enumerate()
+            .for_each(|(part, (own, plane))| {
+                let first = part * band;
+                let end = first + plane.len() / width;
+                let (ring, after) = own.split_at_mut(count * width);
+                let row = |y: usize| &before[y * width..][..width];
+                wide!({
+                    for y in first.saturating_sub(half)..first {
+                        self.blur_row(row(y), &mut ring[y % count * width..][..width]);
+                    }
+                    let behind = end..(end + half).min(height);
+                    for (y, after) in behind.zip(after.chunks_exact_mut(width)) {
+                        self.blur_row(row(y), after);
+                    }
+                });
+            });
+        plane
+            .par_chunks_mut(band * width)
+            .zip(rows.par_chunks_exact_mut(*part))
+            .enumerate()
+            .for_each(|(part, (plane, own))| {
+                let first = part * band;
+                let end = first + plane.len() / width;
+                let (ring, rest) = own.split_at_mut(count * width);
+                let (after, blurred) = rest.split_at_mut(half * width);
+                let mut next = first;
+                for y in first..end {
+                    wide!({
+                        while next <= (y + half).min(height - 1) {
+                            let ring = &mut ring[next % count * width..][..width];
+                            match next.checked_sub(end) {
+                                None => {
+                                    self.blur_row(&plane[(next - first) * width..][..width], ring)
+                                }
+                                Some(i) => ring.copy_from_slice(&after[i * width..][..width]),
+                            }
+                            next += 1;
+                        }
+                        self.blur_down(ring, y, height, blurred);
+                    });
+                    plane[(y - first) * width..][..width].copy_from_slice(blurred);
+                }
+            });
+    }
+
+    /// Row `y` of `height` blurred, of a ring of rows that are blurred along themselves.
+    #[inline(always)]
+    fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
+        let width = blurred.len();
+        let count = ring.len() / width;
+        let row = |y: usize| values(&ring[y % count * width..][..width]);
+        // Here, for a store to the row could change what is read anew in each turn.
+        let tap = self.taps[0];
+        for (to, from) in values_mut(blurred).iter_mut().zip(row(y)) {
+            *to = from * tap;
+        }
+        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
+            let (up, down) = (row(y.saturating_sub(i)), row((y + i).min(height - 1)));
+            let sums = values_mut(blurred).iter_mut();
+            for ((to, up), down) in sums.zip(up).zip(down) {
+                *to += (up + down) * tap;
+            }
+        }
     }
 
     /// The blur of `plane`, (H, W), value by value: the oracle of [`Self::rows`], to the bit.
@@ -204,6 +266,9 @@ mod tests {
         let mut naive = plane.clone();
         plan.filter(&mut naive, w);
         assert_eq!(out, naive);
+        let mut in_place = plane.clone();
+        plan.in_place(&mut in_place, w, &mut plan.scratch(w));
+        assert_eq!(in_place, naive);
         let half = taps as i32 / 2;
         let weight = |i: i32| (-0.5 * (f64::from(i) / f64::from(sigma)).powi(2)).exp();
         let sum: f64 = (-half..=half).map(weight).sum();

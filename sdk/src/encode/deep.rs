@@ -1,25 +1,41 @@
 //! The deep double phase method's pre-filter (DDPM, Eq. 6): a small network that was trained, together with the one that
 //! made the field and through encoding and aperture, to leave what double phase can show.
 //!
-//! It reads the field at the modulator as it is, its phase included: neither a mean phase is taken out nor is it scaled.
+//! It reads the field at the modulator, its phase included: neither a mean phase is taken out nor is it scaled. Where it
+//! asks for that, AA-DPM's blur has gone over the field first.
 
+use super::anti_alias::{AntiAlias, AntiAliasScratch};
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::method::check_display;
-use crate::network::{FilterPlan, FilterScratch, Network};
+use crate::network::{FilterPlan, FilterScratch, InputKind, Network};
 use num_complex::Complex32;
 
 /// How far the modulator may stand from where a pre-filter was trained for: what light spreads over it stays below a
 /// tenth of a pixel of 8 µm.
 const OFFSET_TOLERANCE_M: f64 = 20e-6;
 
+/// The blur that pre-filters for [`InputKind::BlurredField`] are trained behind.
+///
+/// # Errors
+/// None.
+pub(crate) fn blur() -> Result<AntiAlias> {
+    AntiAlias::new(0.7, 3)
+}
+
 /// A pre-filter for one shape.
 pub struct Deep {
+    /// (H, W).
+    shape: (usize, usize),
+    blur: Option<AntiAlias>,
     network: FilterPlan,
 }
 
 /// Working memory of [`Deep::filter`].
-pub struct DeepScratch(FilterScratch);
+pub struct DeepScratch {
+    blur: Option<AntiAliasScratch>,
+    network: FilterScratch,
+}
 
 impl Deep {
     /// Plans the filtering of (3, `height`, `width`) fields.
@@ -27,14 +43,20 @@ impl Deep {
     /// # Errors
     /// A network that is no pre-filter, or that the kernels do not take.
     pub fn new(height: usize, width: usize, network: &Network) -> Result<Self> {
+        let blurred = network.input() == InputKind::BlurredField;
         Ok(Deep {
+            shape: (height, width),
+            blur: blurred.then(blur).transpose()?,
             network: network.filter_plan(height, width)?,
         })
     }
 
     /// Working memory for one call at a time.
     pub fn scratch(&self) -> DeepScratch {
-        DeepScratch(self.network.scratch())
+        DeepScratch {
+            blur: self.blur.as_ref().map(|blur| blur.scratch(self.shape.1)),
+            network: self.network.scratch(),
+        }
     }
 
     /// Replaces `field`, (3, H, W) at the modulator, by the pre-encoding field.
@@ -42,7 +64,13 @@ impl Deep {
     /// # Panics
     /// If `field` has not 3·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut DeepScratch) {
-        self.network.filter(field, &mut scratch.0);
+        let (height, width) = self.shape;
+        if let (Some(blur), Some(scratch)) = (&self.blur, &mut scratch.blur) {
+            for plane in field.chunks_exact_mut(height * width) {
+                blur.in_place(plane, width, scratch);
+            }
+        }
+        self.network.filter(field, &mut scratch.network);
     }
 }
 

@@ -11,6 +11,7 @@ use crate::brightness::{Brightness, Past};
 use crate::encode::Encoding;
 use crate::encode::anti_alias::AntiAlias;
 use crate::encode::band_limit::BandLimit;
+use crate::encode::deep;
 use crate::illumination::Illumination;
 use crate::network::{InputKind, Network};
 use crate::slm::{Response, per_pixel};
@@ -143,22 +144,30 @@ impl Encoder {
                 )?);
             }
             Encoding::Deep(network) => {
-                let made = Prefilter::new(device, network, field, size, options)?;
+                let mut made = Prefilter::new(device, network, field, size, options)?;
+                if network.input() == InputKind::BlurredField {
+                    let blur = deep::blur()?;
+                    let blur = Blur {
+                        device,
+                        frame: &frame,
+                        taps: blur.taps(),
+                        size,
+                    };
+                    made.blur = blur.steps(field, None)?.into();
+                }
                 seen = made.chain.field.clone();
                 prefilter = Some(made);
             }
         }
         let mut half = taps.len() - 1;
         if half > FUSED_HALF {
-            let room = device.buffer("the blurred field", 24 * height * width)?;
             let blur = Blur {
                 device,
                 frame: &frame,
                 taps: &taps,
                 size,
             };
-            before.push(blur.step((1, 0), field, &room, turn.take())?);
-            before.push(blur.step((0, 1), &room, field, None)?);
+            before.extend(blur.steps(field, turn.take())?);
             half = 0;
         }
         taps.resize(3, 0.0);
@@ -286,6 +295,7 @@ impl Encoder {
             steadier.run(pass);
         }
         if let Some(prefilter) = &self.prefilter {
+            prefilter.blur.iter().for_each(|step| step.run(pass));
             prefilter.packer.run(pass);
             prefilter.chain.run(pass);
         }
@@ -307,6 +317,8 @@ impl Encoder {
 
 /// DDPM's network on a field.
 struct Prefilter {
+    /// Where the network asks for it.
+    blur: Vec<Dispatch>,
     packer: Packer,
     chain: ChainPlan,
 }
@@ -319,7 +331,7 @@ impl Prefilter {
         size: (usize, usize),
         options: ChainOptions,
     ) -> Result<Self> {
-        if network.input() != InputKind::Field {
+        if !network.input().is_field() {
             return Err(crate::Error::Network(format!(
                 "a pre-filter takes 'field', this network '{}'",
                 network.input()
@@ -338,7 +350,11 @@ impl Prefilter {
         let end = End::Field(network.head(), InputKind::Field);
         let (input, fusion) = (&packer.input, options.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
-        Ok(Prefilter { packer, chain })
+        Ok(Prefilter {
+            blur: Vec::new(),
+            packer,
+            chain,
+        })
     }
 }
 
@@ -350,6 +366,16 @@ struct Blur<'a> {
 }
 
 impl Blur<'_> {
+    /// Along x, with the mean phase taken out where `turn` says it, then along y back into `field`.
+    fn steps(&self, field: &wgpu::Buffer, turn: Option<&wgpu::Buffer>) -> Result<[Dispatch; 2]> {
+        let (height, width) = self.size;
+        let room = (self.device).buffer("the blurred field", 24 * height * width)?;
+        Ok([
+            self.step((1, 0), field, &room, turn)?,
+            self.step((0, 1), &room, field, None)?,
+        ])
+    }
+
     fn step(
         &self,
         along: (i32, i32),

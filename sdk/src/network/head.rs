@@ -94,7 +94,7 @@ impl Head {
             for (piece, out) in field.chunks_mut(PIECE).enumerate() {
                 let (at, count) = (piece * PIECE, out.len());
                 match kind {
-                    InputKind::Field => {
+                    InputKind::Field | InputKind::BlurredField => {
                         base(c, at, &mut re[..count]);
                         base(3 + c, at, &mut im[..count]);
                     }

@@ -22,6 +22,9 @@ pub enum InputKind {
     Seeded,
     /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,
+    /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network is
+    /// small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
+    BlurredField,
 }
 
 impl InputKind {
@@ -32,8 +35,13 @@ impl InputKind {
             InputKind::RgbdXy => 6,
             InputKind::Ldi { layers } => 4 * layers,
             InputKind::Seeded => 10,
-            InputKind::Field => 6,
+            InputKind::Field | InputKind::BlurredField => 6,
         }
+    }
+
+    /// Whether a network for it is a pre-filter.
+    pub fn is_field(self) -> bool {
+        matches!(self, InputKind::Field | InputKind::BlurredField)
     }
 
     fn from_name(name: &str) -> Option<InputKind> {
@@ -42,6 +50,7 @@ impl InputKind {
             b"rgbdxy" => Some(InputKind::RgbdXy),
             b"seeded" => Some(InputKind::Seeded),
             b"field" => Some(InputKind::Field),
+            b"blurred-field" => Some(InputKind::BlurredField),
             [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
                 layers: usize::from(n - b'0'),
             }),
@@ -58,12 +67,13 @@ impl std::fmt::Display for InputKind {
             InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
             InputKind::Seeded => f.write_str("seeded"),
             InputKind::Field => f.write_str("field"),
+            InputKind::BlurredField => f.write_str("blurred-field"),
         }
     }
 }
 
 /// What `phasefront.input` may be.
-const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9' or 'field'";
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field' or 'blurred-field'";
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]

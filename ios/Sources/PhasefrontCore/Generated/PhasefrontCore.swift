@@ -2647,6 +2647,75 @@ public func FfiConverterTypeConfidenceInfo_lower(_ value: ConfidenceInfo) -> Rus
 
 
 /**
+ * A hologram network and the pre-filter that was trained with it, for the deep double phase method.
+ */
+public struct DeepPair {
+    /**
+     * Makes the hologram.
+     */
+    public var hologram: Network
+    /**
+     * Prepares it for its encoding.
+     */
+    public var prefilter: Network
+
+    // Default memberwise initializers are never public by default, so we
+    // declare one manually.
+    public init(
+        /**
+         * Makes the hologram.
+         */hologram: Network, 
+        /**
+         * Prepares it for its encoding.
+         */prefilter: Network) {
+        self.hologram = hologram
+        self.prefilter = prefilter
+    }
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension DeepPair: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeDeepPair: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> DeepPair {
+        return
+            try DeepPair(
+                hologram: FfiConverterTypeNetwork.read(from: &buf), 
+                prefilter: FfiConverterTypeNetwork.read(from: &buf)
+        )
+    }
+
+    public static func write(_ value: DeepPair, into buf: inout [UInt8]) {
+        FfiConverterTypeNetwork.write(value.hologram, into: &buf)
+        FfiConverterTypeNetwork.write(value.prefilter, into: &buf)
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeDeepPair_lift(_ buf: RustBuffer) throws -> DeepPair {
+    return try FfiConverterTypeDeepPair.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeDeepPair_lower(_ value: DeepPair) -> RustBuffer {
+    return FfiConverterTypeDeepPair.lower(value)
+}
+
+
+/**
  * What a depth image is.
  */
 public struct DepthInfo: Equatable, Hashable {
@@ -6579,6 +6648,21 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
     )
 }
 }
+/**
+ * The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default display's
+ * pitch, colours and volume.
+ *
+ * # Errors
+ * Another offset, or a library that was built without them.
+ */
+public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
+    return try  FfiConverterTypeDeepPair_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_built_in_pair(
+        FfiConverterDouble.lower(offsetMm),uniffiCallStatus
+    )
+})
+}
 
 private enum InitializationResult {
     case ok
@@ -6602,6 +6686,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 8380) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_calibrateddisplay_display() != 31939) {

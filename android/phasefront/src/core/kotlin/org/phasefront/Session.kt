@@ -11,7 +11,7 @@ import kotlinx.coroutines.flow.flow
  * frame: not for the main thread.
  *
  * ```kotlin
- * Session(sessionOptions(Network.builtIn()), RunningMode.IMAGE).use { session ->
+ * Session(sessionOptions(), RunningMode.IMAGE).use { session ->
  *     session.process(frame).use { hologram -> hologram.usePlane(Colour.GREEN) { println(it.remaining()) } }
  * }
  * ```
@@ -126,13 +126,19 @@ public sealed interface SessionEvent {
 }
 
 /**
- * What is usual: holograms of [display]'s resolution by [network]; AA-DPM, levels in equal steps, steady brightness, near
- * and far by percentiles. Change what is not with `copy`.
+ * What is usual: holograms of [display]'s resolution by the pair of networks that is built in for its offset; levels in
+ * equal steps, steady brightness, near and far by percentiles. Change what is not with `copy`.
  */
+public fun sessionOptions(display: Display = Display()): SessionOptions {
+    val pair = builtInPair(display.offsetMm)
+    return sessionOptions(pair.hologram, display).copy(encoding = Encoding.Deep(pair.prefilter))
+}
+
+/** The same by [network] alone, and AA-DPM. */
 public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions =
     sessionOptions(Method.Trained(network), display)
 
-/** The same by [method]. */
+/** The same by [method], and AA-DPM. */
 public fun sessionOptions(method: Method, display: Display = Display()): SessionOptions = SessionOptions(
     display = display,
     ladder = listOf(Rung(method, display.width, display.height)),

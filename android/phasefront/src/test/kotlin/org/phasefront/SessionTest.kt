@@ -283,6 +283,16 @@ class SessionTest {
     }
 
     @Test
+    fun thePairThatIsBuiltInIsUsual() {
+        for (offset in listOf(0.0, 6.0, 12.0)) {
+            val usual = sessionOptions(display.copy(offsetMm = offset))
+            assertTrue(usual.encoding is Encoding.Deep)
+            Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        }
+        assertRefused<PhasefrontException.Network>("pairs for 0, 6 and 12") { sessionOptions(display.copy(offsetMm = 3.0)) }
+    }
+
+    @Test
     fun settingsThatCannotBeMeantAreNamed() {
         fun make(change: SessionOptions.() -> SessionOptions): () -> Any? = { Session(options().change(), RunningMode.IMAGE) }
         assertRefused<PhasefrontException.Setting>("ladder is empty", make { copy(ladder = listOf()) })

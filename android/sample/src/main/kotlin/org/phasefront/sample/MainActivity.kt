@@ -96,7 +96,7 @@ class MainActivity : Activity() {
     private fun run() {
         if (session != null) return
         try {
-            session = Session(sessionOptions(Network.builtIn(), hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
+            session = Session(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
         } catch (refused: PhasefrontException) {
             return say(refused.message.orEmpty())
         }
