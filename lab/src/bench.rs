@@ -116,13 +116,18 @@ pub fn measure(case: &Case<'_>, display: &Display, budget: Duration) -> Result<R
     pool.install(|| measure_here(case, display, budget))
 }
 
-fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
-    let (width, height) = case.size;
-    let (name, network) = match case.method {
+/// A method's name, which is also that of its stage, and its network.
+fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
+    match method {
         Method::Network(network) => ("network", Some(network)),
         Method::Seeded(network) => ("seeded", Some(network)),
         _ => ("sweep", None),
-    };
+    }
+}
+
+fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
+    let (width, height) = case.size;
+    let (name, network) = named(case.method);
     forget_peak_memory();
     let pipeline = Pipeline::new(
         height,

@@ -663,6 +663,33 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
         "{report}"
     );
 
+    let sweep = [
+        "--method",
+        "sweep",
+        "--scale",
+        "1",
+        "--offset-mm",
+        "3",
+        "--json",
+    ];
+    folder.succeeds(&with(&[&sweep[..], &["-o", "cpu.png"]].concat()));
+    let more = ["--backend", "gpu", "--gpu", "llvmpipe", "-o", "gpu.png"];
+    let swept = on_gpu(&with(&[&sweep[..], &more].concat()));
+    let errors = String::from_utf8(swept.stderr).unwrap();
+    assert!(swept.status.success(), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&swept.stdout).unwrap();
+    assert!(report["stage_ms"]["sweep"].is_number(), "{report}");
+    let (cpu, gpu) = (levels("cpu.png"), levels("gpu.png"));
+    let differing = cpu.iter().zip(&gpu).filter(|pair| apart(*pair)).count();
+    assert!(differing * 100 < cpu.len(), "{differing} of {}", cpu.len());
+    let more = ["--size", "48x32", "--layers", "0"];
+    let measured = on_gpu(&[&bench[..], &more].concat());
+    let errors = String::from_utf8(measured.stderr).unwrap();
+    assert!(measured.status.success(), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&measured.stdout).unwrap();
+    assert_eq!(report["rows"].as_array().unwrap().len(), 1);
+    assert_eq!(report["rows"][0]["method"], "sweep");
+
     for (arguments, word) in [
         (with(&["--gpu", "x", "-o", "o.png"]), "--backend gpu"),
         (

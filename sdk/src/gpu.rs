@@ -35,12 +35,15 @@ mod chain;
 mod device;
 mod encode;
 mod fft;
+mod hidden;
 mod input;
+mod method;
 mod peak;
 mod pipeline;
 mod preview;
 mod probe;
 mod renderer;
+mod sweep;
 mod watch;
 
 pub use crate::brightness::{Brightness, Past};

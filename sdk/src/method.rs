@@ -36,6 +36,38 @@ impl Method {
             _ => Method::Network(network),
         }
     }
+
+    /// Whether it suits `display`.
+    pub(crate) fn check(&self, display: &Display) -> Result<()> {
+        let (network, input) = match self {
+            Method::Sweep(_) => return Ok(()),
+            Method::Network(network) if network.input() == InputKind::RgbdXy => {
+                (network, InputKind::RgbdXy)
+            }
+            Method::Network(network) => (network, InputKind::Rgbd),
+            Method::Seeded(network) => (network, InputKind::Seeded),
+            Method::BySharpness(_, network) => {
+                return Method::trained(network.clone()).check(display);
+            }
+        };
+        check_input(network, input)?;
+        check_display(network, display)
+    }
+}
+
+/// Plans `sweep` for (`height`, `width`) frames, on to a display that is not far away, else to the midpoint.
+pub(crate) fn sweep_plan(
+    height: usize,
+    width: usize,
+    sweep: Sweep,
+    display: &Display,
+) -> Result<SweepPlan> {
+    let offset_m = display.offset_m();
+    let z_m = match sweep::reaches(display, offset_m) {
+        true => offset_m,
+        false => 0.0,
+    };
+    SweepPlan::new(height, width, display, sweep, z_m)
 }
 
 /// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
@@ -67,29 +99,15 @@ impl MethodPlan {
     /// # Errors
     /// A network for layered input or for another display, or a method that cannot be planned for this shape.
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
+        method.check(display)?;
         let way = match method {
-            Method::Network(network) => {
-                if network.input() != InputKind::RgbdXy {
-                    check_input(&network, InputKind::Rgbd)?;
-                }
-                check_display(&network, display)?;
-                Way::Network(Box::new(network.plan(height, width)?))
-            }
+            Method::Network(network) => Way::Network(Box::new(network.plan(height, width)?)),
             Method::Seeded(network) => {
-                check_input(&network, InputKind::Seeded)?;
-                check_display(&network, display)?;
                 let plan = SeededPlan::new(height, width, &network, display)?;
                 Way::Seeded(Box::new(plan))
             }
             Method::Sweep(sweep) => {
-                let offset_m = display.offset_m();
-                let z_m = match sweep::reaches(display, offset_m) {
-                    true => offset_m,
-                    false => 0.0,
-                };
-                Way::Sweep(Box::new(SweepPlan::new(
-                    height, width, display, sweep, z_m,
-                )?))
+                Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?))
             }
             Method::BySharpness(sweep, network) => {
                 // Both end where the network does.

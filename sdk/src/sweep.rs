@@ -25,13 +25,16 @@ mod workers;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
-use filters::{Filters, Optics};
+use filters::Filters;
+pub(crate) use filters::Optics;
 use hidden::{Hidden, HiddenScratch};
 use num_complex::Complex32;
 use phasefront_kernels::Isa;
 use phasefront_kernels::fir::Fir;
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
+#[cfg(feature = "gpu")]
+pub(crate) use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
 use workers::Workers;
 
@@ -248,6 +251,12 @@ impl SweepPlan {
         self.z_m
     }
 
+    /// The filters of red, green and blue.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn filters(&self) -> &[Filters; 3] {
+        &self.filters
+    }
+
     /// How well the filters of red, green and blue fit.
     pub fn fit_errors(&self) -> [FitError; 3] {
         self.filters.each_ref().map(|filters| FitError {
@@ -356,7 +365,8 @@ pub fn reaches(display: &Display, z_m: f64) -> bool {
     reach_px(display, z_m.abs() + display.volume_depth_m() / 2.0) <= MAX_HOME_REACH as f64
 }
 
-fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
+/// The optics of red, green and blue between the planes of `sweep` and to `z_m`.
+pub(crate) fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
     if !z_m.is_finite() {
         return Err(Error::Plan(format!(
             "sweep: the hologram cannot stand at z = {z_m} m; it must be finite"

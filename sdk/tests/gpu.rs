@@ -18,7 +18,7 @@ use phasefront::gpu::{
 use phasefront::network::{Isa, reference};
 use phasefront::slm::Response;
 use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Method, Network, RgbdFrame};
+use phasefront::{Display, Illumination, Method, Network, RgbdFrame, Sweep};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
@@ -342,6 +342,124 @@ fn whole_frames_are_those_of_the_cpu() {
             "{what}: {} {expected_scale}",
             report.scale
         );
+    }
+}
+
+/// Swept to the midpoint and propagated, and swept on to the modulator; seeded networks in all numbers.
+#[test]
+fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
+    let Some(device) = device() else { return };
+    let display = Display::default();
+    let usual = Sweep::for_display(&display);
+    let plain = Sweep {
+        planes: 24,
+        taps: 11,
+        hidden_layers: 0,
+        between_planes: false,
+        ..usual
+    };
+    let model = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(5, 8)
+    };
+    let (float, int8) = (
+        model.bytes(),
+        Model {
+            int8: true,
+            ..model
+        }
+        .bytes(),
+    );
+    let seeded = |bytes: &[u8]| Method::Seeded(Arc::new(Network::from_onnx(bytes).unwrap()));
+    let half = match device.has_half() {
+        true => Float::F16,
+        false => Float::F32,
+    };
+    let f32 = Float::F32;
+    for (method, (h, w), offset_m, encoding, float, tolerance) in [
+        (
+            Method::Sweep(usual),
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            f32,
+            0.002,
+        ),
+        (
+            Method::Sweep(usual),
+            (47, 61),
+            3e-3,
+            Encoding::BAND_LIMIT,
+            f32,
+            0.002,
+        ),
+        (
+            Method::Sweep(plain),
+            (61, 47),
+            20e-3,
+            Encoding::DoublePhase,
+            f32,
+            0.002,
+        ),
+        (
+            seeded(&float),
+            (61, 47),
+            2e-3,
+            Encoding::ANTI_ALIAS,
+            f32,
+            0.002,
+        ),
+        (
+            seeded(&float),
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            half,
+            0.05,
+        ),
+        // A step of 8 bits to the other side is worth more than rounding.
+        (
+            seeded(&int8),
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            f32,
+            0.02,
+        ),
+    ] {
+        let display = display.clone().with_offset_m(offset_m).unwrap();
+        let response = Response::linear(8).unwrap();
+        let mut job = Job::new(h, w, method, &display, encoding, Scale::Max, response);
+        job.chain.float = float;
+        let frame = rgbd(h, w);
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let what = format!("{} {h}×{w} {offset_m}", plan.describe());
+        let apart = apart(&levels, &expected, &job.response);
+        println!("{what}: {apart} {report:?}");
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(
+            scales < tolerance,
+            "{what}: {} {expected_scale}",
+            report.scale
+        );
+        // In another form from then on; the sweep asks for the last bit of each depth.
+        let words: Vec<u16> = (frame.depth().iter())
+            .map(|d| (d * 65535.0).round() as u16)
+            .collect();
+        let frame = Frame {
+            depth: DepthData::U16(&words),
+            ..Frame::of(&frame)
+        };
+        plan.expect(Colour::Planar, Depth::U16).unwrap();
+        let mut again = vec![0; levels.len()];
+        plan.process(&frame, &mut again).unwrap();
+        assert!(again == levels, "{what}");
+        gpu::probe(&device, &job).unwrap();
     }
 }
 

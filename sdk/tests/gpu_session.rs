@@ -132,6 +132,34 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     }
 }
 
+/// The plane sweep, by itself and under a network, on rungs of their own, from camera frames.
+#[test]
+fn sweeps_are_those_of_the_cpu() {
+    let mut plain = options(W, H);
+    let seeded = Network::from_onnx(include_bytes!("../../models/seeded-6.onnx")).unwrap();
+    let sweep = Method::Sweep(Sweep::for_display(&plain.display));
+    for (method, word) in [
+        (sweep, "the sweep"),
+        (Method::Seeded(Arc::new(seeded)), "Layers"),
+    ] {
+        plain.ladder[0].method = method;
+        let Some(mut gpu) = on_gpu(plain.clone()) else {
+            return;
+        };
+        gpu.gpu.chain.float = Float::F32;
+        let cpu = Session::new(plain.clone(), RunningMode::Image).unwrap();
+        let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+        let expected = cpu.process(&frame_at(1)).unwrap();
+        let made = gpu.process(&frame_at(1)).unwrap();
+        assert!((made.scale() - expected.scale()).abs() < 1e-3 * expected.scale());
+        let share = differing(made.levels(), expected.levels(), 0.002);
+        assert!(share < 0.05, "{word}: {share}");
+        let backend = gpu.statistics().backend;
+        assert_eq!(backend.name, gpu.gpu().unwrap().name());
+        assert!(backend.why.contains(word), "{backend:?}");
+    }
+}
+
 /// Each colour format, turned and not, as frames of one session: only its input is planned again.
 #[test]
 fn cameras_may_change_their_format() {
@@ -273,8 +301,16 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut cases = vec![(missing, "no GPU")];
     if let Some(gpu) = on_gpu(options(W, H)) {
         let mut sweep = gpu.clone();
-        sweep.ladder[0].method = Method::Sweep(Sweep::for_display(&sweep.display));
-        cases.push((sweep, "plane sweeps"));
+        sweep.ladder[0].method = Method::Sweep(Sweep {
+            taps: 31,
+            ..Sweep::for_display(&sweep.display)
+        });
+        cases.push((sweep, "31 taps"));
+        let mut either = gpu.clone();
+        let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+        let sweep = Sweep::for_display(&either.display);
+        either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
+        cases.push((either, "sharpness"));
         let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
         let mut ten = SessionOptions::new(
             Display::from_toml(text).unwrap(),

@@ -1,7 +1,7 @@
 //! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
 //! measured in the same run.
 
-use super::median;
+use super::{median, named};
 use crate::error::Result;
 use phasefront::encode::{Encoding, Scale};
 use phasefront::frame::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
@@ -11,22 +11,24 @@ use phasefront::gpu::{
 };
 use phasefront::slm::Response;
 use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method, Network};
+use phasefront::{Display, Method};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What was measured of one network and frame size on a GPU. Times are milliseconds, medians over frames.
+/// What was measured of one method and frame size on a GPU. Times are milliseconds, medians over frames.
 #[derive(Debug, Clone, Serialize)]
 pub struct GpuRow {
-    /// Convolution layers.
+    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    pub method: &'static str,
+    /// Convolution layers; 0 without a network.
     pub layers: usize,
-    /// The numbers that the network was computed in: `f32`, `f16` or `int8`.
+    /// The numbers that the network, or a sweep by itself, was computed in: `f32`, `f16` or `int8`.
     pub precision: String,
     /// Always `gpu`.
     pub backend: &'static str,
-    /// The device, how many layers a dispatch computes, and how many dispatches the network takes.
+    /// The device, how many layers or planes a dispatch computes, and how many dispatches the method takes.
     pub kernels: String,
     /// Pixels.
     pub width: usize,
@@ -45,21 +47,21 @@ pub struct GpuRow {
     pub table_percent: Option<f64>,
     /// Frames that were measured one at a time.
     pub frames: usize,
-    /// The network's multiply-adds in its median time, 10⁹ a second.
+    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
     pub gmac_per_s: Option<f64>,
     /// That, of what the device does here from registers alone in these numbers.
     pub peak_percent: Option<f64>,
-    /// What the network's dispatches read and write, each value once, of what a copy does here.
+    /// What the method's dispatches read and write, each value once, of what a copy does here.
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures `network` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not
+/// Measures `method` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not
 /// counted; with `table` each frame once more through it.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
 pub fn measure(
-    network: &Arc<Network>,
+    method: &Method,
     (width, height): (usize, usize),
     device: &Arc<Device>,
     display: &Display,
@@ -67,10 +69,11 @@ pub fn measure(
     table: Option<&Arc<PerPixel>>,
     budget: Duration,
 ) -> Result<GpuRow> {
+    let (name, network) = named(method);
     let mut job = Job::new(
         height,
         width,
-        Method::Network(network.clone()),
+        method.clone(),
         display,
         Encoding::ANTI_ALIAS,
         Scale::Fixed(1.0),
@@ -121,13 +124,13 @@ pub fn measure(
         if let Some(times) = report.times {
             let StageTimes {
                 input,
-                network,
+                method,
                 propagate,
                 encode,
             } = times;
             for (stage, time) in [
                 ("input", input),
-                ("network", network),
+                (name, method),
                 ("propagate", propagate),
                 ("encode", encode),
             ] {
@@ -164,11 +167,14 @@ pub fn measure(
         100.0 * (median(&mut table_encode) - stage_ms["encode"]) / all
     });
     let peak = pipeline.peak()?;
-    let network_s = stage_ms.get("network").map(|ms| ms / 1e3);
-    let mac_per_s =
-        network_s.map(|s| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
+    let method_s = stage_ms.get(name).map(|ms| ms / 1e3);
+    let alone = network.filter(|_| name == "network");
+    let mac_per_s = method_s
+        .zip(alone)
+        .map(|(s, network)| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
     Ok(GpuRow {
-        layers: network.layers(),
+        method: name,
+        layers: network.map_or(0, |network| network.layers()),
         precision: pipeline.numbers().to_owned(),
         backend: "gpu",
         kernels: pipeline.describe(),
@@ -182,7 +188,7 @@ pub fn measure(
         frames: totals.len(),
         gmac_per_s: mac_per_s.map(|rate| rate / 1e9),
         peak_percent: mac_per_s.map(|rate| 100.0 * rate / peak.mac_per_s),
-        bandwidth_percent: network_s
-            .map(|s| 100.0 * pipeline.network_bytes() as f64 / s / peak.bytes_per_s),
+        bandwidth_percent: method_s
+            .map(|s| 100.0 * pipeline.method_bytes() as f64 / s / peak.bytes_per_s),
     })
 }

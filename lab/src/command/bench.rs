@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront::network::Precision;
 use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method, Network, Sweep};
+use phasefront::{Display, Method, Sweep};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, BUILT_IN, Built};
@@ -121,13 +121,7 @@ impl Bench {
                     "--plot and --prefilter go with --backend cpu".into(),
                 ));
             }
-            let networks: Vec<_> = (methods.into_iter())
-                .filter_map(|method| match method {
-                    Method::Network(network) => Some(network),
-                    _ => None,
-                })
-                .collect();
-            return self.on_gpu(&networks, &sizes, &display, table.as_ref(), &options, json);
+            return self.on_gpu(&methods, &sizes, &display, table.as_ref(), &options, json);
         }
         let machine = Machine::this();
         let threads = threads.map_or_else(
@@ -172,7 +166,7 @@ impl Bench {
     /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
     fn on_gpu(
         &self,
-        networks: &[Arc<Network>],
+        methods: &[Method],
         sizes: &[(usize, usize)],
         display: &Display,
         table: Option<&Arc<PerPixel>>,
@@ -186,18 +180,27 @@ impl Bench {
             None => vec![Fusion::Layers, Fusion::Pairs],
         };
         let mut rows = Vec::new();
-        for network in networks {
-            let floats = match network.precision() {
-                Precision::F32 if device.has_half() => vec![Float::F16, Float::F32],
+        for method in methods {
+            let network = match method {
+                Method::Network(network) | Method::Seeded(network) => Some(network),
+                _ => None,
+            };
+            let floats = match network.map(|network| network.precision()) {
+                Some(Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
                 _ => vec![Float::F32],
+            };
+            // A sweep by itself has no layers.
+            let fusions = match network {
+                Some(_) => &fusions[..],
+                None => &[Fusion::Layers],
             };
             for &size in sizes {
                 for &float in &floats {
-                    for &fusion in &fusions {
+                    for &fusion in fusions {
                         let chain = ChainOptions { float, fusion };
                         let budget = Duration::from_secs_f64(self.seconds);
                         rows.push(bench::gpu::measure(
-                            network, size, &device, display, chain, table, budget,
+                            method, size, &device, display, chain, table, budget,
                         )?);
                     }
                 }
@@ -215,19 +218,20 @@ impl Bench {
 
 fn as_gpu_table(device: &Device, rows: &[GpuRow]) -> String {
     let mut text = format!("{}\n\n", device.name());
-    text += "| layers | numbers | kernels | size | input ms | network ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
-    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    text += "| method | layers | numbers | kernels | size | input ms | method ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
         let stage = |name| row.stage_ms.get(name).copied().unwrap_or(f64::NAN);
         text += &format!(
-            "\n| {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} | {} |",
+            "\n| {} | {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} | {} |",
+            row.method,
             row.layers,
             row.precision,
             row.kernels,
             row.width,
             row.height,
             stage("input"),
-            stage("network"),
+            stage(row.method),
             stage("propagate"),
             stage("encode"),
             row.total_ms,

@@ -159,9 +159,11 @@ impl Hologram {
             None => Method::Network,
         });
         let device = self.backend.device()?;
-        if device.is_some() && (method != Method::Network || self.complex.is_some()) {
+        if device.is_some()
+            && (matches!(method, Method::Layers | Method::Points) || self.complex.is_some())
+        {
             return Err(Error::Input(
-                "--backend gpu runs --method network, without --complex; the rest is the CPU's"
+                "--backend gpu runs --method network, sweep, seeded and auto, without --complex; the rest is the CPU's"
                     .into(),
             ));
         }
@@ -179,21 +181,20 @@ impl Hologram {
                 let (network, encoder) =
                     (self.encoder).with_network(name, int8, &display.display)?;
                 let method = phasefront::Method::trained(network);
-                match &device {
-                    Some(options) => self.on_gpu(method, &display, encoder, options)?,
-                    None => self.by_pipeline("network", method, &display, encoder)?,
-                }
+                self.by_core("network", method, &display, encoder, device.as_ref())?
             }
             (Method::Seeded, None) => {
                 let name = self.network.as_deref().unwrap_or(models::SEEDED);
                 let network = models::network(name, self.precision.is_int8())?;
                 let method = phasefront::Method::Seeded(network);
-                self.by_pipeline("seeded", method, &display, self.encoder.read()?)?
+                let encoder = self.encoder.read()?;
+                self.by_core("seeded", method, &display, encoder, device.as_ref())?
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
-                self.by_pipeline("sweep", method, &display, self.encoder.read()?)?
+                let encoder = self.encoder.read()?;
+                self.by_core("sweep", method, &display, encoder, device.as_ref())?
             }
             (Method::Auto, _) | (Method::Network | Method::Sweep | Method::Seeded, Some(_)) => {
                 return Err(Error::Input(
@@ -232,7 +233,21 @@ impl Hologram {
     }
 
     /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
-    fn by_pipeline(
+    fn by_core(
+        &self,
+        stage: &'static str,
+        method: phasefront::Method,
+        display: &DisplayFile,
+        encoder: Encoder,
+        device: Option<&DeviceOptions>,
+    ) -> Result<Made> {
+        match device {
+            Some(options) => self.on_gpu(stage, method, display, encoder, options),
+            None => self.on_cpu(stage, method, display, encoder),
+        }
+    }
+
+    fn on_cpu(
         &self,
         stage: &'static str,
         method: phasefront::Method,
@@ -279,9 +294,10 @@ impl Hologram {
         })
     }
 
-    /// By a network on a GPU that was tried out before.
+    /// On a GPU that was tried out before.
     fn on_gpu(
         &self,
+        stage: &'static str,
         method: phasefront::Method,
         display: &DisplayFile,
         encoder: Encoder,
@@ -316,7 +332,7 @@ impl Hologram {
             scale: report.scale,
             stages: vec![
                 ("input", times.input),
-                ("network", times.network),
+                (stage, times.method),
                 ("propagate", times.propagate),
                 ("encode", times.encode),
             ],

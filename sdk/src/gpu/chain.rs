@@ -2,7 +2,7 @@
 //! is faster on this device. Its twins are [`crate::network::reference`] and the kernels' int8 module.
 
 use super::device::{Constants, Device, Dispatch};
-use super::input::{ChainInput, Packer, Source};
+use super::input::{ChainInput, Form, Packer, Source};
 use super::{Error, Result};
 use crate::network::chain::{Chain, Layer, Precision, Weights};
 use crate::network::{Head, InputKind, Network};
@@ -243,7 +243,7 @@ impl ChainPlan {
 }
 
 /// The shortest of three runs, after one that is not counted.
-fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
+pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     let run = || {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -346,6 +346,7 @@ impl Maker<'_> {
             End::Planes => 0,
             End::Field(Head::AmplitudePhase, _) => 1,
             End::Field(Head::RealImaginary, InputKind::Field) => 3,
+            End::Field(Head::RealImaginary, InputKind::Seeded) => 4,
             End::Field(Head::RealImaginary, _) => 2,
         };
         let more = format!("const HEAD: u32 = {head}u;\nconst TANH: bool = {tanh};\n");
@@ -612,7 +613,13 @@ impl NetworkPlan {
         device.guarded(|| {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
-            let packer = Packer::new(device, chain, numbers, size, Source::Planes, None)?;
+            let packer = Packer::new(
+                device,
+                Form::Chain(chain, numbers),
+                size,
+                Source::Planes,
+                None,
+            )?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
             Ok(NetworkPlan {

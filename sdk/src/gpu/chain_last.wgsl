@@ -1,7 +1,7 @@
 // The last layer and what becomes of its six planes: the planes themselves, or the complex field that they stand for,
 // with each workgroup's sum of it for the mean phase. Goes behind chain.wgsl or chain_int8.wgsl, whose `sums` gives
 // the planes as t.a… (0 to 3) and t.b… (4 and 5). HEAD: 0 planes, 1 amplitude and phase, 2 correction of the image,
-// 3 correction of a field.
+// 3 correction of a field, 4 correction of a seed.
 
 @group(0) @binding(5) var<storage, read_write> planes: array<f32>;
 @group(0) @binding(6) var<storage, read_write> field: array<vec2f>;
@@ -59,13 +59,19 @@ fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
         green = amplitude.y * direction(second.y);
         blue = amplitude.z * direction(second.z);
     } else {
-        var re = first + base(at).xyz;
+        var re = first;
         var im = second;
         if (HEAD == 2u) {
             // Colours come in minus a half.
-            re += 0.5;
-        } else {
+            re += base(at).xyz + 0.5;
+        } else if (HEAD == 3u) {
+            re += base(at).xyz;
             im += vec3f(base(at).w, base(frame.plane + at).xy);
+        } else {
+            // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
+            let seed = base(frame.plane + at);
+            re += 2.0 * seed.xyz + 0.5;
+            im += 2.0 * vec3f(seed.w, base(2u * frame.plane + at).xy);
         }
         red = vec2f(re.x, im.x);
         green = vec2f(re.y, im.y);

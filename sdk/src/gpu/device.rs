@@ -378,7 +378,8 @@ impl Device {
             let _ = send.send(mapped);
         });
         self.wait(submission)?;
-        match receive.try_recv() {
+        // Another thread that polls the device may be the one that says so.
+        match receive.recv_timeout(self.patience) {
             Ok(Ok(())) => Ok(()),
             Ok(Err(why)) => Err(Error::Lost(one_line(why))),
             Err(why) => Err(Error::Lost(one_line(why))),

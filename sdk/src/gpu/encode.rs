@@ -5,7 +5,7 @@ use super::brightness::Steadier;
 use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::{Constants, Device, Dispatch};
 use super::fft::{Convolution, Planes, quadrant};
-use super::input::{Packer, Source};
+use super::input::{Form, Packer, Source};
 use super::{Error, Result};
 use crate::brightness::{Brightness, Past};
 use crate::encode::Encoding;
@@ -340,7 +340,13 @@ impl Prefilter {
         }
         let chain = network.chain();
         let numbers = Numbers::of(device, chain, options.float)?;
-        let packer = Packer::new(device, chain, numbers, size, Source::Field(field), None)?;
+        let packer = Packer::new(
+            device,
+            Form::Chain(chain, numbers),
+            size,
+            Source::Field(field),
+            None,
+        )?;
         let end = End::Field(network.head(), InputKind::Field);
         let (input, fusion) = (&packer.input, options.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;

@@ -115,6 +115,31 @@ impl<'a> Frame<'a> {
     }
 }
 
+/// What a [`Packer`] writes.
+#[derive(Clone, Copy)]
+pub(super) enum Form<'a> {
+    /// The input of a chain in its numbers.
+    Chain(&'a Chain, Numbers),
+    /// Red, green, blue and depth of each pixel, f32, as they are: what the plane sweep reads.
+    Surfaces,
+}
+
+impl Form<'_> {
+    fn channels(&self) -> usize {
+        match self {
+            Form::Chain(chain, _) => chain.inputs,
+            Form::Surfaces => GROUP,
+        }
+    }
+
+    fn numbers(&self) -> Numbers {
+        match self {
+            Form::Chain(_, numbers) => *numbers,
+            Form::Surfaces => Numbers::F32,
+        }
+    }
+}
+
 /// Where a [`Packer`] reads.
 #[derive(Clone, Copy)]
 pub(super) enum Source<'a> {
@@ -122,6 +147,8 @@ pub(super) enum Source<'a> {
     Planes,
     /// A complex field on the GPU.
     Field(&'a wgpu::Buffer),
+    /// A frame's surfaces on the GPU, and the sweep's field of it.
+    Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
     /// A frame, in its own buffers.
     Frame(Colour, Depth),
 }
@@ -129,7 +156,7 @@ pub(super) enum Source<'a> {
 /// What a chain reads, on the GPU.
 #[derive(Clone)]
 pub(super) struct ChainInput {
-    /// The first layer's input.
+    /// The first layer's input, or a frame's surfaces.
     pub(super) first: wgpu::Buffer,
     /// What the last layer reads of it: the same buffer but in int8.
     pub(super) last: wgpu::Buffer,
@@ -177,19 +204,19 @@ struct Camera {
 }
 
 impl Packer {
-    /// The stage for `chain` and frames of `size` (height, width), into memory of its own or `input`, which another
-    /// stage of the same chain, numbers and size had.
+    /// The stage for frames of `size` (height, width), into memory of its own or `input`, which another stage of the same
+    /// form and size had.
     pub(super) fn new(
         device: &Device,
-        chain: &Chain,
-        numbers: Numbers,
+        form: Form<'_>,
         size: (usize, usize),
         source: Source<'_>,
         input: Option<ChainInput>,
     ) -> Result<Self> {
         let (height, width) = size;
         let area = height * width;
-        let groups = chain.inputs.div_ceil(GROUP);
+        let (channels, numbers) = (form.channels(), form.numbers());
+        let groups = channels.div_ceil(GROUP);
         let input = match input {
             Some(input) => input,
             None => ChainInput::new(device, groups * area, numbers)?,
@@ -201,9 +228,12 @@ impl Packer {
             _ => String::new(),
         };
         header += &format!(
-            "alias Value = {};\nconst CHANNELS: u32 = {}u;\nconst GROUPS: u32 = {groups}u;\n",
+            "alias Value = {};\nconst CHANNELS: u32 = {channels}u;\nconst GROUPS: u32 = {groups}u;\nconst MIDDLE: f32 = {:?};\n",
             numbers.value(),
-            chain.inputs
+            match form {
+                Form::Chain(..) => 0.5,
+                Form::Surfaces => 0.0,
+            },
         );
         let mut source_text = String::new();
         let mut camera = None;
@@ -213,13 +243,17 @@ impl Packer {
             Source::Planes => {
                 source_text += include_str!("input_planes.wgsl");
                 (
-                    device.buffer("the network's input", 4 * chain.inputs * area)?,
+                    device.buffer("the network's input", 4 * channels * area)?,
                     0,
                 )
             }
             Source::Field(field) => {
                 source_text += include_str!("input_field.wgsl");
                 (field.clone(), 0)
+            }
+            Source::Seeded(surfaces, _) => {
+                source_text += include_str!("input_seeded.wgsl");
+                (surfaces.clone(), 0)
             }
             Source::Frame(colour, depth) => {
                 formats = Some((colour, depth));
@@ -267,11 +301,13 @@ impl Packer {
             (1, colour.as_entire_binding()),
             (3, input.first.as_entire_binding()),
         ];
-        if formats.is_some() {
-            arguments.push((2, depth.as_entire_binding()));
+        match source {
+            Source::Frame(..) => arguments.push((2, depth.as_entire_binding())),
+            Source::Seeded(_, seed) => arguments.push((2, seed.as_entire_binding())),
+            Source::Planes | Source::Field(_) => {}
         }
-        let steps = match numbers {
-            Numbers::Int8 => Some(steps(device, chain)?),
+        let steps = match form {
+            Form::Chain(chain, Numbers::Int8) => Some(steps(device, chain)?),
             _ => None,
         };
         if let Some(steps) = &steps {
@@ -578,9 +614,9 @@ mod tests {
                 }
                 let source = Source::Frame(colour, Depth::U16);
                 let size = (height, width);
-                let chain = network.chain();
+                let form = Form::Chain(network.chain(), numbers);
                 let packer = device
-                    .guarded(|| Packer::new(&device, chain, numbers, size, source, None))
+                    .guarded(|| Packer::new(&device, form, size, source, None))
                     .unwrap();
                 packer.upload(&device, &frame).unwrap();
                 run(&device, |pass| packer.run(pass));
@@ -608,6 +644,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A depth's last bit says which plane its pixel is on.
+    #[test]
+    fn surfaces_have_the_bits_of_the_cpu() {
+        let Some(device) = device() else { return };
+        let words: Vec<u16> = (0..=u16::MAX).collect();
+        let colours: Vec<f32> = (0..3 << 16).map(|i| (i % 977) as f32 / 977.0).collect();
+        let (size, source) = ((256, 256), Source::Frame(Colour::Planar, Depth::U16));
+        let packer = device
+            .guarded(|| Packer::new(&device, Form::Surfaces, size, source, None))
+            .unwrap();
+        let frame = Frame {
+            colour: ColourData::Planar(&colours),
+            depth: DepthData::U16(&words),
+        };
+        packer.upload(&device, &frame).unwrap();
+        run(&device, |pass| packer.run(pass));
+        let twin = frame.read(Orientation::default(), 256, 256).unwrap();
+        let (rgb, depth) = (twin.rgb(), twin.depth());
+        let expected: Vec<[f32; 4]> = depth
+            .indexed_iter()
+            .map(|((y, x), &d)| [rgb[(0, y, x)], rgb[(1, y, x)], rgb[(2, y, x)], d])
+            .collect();
+        let bytes = device.read(&packer.input.first, 16 << 16).unwrap();
+        assert!(bytes == bytemuck::cast_slice::<_, u8>(&expected));
     }
 
     #[test]

@@ -1,10 +1,22 @@
-// Channels from colour and depth, each minus a half, and of a second group the place in the frame. Goes behind input.wgsl and input_planar.wgsl or
-// input_camera.wgsl, which know what `colour` holds.
+// Channels from colour and depth, each minus the MIDDLE of what the form holds, and of a second group the place in the
+// frame. Goes behind input.wgsl and input_planar.wgsl or input_camera.wgsl, which know what `colour` holds.
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
 
+// The f32 that is nearest to w/65535, which repeats the bits of w behind the point: drivers' divisions are not exact, and
+// a sweep asks for the plane that a pixel belongs to.
+fn normalized(w: u32) -> f32 {
+    if (w == 0u) { return 0.0; }
+    let bits = (w << 16u) | w;
+    let zeros = countLeadingZeros(bits);
+    let leading = (bits << zeros) | (w >> (16u - zeros));
+    // A carry out of the mantissa is the exponent's.
+    let rounded = (leading >> 8u) + ((leading >> 7u) & 1u);
+    return bitcast<f32>(((125u - zeros) << 23u) + rounded);
+}
+
 fn distance_at(at: u32) -> f32 {
-    if (WORDS) { return f32((depth[at / 2u] >> (16u * (at % 2u))) & 65535u) / 65535.0; }
+    if (WORDS) { return normalized((depth[at / 2u] >> (16u * (at % 2u))) & 65535u); }
     return bitcast<f32>(depth[at]);
 }
 
@@ -13,5 +25,5 @@ fn channels(group: u32, x: u32, y: u32) -> vec4f {
         let place = (vec2f(vec2u(x, y)) + 0.5) / vec2f(vec2u(frame.width, frame.height)) - 0.5;
         return vec4f(place, 0.0, 0.0);
     }
-    return vec4f(rgb(x, y), distance_at(y * frame.width + x)) - 0.5;
+    return vec4f(rgb(x, y), distance_at(y * frame.width + x)) - MIDDLE;
 }

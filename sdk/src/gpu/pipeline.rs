@@ -1,18 +1,18 @@
 //! One RGB-D frame through all stages on the GPU, several frames in flight: the twin of [`crate::pipeline`].
 
-use super::chain::{ChainOptions, ChainPlan, End, Numbers};
+use super::chain::ChainOptions;
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
-use super::input::{Colour, Depth, Frame, Packer, Source};
+use super::input::{Colour, Depth, Frame};
+use super::method::MethodPlan;
 use super::peak::Peak;
 use super::{Error, Result};
 use crate::brightness::{Brightness, Past};
 use crate::display::Display;
 use crate::encode::{Encoding, Scale, deep};
 use crate::illumination::Illumination;
-use crate::method::{Method, check_display};
-use crate::network::{InputKind, Network};
+use crate::method::Method;
 use crate::slm::Response;
 use crate::wave::asm::{Padding, Propagator};
 use crate::wave::zernike::Aberration;
@@ -53,7 +53,7 @@ pub struct Job {
     pub colour: Colour,
     /// How depth comes.
     pub depth: Depth,
-    /// How the network is computed.
+    /// How a network is computed.
     pub chain: ChainOptions,
 }
 
@@ -111,24 +111,6 @@ impl Job {
         }
         Ok(pipeline)
     }
-
-    /// The network, where it is one that a GPU runs.
-    pub(crate) fn network(&self) -> Result<&Arc<Network>> {
-        let Method::Network(network) = &self.method else {
-            return Err(Error::Refused(
-                "plane sweeps, corrected by a network or not, run on the CPU only".into(),
-            ));
-        };
-        if !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
-            return Err(crate::Error::Network(format!(
-                "it takes {} planes; a network for RGB-D frames is needed",
-                network.input().channels()
-            ))
-            .into());
-        }
-        check_display(network, &self.display)?;
-        Ok(network)
-    }
 }
 
 /// Who wants a frame's levels.
@@ -150,11 +132,11 @@ pub struct Ticket {
 /// How long each stage of a frame took on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StageTimes {
-    /// From the camera's format to the network's input.
+    /// From the camera's format to the method's input.
     pub input: Duration,
-    /// From the input to the midpoint hologram.
-    pub network: Duration,
-    /// From the midpoint to the modulator.
+    /// From the input to the hologram where the method ends.
+    pub method: Duration,
+    /// From there to the modulator.
     pub propagate: Duration,
     /// From the field to levels.
     pub encode: Duration,
@@ -163,7 +145,7 @@ pub struct StageTimes {
 impl StageTimes {
     /// All stages together.
     pub fn total(&self) -> Duration {
-        self.input + self.network + self.propagate + self.encode
+        self.input + self.method + self.propagate + self.encode
     }
 }
 
@@ -180,10 +162,7 @@ pub struct FrameReport {
 pub struct Pipeline {
     device: Arc<Device>,
     size: (usize, usize),
-    network: Arc<Network>,
-    numbers: Numbers,
-    packer: Packer,
-    chain: ChainPlan,
+    method: MethodPlan,
     /// None for an encoding that was trained on the field's phase as it is.
     mean: Option<MeanPhase>,
     /// None where the modulator stands at the midpoint.
@@ -215,7 +194,7 @@ impl Pipeline {
     /// What [`crate::Pipeline::new`] refuses, and [`Error::Refused`] or [`Error::OutOfMemory`] for what this device
     /// cannot do.
     pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
-        let network = job.network()?;
+        job.method.check(&job.display)?;
         let size = (job.height, job.width);
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
         job.brightness.check()?;
@@ -231,31 +210,22 @@ impl Pipeline {
             ))
             .into());
         }
-        device.guarded(|| Self::build(device, job, network, size))
+        device.guarded(|| Self::build(device, job, size))
     }
 
-    fn build(
-        device: &Arc<Device>,
-        job: &Job,
-        network: &Arc<Network>,
-        size: (usize, usize),
-    ) -> Result<Self> {
-        let chain = network.chain();
-        let numbers = Numbers::of(device, chain, job.chain.float)?;
-        let source = Source::Frame(job.colour, job.depth);
-        let packer = Packer::new(device, chain, numbers, size, source, None)?;
-        let end = End::Field(network.head(), network.input());
-        let (input, fusion) = (&packer.input, job.chain.fusion);
-        let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
+    fn build(device: &Arc<Device>, job: &Job, size: (usize, usize)) -> Result<Self> {
+        let (display, formats) = (&job.display, (job.colour, job.depth));
+        let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
+        let (sums, parts) = method.sums();
         let mean = match job.encoding {
             Encoding::Deep(_) => None,
-            _ => Some(MeanPhase::new(device, &chain.partial, chain.parts)?),
+            _ => Some(MeanPhase::new(device, sums, parts)?),
         };
         // The first to read the field turns it.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
-        let display = &job.display;
         let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
-        let plans = match (display.offset_m(), &job.correction) {
+        // The rest of the way.
+        let plans = match (display.offset_m() - method.z_m(), &job.correction) {
             (offset_m, Some(correction)) => Some(Propagator::for_colours_corrected(
                 size.0,
                 size.1,
@@ -280,7 +250,7 @@ impl Pipeline {
             Some(plans) => Some(Convolution::new(
                 device,
                 &Planes {
-                    field: &chain.field,
+                    field: method.field(),
                     size,
                     padded: plans[0].padded_shape(),
                     factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
@@ -295,7 +265,7 @@ impl Pipeline {
             .collect::<Result<Vec<_>>>()?;
         let encoder = Encoder::new(
             device,
-            &chain.field,
+            method.field(),
             size,
             &job.encoding,
             job.chain,
@@ -309,10 +279,7 @@ impl Pipeline {
         Ok(Pipeline {
             device: device.clone(),
             size,
-            network: network.clone(),
-            numbers,
-            packer,
-            chain,
+            method,
             mean,
             offset,
             encoder,
@@ -332,33 +299,28 @@ impl Pipeline {
         &self.device
     }
 
-    /// What the network is computed in, and how.
+    /// What the hologram is computed in, and how.
     pub fn describe(&self) -> String {
-        format!(
-            "{} on {}, {:?} in {} dispatches",
-            self.numbers.name(),
-            self.device.name(),
-            self.chain.fusion,
-            self.chain.dispatches()
-        )
+        let (numbers, device) = (self.numbers(), self.device.name());
+        format!("{numbers} on {device}, {}", self.method.describe())
     }
 
-    /// What the network is computed in: `f32`, `f16` or `int8`.
+    /// What the network, or a sweep by itself, is computed in: `f32`, `f16` or `int8`.
     pub fn numbers(&self) -> &'static str {
-        self.numbers.name()
+        self.method.numbers().name()
     }
 
-    /// What the device does at its best, measured now, in the network's numbers.
+    /// What the device does at its best, measured now, in these numbers.
     ///
     /// # Errors
     /// What the device refuses; [`Error::Lost`].
     pub fn peak(&self) -> Result<Peak> {
-        super::peak::measure(&self.device, self.numbers)
+        super::peak::measure(&self.device, self.method.numbers())
     }
 
-    /// Bytes that the network's dispatches read and write in a frame, each value once.
-    pub fn network_bytes(&self) -> usize {
-        self.chain.bytes
+    /// Bytes that the method's dispatches read and write in a frame, each value once.
+    pub fn method_bytes(&self) -> usize {
+        self.method.bytes()
     }
 
     /// Frames come so from now on: the input stage alone is planned again. Frames in flight are not harmed.
@@ -366,16 +328,7 @@ impl Pipeline {
     /// # Errors
     /// A format that the CPU refuses too, or what this device cannot do; frames then come as before.
     pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
-        if self.packer.formats() == Some((colour, depth)) {
-            return Ok(());
-        }
-        let device = self.device.clone();
-        self.packer = device.guarded(|| {
-            let (chain, source) = (self.network.chain(), Source::Frame(colour, depth));
-            let input = Some(self.packer.input.clone());
-            Packer::new(&device, chain, self.numbers, self.size, source, input)
-        })?;
-        Ok(())
+        self.method.expect(&self.device, (colour, depth))
     }
 
     /// Sends a frame through. At most [`FLIGHTS`] may be in flight.
@@ -404,7 +357,7 @@ impl Pipeline {
         };
         let device = self.device.clone();
         let submission = device.guarded(|| {
-            self.packer.upload(&device, frame)?;
+            self.method.upload(&device, frame)?;
             self.encoder.heed(&device, past);
             Ok(device.queue.submit([self.commands(slot, deliver)]))
         })?;
@@ -436,9 +389,9 @@ impl Pipeline {
             });
             work(&mut pass);
         };
-        stage(0, &|pass| self.packer.run(pass));
+        stage(0, &|pass| self.method.read(pass));
         stage(1, &|pass| {
-            self.chain.run(pass);
+            self.method.run(pass);
             if let Some(mean) = &self.mean {
                 mean.run(pass);
             }
@@ -549,7 +502,7 @@ impl Pipeline {
             scale: self.encoder.scale(word(0)),
             times: slot.stamps.is_some().then(|| StageTimes {
                 input: stage(0),
-                network: stage(1),
+                method: stage(1),
                 propagate: stage(2),
                 encode: stage(3),
             }),

@@ -1,6 +1,5 @@
 //! Trust, then use: a small frame on the device beside the same on the CPU.
 
-use super::chain::Numbers;
 use super::device::Device;
 use super::input::Frame;
 use super::pipeline::{Job, Pipeline};
@@ -53,10 +52,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     for _ in 0..2 {
         gpu.process(&Frame::of(&frame), &mut levels)?;
         let apart = apart(&levels, &expected, &job.response);
-        let most = match Numbers::of(device, job.network()?.chain(), job.chain.float)? {
-            Numbers::F16 => 0.1,
-            _ => 0.01,
-        };
+        let most = if gpu.numbers() == "f16" { 0.1 } else { 0.01 };
         if apart > most {
             return Err(Error::Wrong(format!(
                 "{}: phases of a small frame differ from the CPU's by {apart:.3} on average, {most} are right",

@@ -272,7 +272,7 @@ impl Cpu {
         let frame = frame.read(orientation, job.height, job.width)?;
         let mut levels = vec![0; self.field.len()];
         let (field, scratch) = (&mut self.field, &mut self.scratch);
-        let (network, propagate) = self.pipeline.field(&frame, field, scratch)?;
+        let (method, propagate) = self.pipeline.field(&frame, field, scratch)?;
         let start = Instant::now();
         let scale = match job.brightness {
             Brightness::FrameMax => Scale::Max,
@@ -287,7 +287,7 @@ impl Cpu {
             scale: made.scale,
             times: Some(StageTimes {
                 input: Duration::ZERO,
-                network,
+                method,
                 propagate,
                 encode: start.elapsed(),
             }),

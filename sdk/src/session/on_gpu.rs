@@ -72,8 +72,6 @@ impl OnGpu {
                 response,
             )
         };
-        // Before anything is opened for what no GPU does.
-        job.network()?;
         let device_options = options.gpu.device.clone();
         Renderer::on(device, device_options, job, Otherwise::Error).map(OnGpu)
     }

@@ -19,25 +19,25 @@ const PASS: usize = 3;
 const MARGIN: usize = 6;
 
 /// A symmetric filter as the kernels take it: the centre, then the taps at distances 1, 2 …
-pub(super) type Taps = Vec<[f32; 2]>;
+pub(crate) type Taps = Vec<[f32; 2]>;
 
 /// The optics of one colour between the planes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Optics {
+pub(crate) struct Optics {
     pub(super) pitch_m: f64,
     pub(super) wavelength_m: f64,
     /// Between neighbouring planes.
-    pub(super) step_m: f64,
+    pub(crate) step_m: f64,
     pub(super) planes: usize,
     /// From plane 0, the nearest to the viewer, to the hologram.
-    pub(super) home_m: f64,
+    pub(crate) home_m: f64,
     /// Whether light of points between planes is carried to theirs.
     pub(super) between_planes: bool,
 }
 
 impl Optics {
     /// How far light spreads over `distance_m`, pixels.
-    pub(super) fn reach(&self, distance_m: f64) -> usize {
+    pub(crate) fn reach(&self, distance_m: f64) -> usize {
         let reach_m = crate::wave::asm::reach_m(distance_m, self.wavelength_m, self.pitch_m);
         (reach_m / self.pitch_m).ceil() as usize
     }
@@ -52,13 +52,13 @@ impl Optics {
 }
 
 /// The filters of one colour.
-pub(super) struct Filters {
+pub(crate) struct Filters {
     /// What light gains beside its point, over i, its amplitude and how much deeper in normalized depth the point lies
     /// than its plane; the point itself loses four times that.
-    pub(super) carry: f32,
+    pub(crate) carry: f32,
     /// H and B, for the oracle.
-    pub(super) step: Taps,
-    pub(super) home: Taps,
+    pub(crate) step: Taps,
+    pub(crate) home: Taps,
     /// Weighted errors of H and of its power over the whole volume.
     pub(super) errors: [f64; 2],
     /// Hᵐ for m − 1; only what [`Filters::part`] names is used.

@@ -12,7 +12,7 @@ use phasefront_kernels::fir::{Fir, RUN};
 use std::ops::Range;
 
 /// Pixels beyond light's reach that are computed, too: a fitted filter's light runs a little ahead.
-const MARGIN: usize = 10;
+pub(crate) const MARGIN: usize = 10;
 
 /// The pixels of a row from one to before another; none where the second is not the greater.
 type Span = [usize; 2];

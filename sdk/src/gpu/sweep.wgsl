@@ -1,0 +1,167 @@
+// Several planes of the sweep, the farthest first, for one colour in one tile: the step from the plane behind along rows
+// and columns, then the plane's points, which replace the field where they are, then the light of those that lie before or
+// behind the plane. A tile comes with a halo into workgroup memory, and what is right of it shrinks by RADIUS a step until
+// its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a thread has EACH
+// rows of a column.
+
+struct Frame {
+    width: u32, height: u32,
+    // Black around the frame, for light that leaves it and comes back.
+    border: u32,
+    // The first plane that is done here; behind the last one there is no light.
+    first: u32,
+}
+// What a point gives to its neighbours (see Filters::carry), in the first value's z; the filter's centre, then the taps at
+// distances 1, 2 …, complex.
+struct Colour { taps: array<vec4f, RADIUS + 1> }
+
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> colours: array<Colour, 3>;
+// Red, green, blue, depth.
+@group(0) @binding(2) var<storage, read> surfaces: array<vec4f>;
+@group(0) @binding(3) var<storage, read> sources: array<u32>;
+// The planes of each pixel's points; see sweep_points.wgsl.
+@group(0) @binding(4) var<storage, read> points: array<u32>;
+@group(0) @binding(5) var<storage, read> behind: array<vec2f>;
+@group(0) @binding(6) var<storage, read_write> result: array<vec2f>;
+
+const HALO: u32 = RADIUS * PLANES;
+const LIT: u32 = 0x80000000u;
+
+var<workgroup> tile: array<vec2f, COLUMNS * ROWS>;
+// A bit for each plane that has points here, and LIT where light comes from behind.
+var<workgroup> marks: atomic<u32>;
+var<workgroup> marked: u32;
+
+fn times(a: vec2f, b: vec2f) -> vec2f { return vec2f(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
+
+// The plane of a pixel's point of a layer, 0 what is seen.
+fn plane_of(word: u32, layer: u32) -> u32 {
+    if (layer == 0u) { return word & 1023u; }
+    return (word >> (11u * layer - 1u)) & 2047u;
+}
+
+@compute @workgroup_size(COLUMNS, ROWS / EACH)
+fn cross_planes(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_id) thread: vec3u,
+    @builtin(local_invocation_index) index: u32,
+) {
+    let colour = group.z;
+    let x = thread.x;
+    let y = thread.y * EACH;
+    let area = frame.width * frame.height;
+    // The field is the frame and its border; all of it lies right of and below 0 by HALO.
+    let width = frame.width + 2u * frame.border;
+    let height = frame.height + 2u * frame.border;
+    let at_x = group.x * (COLUMNS - 2u * HALO) + x;
+    let at_y = group.y * (ROWS - 2u * HALO) + y;
+    let in_field_x = at_x >= HALO && at_x < width + HALO;
+    let in_frame_x = at_x >= HALO + frame.border && at_x < HALO + frame.border + frame.width;
+    // The thread's first pixel; where it lies beside the frame, nobody asks for it.
+    let own = (at_y - HALO - frame.border) * frame.width + at_x - HALO - frame.border;
+
+    if (index == 0u) { atomicStore(&marks, 0u); }
+    workgroupBarrier();
+    var v: array<vec2f, EACH>;
+    var planes: array<u32, EACH>;
+    var own_marks = 0u;
+    for (var i = 0u; i < EACH; i++) {
+        let row = at_y + i;
+        v[i] = vec2f(0);
+        if (frame.first + 1u < COUNT && in_field_x && row >= HALO && row < height + HALO) {
+            v[i] = behind[(colour * height + row - HALO) * width + at_x - HALO];
+        }
+        if (any(v[i] != vec2f(0))) { own_marks |= LIT; }
+        tile[(y + i) * COLUMNS + x] = v[i];
+        // Beside the frame, a plane that is not done here.
+        planes[i] = 0xfffffc00u | ((frame.first + 1u) & 1023u);
+        if (in_frame_x && row >= HALO + frame.border && row < HALO + frame.border + frame.height) {
+            planes[i] = points[own + i * frame.width];
+            for (var layer = 0u; layer <= HIDDEN; layer++) {
+                let step = frame.first - plane_of(planes[i], layer);
+                if (step < PLANES) { own_marks |= 1u << step; }
+            }
+        }
+    }
+    if (own_marks != 0u) { atomicOr(&marks, own_marks); }
+    workgroupBarrier();
+    if (index == 0u) { marked = atomicLoad(&marks); }
+    let held = workgroupUniformLoad(&marked);
+
+    // Without light and points all stays dark.
+    if (held != 0u) {
+        for (var step = 0u; step < PLANES; step++) {
+            // Along the row. What reads beyond the tile is not right any more.
+            for (var i = 0u; i < EACH; i++) { v[i] = times(colours[colour].taps[0].xy, v[i]); }
+            for (var j = 1u; j <= RADIUS; j++) {
+                let tap = colours[colour].taps[j].xy;
+                let left = y * COLUMNS + max(x, j) - j;
+                let right = y * COLUMNS + min(x + j, COLUMNS - 1u);
+                for (var i = 0u; i < EACH; i++) {
+                    v[i] += times(tap, tile[left + i * COLUMNS] + tile[right + i * COLUMNS]);
+                }
+            }
+            workgroupBarrier();
+            for (var i = 0u; i < EACH; i++) { tile[(y + i) * COLUMNS + x] = v[i]; }
+            workgroupBarrier();
+            // Down the column.
+            var column: array<vec2f, EACH + 2u * RADIUS>;
+            for (var i = 0u; i < EACH + 2u * RADIUS; i++) {
+                column[i] = tile[min(max(y + i, RADIUS) - RADIUS, ROWS - 1u) * COLUMNS + x];
+            }
+            for (var i = 0u; i < EACH; i++) {
+                v[i] = times(colours[colour].taps[0].xy, column[i + RADIUS]);
+                for (var j = 1u; j <= RADIUS; j++) {
+                    v[i] += times(colours[colour].taps[j].xy, column[i + RADIUS - j] + column[i + RADIUS + j]);
+                }
+            }
+            // The plane's points, what is seen last.
+            let plane = frame.first - step;
+            let middle = (f32(plane) + 0.5) / f32(COUNT);
+            let here = (held & (1u << step)) != 0u;
+            var light: array<f32, EACH>;
+            if (here) {
+                for (var i = 0u; i < EACH; i++) {
+                    light[i] = 0.0;
+                    for (var l = 0u; l <= HIDDEN; l++) {
+                        let layer = HIDDEN - l;
+                        if (plane_of(planes[i], layer) != plane) { continue; }
+                        var source = own + i * frame.width;
+                        if (layer > 0u) { source = sources[(layer - 1u) * area + source]; }
+                        let point = surfaces[source];
+                        let amplitude = point[colour];
+                        v[i] = vec2f(amplitude, 0.0);
+                        light[i] += colours[colour].taps[0].z * amplitude * (point.w - middle);
+                    }
+                }
+            }
+            if (CARRY && here) {
+                workgroupBarrier();
+                for (var i = 0u; i < EACH; i++) { tile[(y + i) * COLUMNS + x] = vec2f(light[i], 0.0); }
+                workgroupBarrier();
+                for (var i = 0u; i < EACH; i++) {
+                    let row = (y + i) * COLUMNS;
+                    let beside = tile[row + max(x, 1u) - 1u].x + tile[row + min(x + 1u, COLUMNS - 1u)].x;
+                    let above = tile[(max(y + i, 1u) - 1u) * COLUMNS + x].x;
+                    let below = tile[min(y + i + 1u, ROWS - 1u) * COLUMNS + x].x;
+                    v[i].y += beside + above + below - 4.0 * light[i];
+                }
+            }
+            if (step + 1u < PLANES) {
+                workgroupBarrier();
+                for (var i = 0u; i < EACH; i++) { tile[(y + i) * COLUMNS + x] = v[i]; }
+                workgroupBarrier();
+            }
+        }
+    }
+
+    let middle_x = x >= HALO && x < COLUMNS - HALO;
+    for (var i = 0u; i < EACH; i++) {
+        let row = at_y + i;
+        let middle_y = y + i >= HALO && y + i < ROWS - HALO;
+        if (middle_x && middle_y && in_field_x && row < height + HALO) {
+            result[(colour * height + row - HALO) * width + at_x - HALO] = v[i];
+        }
+    }
+}
