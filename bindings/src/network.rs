@@ -1,6 +1,7 @@
 //! Networks: from a file, from bytes, or built in.
 
 use crate::error::{PhasefrontError, guard};
+use phasefront::encode::deep;
 use std::sync::Arc;
 
 /// The network that is built in where the feature `built-in-network` is on.
@@ -9,29 +10,24 @@ const BUILT_IN: Option<&[u8]> = Some(include_bytes!("../../models/rgbd-8-int8.on
 #[cfg(not(feature = "built-in-network"))]
 const BUILT_IN: Option<&[u8]> = None;
 
-/// The pairs that are built in with it, each for an offset in mm: hologram network and pre-filter.
+/// The pairs that are built in with it: hologram network and pre-filter, which says what offset it is for.
 #[cfg(feature = "built-in-network")]
-const PAIRS: &[(f64, &[u8], &[u8])] = &[
+const PAIRS: &[(&[u8], &[u8])] = &[
     (
-        0.0,
         include_bytes!("../../models/ddpm-8-int8.onnx"),
         include_bytes!("../../models/ddpm-8-prefilter-int8.onnx"),
     ),
     (
-        6.0,
         include_bytes!("../../models/ddpm-8-6mm-int8.onnx"),
         include_bytes!("../../models/ddpm-8-6mm-prefilter-int8.onnx"),
     ),
     (
-        12.0,
         include_bytes!("../../models/ddpm-8-12mm-int8.onnx"),
         include_bytes!("../../models/ddpm-8-12mm-prefilter-int8.onnx"),
     ),
 ];
 #[cfg(not(feature = "built-in-network"))]
-const PAIRS: &[(f64, &[u8], &[u8])] = &[];
-/// Farther from its offset, mm, a pair is not taken.
-const OFFSET_TOLERANCE_MM: f64 = 0.1;
+const PAIRS: &[(&[u8], &[u8])] = &[];
 
 /// A hologram network. Immutable; one serves many sessions.
 #[derive(Debug, uniffi::Object)]
@@ -70,16 +66,20 @@ pub struct DeepPair {
 /// Another offset, or a library that was built without them.
 #[uniffi::export]
 pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
-    let near = |offset: &f64| (offset - offset_mm).abs() <= OFFSET_TOLERANCE_MM;
-    match PAIRS.iter().find(|(offset, ..)| near(offset)) {
-        Some((_, hologram, prefilter)) => Ok(DeepPair {
-            hologram: Network::from_bytes(hologram)?,
-            prefilter: Network::from_bytes(prefilter)?,
-        }),
-        None => Err(PhasefrontError::Network(format!(
-            "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
-        ))),
+    let display = phasefront::Display::default().with_offset_m(offset_mm * 1e-3)?;
+    for (hologram, prefilter) in PAIRS {
+        let prefilter = Network::from_bytes(prefilter)?;
+        if deep::check(&prefilter.core, &display).is_ok() {
+            let hologram = Network::from_bytes(hologram)?;
+            return Ok(DeepPair {
+                hologram,
+                prefilter,
+            });
+        }
     }
+    Err(PhasefrontError::Network(format!(
+        "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
+    )))
 }
 
 #[uniffi::export]

@@ -1,7 +1,7 @@
 //! The networks that come with the command, and those of files.
 
 use crate::error::{Error, Result};
-use phasefront::method::check_display;
+use phasefront::encode::deep;
 use phasefront::{Display, Network};
 use std::path::Path;
 use std::sync::Arc;
@@ -58,9 +58,6 @@ pub const PAIRS: &[Pair] = &[
     pair!(12.0, "ddpm-8-12mm"),
 ];
 
-/// Farther from its offset, mm, a pair is not taken.
-const OFFSET_TOLERANCE_MM: f64 = 0.1;
-
 impl Pair {
     /// (hologram network, pre-filter).
     ///
@@ -77,16 +74,13 @@ impl Pair {
 /// # Errors
 /// As [`Pair::read`].
 pub fn pair_for(display: &Display, int8: bool) -> Result<Option<(Arc<Network>, Arc<Network>)>> {
-    let away = |pair: &&Pair| (pair.offset_mm - display.offset_m() * 1e3).abs();
-    let near = |pair: &&Pair| away(pair) <= OFFSET_TOLERANCE_MM;
-    let Some(pair) = PAIRS.iter().find(near) else {
-        return Ok(None);
-    };
-    let (hologram, prefilter) = pair.read(int8)?;
-    Ok(match check_display(&hologram, display) {
-        Ok(()) => Some((hologram, prefilter)),
-        Err(_) => None,
-    })
+    for pair in PAIRS {
+        let (hologram, prefilter) = pair.read(int8)?;
+        if deep::check(&prefilter, display).is_ok() {
+            return Ok(Some((hologram, prefilter)));
+        }
+    }
+    Ok(None)
 }
 
 /// What comes along by itself.

@@ -42,6 +42,8 @@ fn pairs_are_for_their_offset_and_display() {
     }
     let none = |display: Display| models::pair_for(&display, true).unwrap().is_none();
     assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
+    // Where the encoder would refuse its pre-filter.
+    assert!(none(Display::default().with_offset_m(6.05e-3).unwrap()));
     assert!(none(Display::from_toml("pitch_um = 6.4").unwrap()));
 }
 

@@ -102,7 +102,8 @@ class Stage2(_OnHolograms):
 
 def encoding_figures(model, scenes, degraded=False, full=True, others=True):
     """{method: mean figures} of what an encoded hologram shows: DDPM, and after the same hologram network AA-DPM and BL-DPM
-    with a weak and a strong filter, and plain double phase; `wraps` is the share of phases outside (−π, π] and `brightness` the mean amplitude over the true."""
+    with a weak and a strong filter, and plain double phase (`others`); `wraps` is the share of phases outside (−π, π] and
+    `brightness` the mean amplitude over the true."""
     rows = {}
     device = next(model.parameters()).device
     with torch.no_grad():
