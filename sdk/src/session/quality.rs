@@ -24,8 +24,8 @@ pub enum Backend {
     #[default]
     Cpu,
     /// On the GPU, where this library was built for it (feature `gpu`), there is one, and it answers as the CPU does;
-    /// else on the CPU. Plane sweeps and levels over 8 bits are the CPU's. [`super::Statistics::backend`] says which it
-    /// is, and why.
+    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen by sharpness are the
+    /// CPU's. [`super::Statistics::backend`] says which it is, and why.
     Gpu,
 }
 
