@@ -167,13 +167,15 @@ def run_stage1(args):
 
 
 def begun(args, wanted, train):
-    """A fresh network, or the one of --init, grown where it has fewer layers."""
+    """A fresh network, or the one of --init, told more and grown where the flags ask for it."""
     if not args.init:
         return networks.Chain(wanted)
     network, _ = checkpoint.load_network(args.init)
     found = network.architecture
-    if (found.filters, found.input, found.head) != (wanted.filters, wanted.input, wanted.head):
+    if (found.filters, found.head) != (wanted.filters, wanted.head):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
+    if found.input != wanted.input:
+        network = grow.widen(network, wanted.input)
     return grow.grow(network, args.layers, quantize.examples(train, network.architecture.coordinates))
 
 
@@ -302,7 +304,10 @@ def run_evaluate(args):
     predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
     inputs = {architecture.input for _, architecture in predictors.values()} or {"rgbd"}
     scenes = scenes_for(args, args.split, inputs, args.scenes)
-    methods = {"RGB as the field": evaluate.rgb_as_field}
+    methods = {
+        "RGB as the field": evaluate.rgb_as_field,
+        "SM-LBM of what is visible": evaluate.visible_layers(scenes.display, scenes.origin["planes"]),
+    }
     if scenes.seeded:
         methods["the sweep"] = evaluate.seed_as_field
     methods |= {name: predict for name, (predict, _) in predictors.items()}

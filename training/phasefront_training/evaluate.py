@@ -1,8 +1,8 @@
 """How good a network's holograms are on scenes not trained on.
 
 Amplitude PSNR and SSIM (peak 1) of the midpoint hologram, and the same as the mean over a focal stack of five planes
-inside the volume; means over scenes. Beside the network stands 'the RGB as the field': the front layer's image with
-phase 0. With degraded depth, each scene's degradation is fixed by its number, so figures compare.
+inside the volume; means over scenes. Beside the network stand 'RGB as the field', the front layer's image with phase 0,
+and 'SM-LBM of what is visible', exact waves from the front layer alone. With degraded depth, each scene's degradation is fixed by its number, so figures compare.
 """
 
 import json
@@ -19,7 +19,7 @@ from .degrade import degrade_depth
 from .files import replacing
 from .metrics import psnr, ssim
 from .networks import Architecture, head_field
-from .optics import propagate
+from .optics import padded_shape, propagate, transfer
 
 STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
@@ -28,6 +28,29 @@ FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
 def rgb_as_field(colour, depth, seed=None):
     """The front layer's image as amplitude, with phase 0."""
     return torch.complex(colour[:3], torch.zeros_like(colour[:3]))
+
+
+def visible_layers(display, planes):
+    """colour, depth -> field by SM-LBM (Eq. 1 to 4) of the front layer: the lab's `sm_lbm`, by whole transforms."""
+    z = display.z_m((torch.arange(planes, dtype=torch.float64) + 0.5) / planes)
+
+    def predict(colour, depth, seed=None):
+        height, width = depth.shape[-2:]
+        shape = padded_shape(display, display.volume_depth_m, height, width)
+        plane = (depth[0].double() * planes).long().clamp(max=planes - 1)
+        wave, at = torch.zeros(3, *shape, dtype=torch.complex64), z[-1]
+        for k in plane.unique().flip(0).tolist():
+            wave, at = _on(wave, float(z[k] - at), display), z[k]
+            here = plane == k
+            wave[:, :height, :width][:, here] = colour[:3, here].to(wave)
+        return _on(wave, float(-at), display)[:, :height, :width]
+
+    return predict
+
+
+def _on(wave, distance_m, display):
+    """`wave` at distance_m further, circularly."""
+    return torch.fft.ifft2(torch.fft.fft2(wave) * transfer(display, distance_m, *wave.shape[-2:]))
 
 
 def seed_as_field(colour, depth, seed):

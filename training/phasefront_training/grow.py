@@ -1,4 +1,4 @@
-"""A deeper network from a trained one, that begins by giving what the trained one gives.
+"""A deeper network from a trained one, or one that is told more, that begins by giving what the trained one gives.
 
 A chain of an even number of layers is a first layer, residual pairs and the last layer; one of an odd number has one
 more layer without a skip before the last. New residual pairs begin as a tenth of what a fresh one is: near the identity,
@@ -6,7 +6,11 @@ but with units that fire, for a branch that begins at zero dies behind its ReLU 
 new single layer is a kernel that copies. From odd to even the single layer must become a pair, whose skip adds what the old network did not
 have: its partner copies four times over, so that this
 weighs little, and the last layer is fitted anew to the old output by least squares over examples.
+
+Told more, it begins with weights of zero for what is new: hidden layers of a layered depth image, the place in the frame.
 """
+
+from dataclasses import replace
 
 import torch
 from torch.nn import functional as F
@@ -32,6 +36,26 @@ def grow(network, layers, examples=()):
     if old.layers % 2 == 0:
         return _append_copy(_insert_pairs(network, layers - 1))
     return _insert_pairs(_refit(network, _append_copy(network, GAIN), examples), layers)
+
+
+def widen(network, kind):
+    """A Chain for inputs of `kind` that gives what `network` gives for the first of their channels.
+
+    Raises ValueError where inputs of `kind` do not begin with those of the network.
+    """
+    old = network.architecture
+    new = replace(old, input=kind)
+    images = "rgbd", "rgbdxy", "ldi"
+    continues = old.input == "rgbd" or old.input.startswith("ldi") and kind.startswith("ldi")
+    if not (continues and kind.startswith(images) and new.input_channels >= old.input_channels):
+        raise ValueError(f"inputs '{kind}' do not begin with those of the network, '{old.input}'")
+    wide = Chain(new)
+    with torch.no_grad():
+        for conv, known in zip(wide.convs, network.convs):
+            conv.weight.zero_()
+            conv.weight[:, : known.in_channels] = known.weight
+            conv.bias.copy_(known.bias)
+    return wide
 
 
 def _chain(old, layers):

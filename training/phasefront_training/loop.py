@@ -1,7 +1,7 @@
 """The training loop that all stages share: schedule, budget, log, checkpoints, stopping, several processes.
 
-A stage gives a `Task`; nothing here knows what is trained. Adam (0.9, 0.99), gradients clipped to norm 1, 50 steps
-of warm-up, then a cosine down to 2 % of the rate. The budget is a number of steps, or minutes of wall clock that
+A stage gives a `Task`; nothing here knows what is trained. Gradients are clipped to norm 1; 50 steps of warm-up, then
+a cosine down to 2 % of the rate. The budget is a number of steps, or minutes of wall clock that
 count across resumptions. With steps, a stopped and resumed training repeats the uninterrupted one exactly.
 """
 
@@ -21,6 +21,7 @@ from torch import distributed
 
 from .checkpoint import Checkpoint
 from .files import replacing
+from .optimiser import MuonAndAdam
 
 WARM_UP = 50
 LOGS = 200  # lines of the curve in a whole budget
@@ -149,7 +150,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
     """
     output = Path(output)
     module = task.module()
-    optimiser = torch.optim.Adam(module.parameters(), lr=learning_rate, betas=(0.9, 0.99), fused=True)
+    optimiser = MuonAndAdam(module, learning_rate)
     step, before = 0, 0.0
     if resume is not None:
         optimiser.load_state_dict(resume.optimiser)
@@ -191,11 +192,11 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                 progress, asked = workers.agree(own, float(signals.asked))
                 if progress >= 1 or asked or step == stop_at:
                     break
-                for group in optimiser.param_groups:
-                    group["lr"] = rate(learning_rate, step, progress)
+                now = rate(learning_rate, step, progress)
+                optimiser.set_rate(now)
                 batch = to_device(batches.take(), workers.device)
                 loss, terms = task.loss(trained, batch, step)
-                optimiser.zero_grad(set_to_none=True)
+                module.zero_grad(set_to_none=True)
                 loss.backward()
                 norm = torch.nn.utils.clip_grad_norm_(module.parameters(), 1.0)
                 (bad,) = workers.agree(float(not (torch.isfinite(loss) and torch.isfinite(norm))))
@@ -212,7 +213,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                     progress = budget.progress(step, elapsed())
                     if int(LOGS * progress) > last_log:
                         last_log = int(LOGS * progress)
-                        line = {"step": step, "elapsed_s": round(elapsed(), 1), "lr": optimiser.param_groups[0]["lr"]}
+                        line = {"step": step, "elapsed_s": round(elapsed(), 1), "lr": now}
                         line |= {name: float(f"{float(value) / summed:.6g}") for name, value in sums.items()}
                         sums, summed = {}, 0
                         if int(VALIDATIONS * progress) > last_validation:

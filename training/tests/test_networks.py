@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from phasefront_training.grow import grow
+from phasefront_training.grow import grow, widen
 from phasefront_training.networks import Architecture, Chain, multiplies_per_pixel
 
 
@@ -42,6 +42,23 @@ def test_growing_from_odd_to_even_is_near_the_old_network():
 def test_networks_do_not_shrink():
     with pytest.raises(ValueError, match="8 layers does not grow to 4"):
         grow(Chain(Architecture(8)), 4)
+
+
+@pytest.mark.parametrize(("of", "to"), [("rgbd", "rgbdxy"), ("rgbd", "ldi3"), ("ldi2", "ldi5")])
+def test_a_network_that_is_told_more_begins_with_what_it_knew(of, to):
+    knew = Chain(Architecture(5, input=of))
+    told = widen(knew, to)
+    x = torch.rand(1, told.architecture.input_channels, 16, 20) - 0.5
+    assert torch.allclose(told(x), knew(x[:, : knew.architecture.input_channels]), atol=1e-6)
+    told(x).square().mean().backward()
+    new = told.convs[0].weight.grad[:, knew.architecture.input_channels :]
+    assert new.abs().amax((1, 2, 3)).gt(0).float().mean() > 0.5
+
+
+@pytest.mark.parametrize(("of", "to"), [("ldi2", "rgbd"), ("rgbdxy", "ldi2"), ("field", "rgbd"), ("rgbd", "seeded"), ("ldi3", "ldi2")])
+def test_a_network_is_told_nothing_less_and_nothing_else(of, to):
+    with pytest.raises(ValueError, match="do not begin with"):
+        widen(Chain(Architecture(5, input=of)), to)
 
 
 def test_heads_mean_what_the_contract_says():

@@ -10,7 +10,9 @@ import pytest
 import torch
 from PIL import Image
 
+from phasefront_training.data import Manifest
 from phasefront_training.encode import DeepDoublePhase, double_phase, scale_of
+from phasefront_training.evaluate import visible_layers
 from phasefront_training.export import float_model, write
 from phasefront_training.export_int8 import int8_model
 from phasefront_training.networks import Architecture, Chain
@@ -73,3 +75,20 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
     step = np.pi / 256
     assert np.median(np.abs(apart)) < step
     assert (np.abs(apart) > 2 * step).mean() < (0.04 if precision == "int8" else 0.01)
+
+
+def test_what_is_visible_by_waves_is_the_labs(tmp_path):
+    if not COMMAND.exists():
+        pytest.skip(f"the command is not built: {COMMAND}")
+    size = ["--scenes", "1", "--size", "61", "--planes", "23", "--ldi-layers", "1"]
+    subprocess.run([COMMAND, "dataset", *size, "-o", tmp_path / "data"], check=True)
+    manifest = Manifest.read(tmp_path / "data")
+    pair = np.load(manifest.pair(0))
+    assert pair["rgb"][..., 3].all()
+    colour = torch.from_numpy(pair["rgb"][0, ..., :3].transpose(2, 0, 1) / np.float32(255))
+    depth = torch.from_numpy(pair["depth"] / np.float32(65535))
+    truth = torch.from_numpy(pair["hologram"])
+    field = visible_layers(manifest.display, 23)(colour, depth)
+    error = (field - truth).abs().square().mean() / truth.abs().square().mean()
+    # What leaves the frame comes back in part, and both pad it by other amounts.
+    assert error < 1e-4
