@@ -134,32 +134,26 @@ impl<'a> Method<'a> {
         display: &Display,
     ) -> Result<Self> {
         let name = name.into();
-        let layers = match network.input() {
-            InputKind::Rgbd | InputKind::RgbdXy => 1,
-            InputKind::Seeded => return Self::seeded(name, network, size, display),
-            InputKind::Ldi { layers } => layers,
-            other => {
-                return Err(phasefront::Error::Network(format!(
-                    "it takes '{other}'; a network for 'rgbd', 'seeded' or layered depth images is needed"
-                ))
-                .into());
-            }
-        };
+        if network.input() == InputKind::Seeded {
+            return Self::seeded(name, network, size, display);
+        }
+        let of_layers = matches!(network.input(), InputKind::Ldi { .. });
+        if !of_layers && !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
+            return Err(phasefront::Error::Network(format!(
+                "it takes '{}'; a network for 'rgbd', 'seeded' or layered depth images is needed",
+                network.input()
+            ))
+            .into());
+        }
         check_display(network, display)?;
         let plan = network.plan(size, size)?;
-        let (kind, head) = (network.input(), network.head());
         Ok(Self::new(name, move |ldi| {
-            let mut input = network_input(ldi, layers);
-            if kind == InputKind::RgbdXy {
-                let place = |at: usize| (at as f32 + 0.5) / size as f32 - 0.5;
-                input.extend((0..size * size).map(|i| place(i % size)));
-                input.extend((0..size * size).map(|i| place(i / size)));
-            }
-            let mut output = vec![0.0; plan.channels().1 * size * size];
-            plan.run(&input, &mut output, &mut plan.scratch())?;
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            head.field(kind, &output, &input, values)?;
+            match of_layers {
+                true => plan.field(ldi, values, &mut plan.scratch())?,
+                false => plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?,
+            }
             remove_mean_phase(values);
             Ok(field)
         }))
@@ -216,29 +210,6 @@ pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
         depth: depth.clone(),
     };
     Ldi::new(std::iter::once(front).chain(behind).collect())
-}
-
-/// A network's input of `layers` layers, (4·layers, H, W): colour and depth of each, minus ½; black and farthest
-/// where there is no hit.
-fn network_input(ldi: &Ldi, layers: usize) -> Vec<f32> {
-    let (height, width) = ldi.shape();
-    let mut input = Vec::with_capacity(4 * layers * height * width);
-    for layer in 0..layers {
-        for channel in 0..4 {
-            for y in 0..height {
-                for x in 0..width {
-                    let layer = ldi.layers.get(layer).filter(|l| !l.depth[(y, x)].is_nan());
-                    input.push(match (layer, channel) {
-                        (Some(layer), 3) => layer.depth[(y, x)] - 0.5,
-                        (Some(layer), c) => layer.rgb[(c, y, x)] - 0.5,
-                        (None, 3) => 0.5,
-                        (None, _) => -0.5,
-                    });
-                }
-            }
-        }
-    }
-    input
 }
 
 /// How a field is shown.

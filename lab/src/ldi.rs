@@ -9,6 +9,7 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageReader};
 use ndarray::{Array2, Array3};
+use phasefront::network::Source;
 
 use crate::error::{Error, Result};
 
@@ -36,6 +37,26 @@ impl PartialEq for LdiLayer {
             && self.depth.dim() == other.depth.dim()
             && self.rgb.iter().zip(&other.rgb).all(|(a, b)| same(a, b))
             && self.depth.iter().zip(&other.depth).all(|(a, b)| same(a, b))
+    }
+}
+
+/// The planes of [`phasefront::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn, each minus ½;
+/// black and farthest where there is no hit, or no such layer.
+impl Source for Ldi {
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
+        let Some(layer) = self.layers.get(plane / 4) else {
+            return into.fill(if plane % 4 == 3 { 0.5 } else { -0.5 });
+        };
+        for (x, to) in into.iter_mut().enumerate() {
+            let at = (row, from + x);
+            let depth = layer.depth[at];
+            *to = match (plane % 4, depth.is_nan()) {
+                (3, true) => 0.5,
+                (3, false) => depth - 0.5,
+                (_, true) => -0.5,
+                (colour, false) => layer.rgb[(colour, at.0, at.1)] - 0.5,
+            };
+        }
     }
 }
 
@@ -365,6 +386,39 @@ mod tests {
             .collect();
         names.sort();
         names
+    }
+
+    #[test]
+    fn networks_read_layers_in_turn_and_black_at_the_back_where_there_is_none() {
+        let ldi = sample();
+        let read = |plane: usize, row: usize| {
+            let mut values = [f32::NAN; 4];
+            ldi.read(plane, row, 2, &mut values);
+            values
+        };
+        for row in 0..5 {
+            for (index, layer) in ldi.layers.iter().enumerate() {
+                for channel in 0..4 {
+                    for (value, x) in read(4 * index + channel, row).into_iter().zip(2..) {
+                        let depth = layer.depth[(row, x)];
+                        let there = match (channel, depth.is_nan()) {
+                            (3, _) => {
+                                if depth.is_nan() {
+                                    1.0
+                                } else {
+                                    depth
+                                }
+                            }
+                            (_, true) => 0.0,
+                            (c, false) => layer.rgb[(c, row, x)],
+                        };
+                        assert_eq!(value, there - 0.5, "{index} {channel} {row} {x}");
+                    }
+                }
+            }
+            assert_eq!(read(8, row), [-0.5; 4]);
+            assert_eq!(read(11, row), [0.5; 4]);
+        }
     }
 
     #[test]

@@ -7,6 +7,8 @@ use num_complex::Complex32;
 use phasefront::depth::sharpness;
 use phasefront::encode::Scale;
 use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
+use phasefront::method::check_display;
+use phasefront::network::{Engine, InputKind};
 use phasefront::{Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
@@ -24,10 +26,10 @@ use std::time::{Duration, Instant};
 pub(crate) struct Hologram {
     #[command(flatten)]
     frame: FrameFlags,
-    /// Folder of a layered depth image, for --method layers and points
+    /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
     #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
     ldi: Option<PathBuf>,
-    /// How the midpoint hologram is made [default: network; layers with --ldi]
+    /// How the midpoint hologram is made [default: network; layers with --ldi and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder); seeded-6 with --method seeded]
@@ -154,16 +156,18 @@ impl Hologram {
             }
         }
         let display = self.display.read()?;
-        let method = self.method.unwrap_or(match self.ldi {
-            Some(_) => Method::Layers,
-            None => Method::Network,
+        let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
+            (Some(_), None) => Method::Layers,
+            _ => Method::Network,
         });
         let device = self.backend.device()?;
         if device.is_some()
-            && (matches!(method, Method::Layers | Method::Points) || self.complex.is_some())
+            && (matches!(method, Method::Layers | Method::Points)
+                || self.complex.is_some()
+                || self.ldi.is_some())
         {
             return Err(Error::Input(
-                "--backend gpu runs --method network, sweep, seeded and auto, without --complex; the rest is the CPU's"
+                "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex; the rest is the CPU's"
                     .into(),
             ));
         }
@@ -196,18 +200,18 @@ impl Hologram {
                 let encoder = self.encoder.read()?;
                 self.by_core("sweep", method, &display, encoder, device.as_ref())?
             }
-            (Method::Auto, _) | (Method::Network | Method::Sweep | Method::Seeded, Some(_)) => {
+            (Method::Auto, _) | (Method::Sweep | Method::Seeded, Some(_)) => {
                 return Err(Error::Input(
-                    "--method network, sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points"
+                    "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
                         .into(),
                 ));
             }
-            (Method::Layers | Method::Points, source) => {
+            (Method::Layers | Method::Points | Method::Network, source) => {
                 let ldi = match source {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_physics(method, &ldi, &display, self.encoder.read()?)?
+                self.by_layers(method, &ldi, &display, self.encoder.read()?)?
             }
         };
         let info = HologramInfo {
@@ -290,7 +294,7 @@ impl Hologram {
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
-            engine: engine.map(|engine| format!("{} ({})", engine.name, engine.why)),
+            engine: engine.map(described),
         })
     }
 
@@ -340,8 +344,8 @@ impl Hologram {
         })
     }
 
-    /// The methods that need no network, on a layered depth image.
-    fn by_physics(
+    /// The methods for layered depth images.
+    fn by_layers(
         &self,
         method: Method,
         ldi: &Ldi,
@@ -368,7 +372,16 @@ impl Hologram {
             bar.set_length(total as u64);
             bar.set_position(done as u64);
         };
+        let mut engine = None;
         let (stage, mut field) = match method {
+            Method::Network => {
+                let plan = self.network_for_layers(display)?.plan(height, width)?;
+                let mut field = Array3::zeros((3, height, width));
+                let values = field.as_slice_mut().expect("standard layout");
+                plan.field(ldi, values, &mut plan.scratch())?;
+                engine = Some(described(plan.engine()));
+                ("network", field)
+            }
             Method::Points => {
                 bar.set_message("rows");
                 let occlusion = self.occlusion.occlusion();
@@ -409,8 +422,29 @@ impl Hologram {
                 ("propagate", propagate),
                 ("encode", modulation.encode),
             ],
-            engine: None,
+            engine,
         })
+    }
+
+    /// The network of --network, which must take layers and be for `display`.
+    fn network_for_layers(
+        &self,
+        display: &phasefront::Display,
+    ) -> Result<Arc<phasefront::Network>> {
+        let name = self.network.as_deref().ok_or_else(|| {
+            Error::Input(
+                "--method network with --ldi needs a --network for layered depth images".into(),
+            )
+        })?;
+        let network = models::network(name, self.precision.is_int8())?;
+        if !matches!(network.input(), InputKind::Ldi { .. }) {
+            return Err(Error::Input(format!(
+                "--network {name} takes '{}'; for a layered depth image one for 'ldi2' to 'ldi9' is needed",
+                network.input()
+            )));
+        }
+        check_display(&network, display)?;
+        Ok(network)
     }
 
     fn scale(&self) -> Scale {
@@ -440,6 +474,10 @@ impl Hologram {
             ),
         );
     }
+}
+
+fn described(engine: &Engine) -> String {
+    format!("{} ({})", engine.name, engine.why)
 }
 
 fn slices<'a>(

@@ -68,6 +68,16 @@ impl Isa {
         found
     }
 
+    /// The int8 kernels that are fastest here for hidden layers of `filters` filters: a tile of AMX that is half empty
+    /// loses to VNNI.
+    pub fn int8_for(filters: usize) -> Isa {
+        let found = Isa::int8();
+        match (found[0], found.get(1)) {
+            (Isa::Amx, Some(&next)) if filters <= 8 => next,
+            (fastest, _) => fastest,
+        }
+    }
+
     /// The f32 kernels that this processor runs, fastest first; the last is always [`Isa::Portable`].
     pub fn f32() -> Vec<Isa> {
         let mut found = Vec::new();

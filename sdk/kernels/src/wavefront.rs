@@ -27,10 +27,9 @@ pub struct Tiling {
     pub strip_columns: usize,
 }
 
-/// A tiling for `chain` on the current pool, by reasoning and not yet by measurement: two bands a thread where the frame is high enough that little is
-/// computed twice, and strips whose rings stay in a core's second-level cache.
+/// A tiling for `chain` on the current pool: two bands a thread where the frame is high enough that little is
+/// computed twice, and strips whose rings stay in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
-    const CACHE: usize = 1 << 20;
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
         .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
@@ -41,7 +40,9 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
         .div_ceil(threads * bands_a_thread)
         .max((4 * layers).min(height))
         .max(1);
-    let widest = (CACHE / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
+    let widest = (C::CACHE / ring_column.max(1))
+        .max(24 * layers)
+        .max(4 * BLOCK);
     let strip_columns = width.div_ceil(width.div_ceil(widest).max(1)).max(1);
     Tiling {
         band_rows,
@@ -108,6 +109,8 @@ pub(crate) trait Chain: Sync {
     type Element: Copy + Default + Send + Sync;
     /// Channels in a group: elements of one pixel that lie together.
     const GROUP: usize;
+    /// Bytes that the rings of a strip may take.
+    const CACHE: usize;
 
     fn layers(&self) -> usize;
     /// Channels of the network's input.

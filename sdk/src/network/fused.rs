@@ -38,10 +38,12 @@ impl FusedChain {
     ///
     /// The error says what the kernels cannot run.
     pub(super) fn new(chain: &Chain, isa: Option<Isa>) -> Result<FusedChain, String> {
-        let fastest = |found: Vec<Isa>| isa.or(found.first().copied()).unwrap_or(Isa::Portable);
         let kernels = match chain.precision {
-            Precision::Int8 => Kernels::Int8(int8(chain, fastest(Isa::int8()))?),
-            Precision::F32 => Kernels::F32(f32(chain, fastest(Isa::f32()))?),
+            Precision::Int8 => {
+                let isa = isa.unwrap_or_else(|| Isa::int8_for(chain.filters()));
+                Kernels::Int8(int8(chain, isa)?)
+            }
+            Precision::F32 => Kernels::F32(f32(chain, isa.unwrap_or_else(|| Isa::f32()[0]))?),
         };
         Ok(FusedChain {
             kernels,
