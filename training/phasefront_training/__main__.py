@@ -57,7 +57,8 @@ def parser():
     p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
     training_flags(p, crop=384, rate=2e-4)
     resume_flag(p)
-    p.add_argument("--init", metavar="FILE", help="the hologram network of stage 1, a checkpoint or a float32 .onnx")
+    p.add_argument("--init", metavar="FILE", help="the hologram network, of stage 1 or 2: a checkpoint or a float32 .onnx")
+    p.add_argument("--init-prefilter", metavar="FILE", help="the pre-filter to go on from, a float32 .onnx; without it a new one")
     p.add_argument("--offset-mm", type=float, default=0.0, help="from the midpoint hologram to the modulator (default 0)")
     p.add_argument("--identity-steps", type=int, default=0, help="steps that teach the pre-filter first to give true holograms as they are, as in the paper (default 0: it begins as the blur of AA-DPM)")
     p.add_argument("--prefilter-layers", type=int, default=8, help="convolution layers of the pre-filter (default 8)")
@@ -188,7 +189,7 @@ def run_stage2(args):
         if not args.init:
             raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
         hologram, _ = checkpoint.load_network(args.init)
-        prefilter = prefilter_network(args.prefilter_layers, args.prefilter_filters)
+        prefilter = begun_prefilter(args)
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
     train, validation = load(args, hologram.architecture)
@@ -198,6 +199,16 @@ def run_stage2(args):
         identity = Identity(model, train, validation, workers, **{k: v for k, v in options.items() if k != "planes"})
         loop.fit(identity, loop.Budget(steps=args.identity_steps), 10 * args.rate, Path(args.output) / "identity", workers)
     go(Stage2(model, train, validation, workers, **options), args, workers, resume)
+
+
+def begun_prefilter(args):
+    """A fresh pre-filter, or the one of --init-prefilter."""
+    if not args.init_prefilter:
+        return prefilter_network(args.prefilter_layers, args.prefilter_filters)
+    network, _ = checkpoint.load_network(args.init_prefilter)
+    if not network.architecture.of_fields:
+        raise ValueError(f"{args.init_prefilter}: it takes '{network.architecture.input}', a pre-filter takes a field")
+    return network
 
 
 def sampling(args):

@@ -129,7 +129,13 @@ def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, 
     path = tmp_path / "pre.onnx"
     assert main(["export", str(second / "checkpoint.pt"), "--network", "prefilter", "-o", str(path)]) == 0
     assert read_description(path)["input"] == "blurred-field" and read_description(path)["offset_mm"] == "1"
-    capsys.readouterr()
+    again = ["stage2", *common, "-o", str(tmp_path / "again"), "--init", str(second / "checkpoint.pt"), "--offset-mm", "1", "--steps", "1", "--rate", "0"]
+    assert main([*again, "--init-prefilter", str(path)]) == 0
+    begun = Checkpoint.load(tmp_path / "again" / "checkpoint.pt")
+    for name in ("hologram", "prefilter"):
+        assert all(torch.equal(w, last.networks[name][1][k]) for k, w in begun.networks[name][1].items())
+    assert main([*again, "--init-prefilter", str(first / "checkpoint.pt")]) == 1
+    assert "a pre-filter takes a field" in capsys.readouterr().err
     assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder)]) == 0
     exact = capsys.readouterr().out
     assert "deep double phase" in exact and "anti-aliased" in exact
