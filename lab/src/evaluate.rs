@@ -6,13 +6,14 @@
 //! The truth is always the data set's complex field. Pairs are valid to their border, so the whole
 //! frame counts.
 
+use crate::calibrate::table::{self, AberrationFile};
 use crate::dataset::{self, Manifest};
 use crate::error::Result;
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
 use crate::metrics;
 use crate::point_based::{self, Occlusion};
-use crate::reconstruct::APERTURE_RADIUS;
+use crate::reconstruct::{APERTURE_RADIUS, AberratedOptics};
 use crate::scene::dice::Dice;
 use crate::sm_lbm;
 use ndarray::{Array2, Array3, Axis, concatenate};
@@ -285,10 +286,12 @@ pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-/// What looks at holograms of one data set: plans for its shape and display.
+/// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration that is
+/// one for all depths, it looks through that (the paper's Fig. 8).
 pub struct Viewer {
     display: Display,
     size: usize,
+    optics: Option<AberratedOptics>,
     complex: Refocus,
     apertured: Refocus,
 }
@@ -302,7 +305,15 @@ impl Viewer {
         let display = manifest.display.clone();
         let ends = [0.5, -0.5].map(|part| part * display.volume_depth_m());
         let plan = |aperture| Refocus::new(manifest.size, manifest.size, &display, &ends, aperture);
+        let correction = match table::aberrations(&manifest.aberration) {
+            Ok(AberrationFile::Uniform(all)) => all.constant(),
+            _ => None,
+        };
+        let shape = (manifest.size, manifest.size);
         Ok(Viewer {
+            optics: correction
+                .map(|correction| AberratedOptics::new(shape, &display, &correction))
+                .transpose()?,
             complex: plan(None)?,
             apertured: plan(Some(APERTURE_RADIUS))?,
             size: manifest.size,
@@ -341,6 +352,9 @@ impl Viewer {
                 &self.apertured
             }
         };
+        if let Some(optics) = &self.optics {
+            optics.pass(&mut values);
+        }
         let views = refocus.focal_stack(&values, z_m)?;
         Ok((views.into_iter())
             .map(|view| Array3::from_shape_vec((3, size, size), view).expect("the field's shape"))

@@ -5,11 +5,49 @@ use crate::error::{Error, Result};
 use crate::files::{DisplayFile, Hologram, HologramInfo};
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Display;
 use phasefront::refocus::{Refocus, phase_only_field};
 use phasefront::wave::asm::Propagator;
+use phasefront::wave::zernike::Aberration;
 
 /// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
 pub const APERTURE_RADIUS: f64 = 1.0;
+
+/// Optics with an aberration that is one for all depths, for holograms of one shape.
+pub struct AberratedOptics([Propagator; 3]);
+
+impl AberratedOptics {
+    /// Those that `correction` corrects.
+    ///
+    /// # Errors
+    /// An empty shape.
+    pub fn new(
+        (height, width): (usize, usize),
+        display: &Display,
+        correction: &Aberration,
+    ) -> Result<Self> {
+        let pitch_m = display.pitch_m();
+        let plans = Propagator::for_colours_corrected(
+            height,
+            width,
+            pitch_m,
+            display.wavelengths_m(),
+            0.0,
+            &correction.reversed(),
+            pitch_m,
+        )?;
+        Ok(AberratedOptics(plans))
+    }
+
+    /// What becomes of `field`, (3, H, W), on its way through.
+    pub fn pass(&self, field: &mut [Complex32]) {
+        let mut scratch = self.0[0].scratch();
+        let area = field.len() / 3;
+        for (plan, plane) in self.0.iter().zip(field.chunks_exact_mut(area)) {
+            plan.propagate(plane, &mut scratch);
+        }
+    }
+}
 
 impl Hologram {
     /// (H, W).
@@ -67,21 +105,8 @@ impl Hologram {
         if let Some(AberrationFile::Uniform(all)) = &file.aberration
             && let Some(correction) = all.constant()
         {
-            let display = &info.display;
-            let plans = Propagator::for_colours_corrected(
-                height,
-                width,
-                display.pitch_m(),
-                display.wavelengths_m(),
-                0.0,
-                &correction.reversed(),
-                display.pitch_m(),
-            )?;
-            let mut scratch = plans[0].scratch();
-            let values = field.as_slice_mut().expect("standard layout");
-            for (plan, plane) in plans.iter().zip(values.chunks_exact_mut(height * width)) {
-                plan.propagate(plane, &mut scratch);
-            }
+            let optics = AberratedOptics::new(shape, &info.display, &correction)?;
+            optics.pass(field.as_slice_mut().expect("standard layout"));
         } else if file.aberration.is_some() {
             return Err(Error::Input(
                 "the display's aberration changes over depth or over the frame; such views cannot be made yet, leave the aberration out of the display's file".into(),

@@ -733,6 +733,39 @@ fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
 }
 
 #[test]
+fn a_network_for_layers_takes_a_layered_depth_image() {
+    let folder = Folder::new();
+    folder.succeeds(&[
+        "scene", "--seed", "5", "--size", "61x47", "--layers", "2", "-o", "a",
+    ]);
+    let network = format!("{MODELS}/ldi3-15-int8.onnx");
+    let call = [
+        "hologram",
+        "--ldi",
+        "a",
+        "--network",
+        &network,
+        "-o",
+        "h.png",
+    ];
+    let made: serde_json::Value =
+        serde_json::from_str(&folder.succeeds(&[&call[..], &["--json"]].concat())).unwrap();
+    assert!(made["stage_ms"]["network"].is_number(), "{made}");
+    let engine = made["engine"].as_str().unwrap();
+    assert!(
+        engine.contains("15 layers of 24 filters in int8"),
+        "{engine}"
+    );
+    let ldi = ["hologram", "--ldi", "a", "-o", "h.png"];
+    let method = [&ldi[..], &["--method", "network"]].concat();
+    folder.refuses(&method, 1, &["--network for layered depth images"]);
+    let flat = [&ldi[..], &["--network", "8"]].concat();
+    folder.refuses(&flat, 1, &["takes 'rgbd'", "'ldi2' to 'ldi9'"]);
+    let gpu = [&call[..], &["--backend", "gpu"]].concat();
+    folder.refuses(&gpu, 1, &["on RGB-D"]);
+}
+
+#[test]
 fn a_pre_filter_belongs_to_the_deep_encoder() {
     let folder = Folder::new().with_frame();
     let hologram_network = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/rgbd-8.onnx");

@@ -8,8 +8,10 @@ use phasefront::encode::{Encoding, Scale};
 use phasefront::modulator::Modulator;
 use phasefront::slm::Response;
 use phasefront::wave::asm::{Padding, Propagator};
+use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::dataset::{self, Manifest};
-use phasefront_lab::evaluate::{self, Method, Row, Shown};
+use phasefront_lab::evaluate::{self, Method, Row, Shown, Viewer};
 use phasefront_lab::files::{self, Hologram, HologramInfo};
 use phasefront_lab::{metrics, models, scene, sm_lbm};
 use std::fs;
@@ -27,8 +29,13 @@ struct Data {
 
 impl Data {
     fn new() -> Self {
+        Self::correcting(None)
+    }
+
+    fn correcting(aberration: Option<&AberrationFile>) -> Self {
         let dir = tempfile::tempdir().unwrap();
         let manifest = Manifest::new(80, SIZE, PLANES, 3, 4, Display::default()).unwrap();
+        let manifest = manifest.correcting(aberration);
         assert_eq!(manifest.splits.test, [78, 80]);
         for shard in [78, 79] {
             dataset::make(&manifest, dir.path(), (shard, 80), &|| {}).unwrap();
@@ -181,6 +188,44 @@ fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
     assert!(visible.focal_ssim > rgb.focal_ssim);
 }
 
+/// Fig. 8: where a data set's holograms correct an aberration, all are looked at through it.
+#[test]
+fn holograms_that_correct_an_aberration_are_judged_through_it() {
+    let cylinder = Aberration::new([[2.0, 4.0, 0.0, 0.0, 0.0]; 3]).unwrap();
+    let all = Aberrations::new(vec![(0.0, cylinder)]).unwrap();
+    let plain = Data::new();
+    let corrected = Data::correcting(Some(&AberrationFile::Uniform(all)));
+    let psnr = |data: &Data, method: Method<'_>| {
+        data.evaluate(&[method], &[Shown::complex()])[0]
+            .mean
+            .amplitude_psnr
+    };
+    let display = Display::default();
+    let layers = || Method::layers(&display, PLANES);
+    assert!(psnr(&plain, layers()) > 100.0);
+    // What corrects nothing is blurred.
+    let blurred = psnr(&corrected, layers());
+    assert!(blurred < 25.0, "{blurred}");
+    // The correcting holograms look through the cylinder as the others do without: but for light over the rim.
+    let z_m = [0.0, 1e-3];
+    let see = |data: &Data| {
+        let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
+        let viewer = Viewer::new(&data.manifest).unwrap();
+        viewer
+            .views(&pair.hologram, &Shown::complex(), &z_m)
+            .unwrap()
+    };
+    let inner = ndarray::s![.., 12..SIZE - 12, 12..SIZE - 12];
+    for (there, here) in see(&corrected).iter().zip(&see(&plain)) {
+        let figures = metrics::compare(there.slice(inner), here.slice(inner)).unwrap();
+        assert!(
+            figures.psnr_overall > blurred + 6.0,
+            "{} {blurred}",
+            figures.psnr_overall
+        );
+    }
+}
+
 #[test]
 fn encoded_fields_are_judged_as_their_files_look() {
     let data = Data::new();
@@ -259,9 +304,14 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
 fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let data = Data::new();
     let network = models::network("8", false).unwrap();
-    let method = Method::network("8", &network, SIZE, &data.manifest.display).unwrap();
-    let rows = data.evaluate(&[method, Method::rgb()], &[Shown::complex()]);
-    assert!(rows[0].mean.amplitude_psnr > rows[1].mean.amplitude_psnr);
+    let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/ldi3-15.onnx");
+    let layers = models::network(layers, false).unwrap();
+    let judged = [("8", &network), ("layers", &layers)]
+        .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());
+    let [flat, layers] = judged;
+    let rows = data.evaluate(&[flat, layers, Method::rgb()], &[Shown::complex()]);
+    let psnr: Vec<f64> = rows.iter().map(|row| row.mean.amplitude_psnr).collect();
+    assert!(psnr[0] > psnr[2] && psnr[1] > psnr[2] + 3.0, "{psnr:?}");
     let deep = Display::from_toml("volume_depth_mm = 12").unwrap();
     let refused = Method::network("8", &network, SIZE, &deep).err().unwrap();
     assert!(refused.to_string().contains("volume depth"), "{refused}");

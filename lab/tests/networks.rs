@@ -34,10 +34,7 @@ fn pairs_are_for_their_offset_and_display() {
             let plan = hologram.plan(40, 64).unwrap();
             assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
             let plan = prefilter.filter_plan(40, 64).unwrap();
-            assert_eq!(
-                plan.engine().name,
-                hologram.plan(40, 64).unwrap().engine().name
-            );
+            assert!(plan.engine().isa.is_some());
         }
     }
     let none = |display: Display| models::pair_for(&display, true).unwrap().is_none();

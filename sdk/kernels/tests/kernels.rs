@@ -492,6 +492,18 @@ fn chains_that_kernels_cannot_run_are_refused() {
 }
 
 #[test]
+fn chains_of_few_filters_leave_amx_alone() {
+    for filters in [8, 16, 24] {
+        let isa = Isa::int8_for(filters);
+        assert!(Isa::int8().contains(&isa));
+        assert_eq!(
+            isa == Isa::int8()[0],
+            filters > 8 || isa != Isa::Avx512Vnni || !Isa::int8().contains(&Isa::Amx)
+        );
+    }
+}
+
+#[test]
 fn every_instruction_set_but_the_portable_one_has_a_peak() {
     let duration = std::time::Duration::from_millis(1);
     for isa in Isa::int8() {
