@@ -27,15 +27,17 @@ pub struct Tiling {
     pub strip_columns: usize,
 }
 
-/// A tiling for `chain` on the current pool: two bands a thread where the frame is high enough that little is
-/// computed twice, and strips whose rings stay in [`Chain::CACHE`].
+/// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as long as
+/// a twelfth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
         .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
         .sum();
     let threads = rayon::current_num_threads();
-    let bands_a_thread = (height / (threads * 32 * layers)).clamp(1, 2);
+    // At each edge between two bands layer i computes layers − 1 − i rows on both sides.
+    let bands = 1 + height / (12 * layers.max(2) - 12);
+    let bands_a_thread = (bands / threads).clamp(1, 3);
     let band_rows = height
         .div_ceil(threads * bands_a_thread)
         .max((4 * layers).min(height))
