@@ -738,7 +738,7 @@ fn a_network_for_layers_takes_a_layered_depth_image() {
     folder.succeeds(&[
         "scene", "--seed", "5", "--size", "61x47", "--layers", "2", "-o", "a",
     ]);
-    let network = format!("{MODELS}/ldi3-15-int8.onnx");
+    let network = format!("{MODELS}/ldi3-15.onnx");
     let call = [
         "hologram",
         "--ldi",
@@ -753,7 +753,7 @@ fn a_network_for_layers_takes_a_layered_depth_image() {
     assert!(made["stage_ms"]["network"].is_number(), "{made}");
     let engine = made["engine"].as_str().unwrap();
     assert!(
-        engine.contains("15 layers of 24 filters in int8"),
+        engine.contains("15 layers of 24 filters in f32"),
         "{engine}"
     );
     let ldi = ["hologram", "--ldi", "a", "-o", "h.png"];

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, seeds, shards
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, revive, seeds, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
 from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
+REVIVAL_SCENES = 4  # that show which units never fire
 VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
 
 
@@ -177,7 +178,11 @@ def begun(args, wanted, train):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
     if found.input != wanted.input:
         network = grow.widen(network, wanted.input)
-    return grow.grow(network, args.layers, quantize.examples(train, network.architecture.coordinates))
+    seen = list(quantize.examples(train, network.architecture.coordinates))
+    grown = grow.grow(network, args.layers, seen)
+    if revived := revive.revive(grown, seen[:REVIVAL_SCENES]):
+        print(f"{args.init}: {revived} units that never fire begin again", file=sys.stderr)
+    return grown
 
 
 def run_stage2(args):

@@ -89,26 +89,6 @@ class Architecture:
         return asdict(self)
 
 
-class Relu(torch.autograd.Function):
-    """ReLU whose gradient leaks where it does not fire.
-
-    Without, units of the deeper layers die for good: of the 24 in every second layer of a 15-layer network half were left
-    in the middle and none at the end.
-    """
-
-    LEAK = 0.1
-
-    @staticmethod
-    def forward(ctx, x):
-        ctx.save_for_backward(x > 0)
-        return F.relu(x)
-
-    @staticmethod
-    def backward(ctx, gradient):
-        (fires,) = ctx.saved_tensors
-        return torch.where(fires, gradient, Relu.LEAK * gradient)
-
-
 class Chain(nn.Module):
     """The chain; `forward` gives the six channels of the last layer (after tanh for `amplitude-phase`)."""
 
@@ -142,7 +122,7 @@ class Chain(nn.Module):
                 h = torch.cat([h, x.to(h.dtype)], 1)
             h = conv(h)
             if i < last:
-                h = Relu.apply(h)
+                h = F.relu(h)
         return torch.tanh(h.float()) if self.architecture.head == "amplitude-phase" else h.float()
 
     def field(self, x):
