@@ -24,11 +24,10 @@ class MuonAndAdam:
         hidden = set(map(id, self.hidden))
         rest = [p for p in module.parameters() if id(p) not in hidden]
         self.parts = {
-            "muon": torch.optim.Muon(
-                self.matrices, MUON_RATE * learning_rate, weight_decay=0.0, momentum=MOMENTUM, adjust_lr_fn="match_rms_adamw"
-            ),
-            "adam": torch.optim.Adam(rest, learning_rate, betas=BETAS, fused=True),
+            "muon": torch.optim.Muon(self.matrices, weight_decay=0.0, momentum=MOMENTUM, adjust_lr_fn="match_rms_adamw"),
+            "adam": torch.optim.Adam(rest, betas=BETAS, fused=True),
         }
+        self.set_rate(learning_rate)
 
     def set_rate(self, rate):
         for name, part in self.parts.items():
