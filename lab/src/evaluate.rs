@@ -300,14 +300,17 @@ impl Viewer {
     /// Plans views from anywhere in the volume.
     ///
     /// # Errors
-    /// A volume that cannot be propagated through.
+    /// A volume that cannot be propagated through, or an aberration that is none.
     pub fn new(manifest: &Manifest) -> Result<Self> {
         let display = manifest.display.clone();
         let ends = [0.5, -0.5].map(|part| part * display.volume_depth_m());
         let plan = |aperture| Refocus::new(manifest.size, manifest.size, &display, &ends, aperture);
-        let correction = match table::aberrations(&manifest.aberration) {
-            Ok(AberrationFile::Uniform(all)) => all.constant(),
-            _ => None,
+        let correction = match manifest.aberration.is_empty() {
+            true => None,
+            false => match table::aberrations(&manifest.aberration)? {
+                AberrationFile::Uniform(all) => all.constant(),
+                AberrationFile::Spatial(_) => None,
+            },
         };
         let shape = (manifest.size, manifest.size);
         Ok(Viewer {
