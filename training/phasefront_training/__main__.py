@@ -1,6 +1,7 @@
 """The command: `python -m phasefront_training COMMAND`. Flags are defined here, once; the work is elsewhere."""
 
 import argparse
+import itertools
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from .stage1 import Stage1
 from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
-REVIVAL_SCENES = 4  # that show which units never fire
+BEGINNING_SCENES = 4  # that show which units never fire, and what a grown last layer is fitted to
 VALIDATION_SCENES = 8  # of the curve; `evaluate` takes all
 
 
@@ -84,6 +85,7 @@ def parser():
     p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
     p.add_argument("checkpoint")
     p.add_argument("--prefilter", metavar="FILE", help="an .onnx to judge instead of the checkpoint's own pre-filter, such as its int8 form")
+    p.add_argument("--degraded", action="store_true", help="on depth as phones give it")
     evaluation_flags(p)
 
     p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
@@ -178,9 +180,9 @@ def begun(args, wanted, train):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
     if found.input != wanted.input:
         network = grow.widen(network, wanted.input)
-    seen = list(quantize.examples(train, network.architecture.coordinates))
+    seen = list(itertools.islice(quantize.examples(train, network.architecture.coordinates), BEGINNING_SCENES))
     grown = grow.grow(network, args.layers, seen)
-    if revived := revive.revive(grown, seen[:REVIVAL_SCENES]):
+    if revived := revive.revive(grown, seen):
         print(f"{args.init}: {revived} units that never fire begin again", file=sys.stderr)
     return grown
 
@@ -193,8 +195,8 @@ def run_stage2(args):
     else:
         if not args.init:
             raise ValueError("stage 2 begins with a network of stage 1: --init FILE")
-        hologram, _ = checkpoint.load_network(args.init)
-        prefilter = begun_prefilter(args)
+        hologram, display = checkpoint.load_network(args.init)
+        prefilter = begun_prefilter(args, display)
         offset_m = args.offset_mm * 1e-3
     workers = loop.Workers.start(args.device)
     train, validation = load(args, hologram.architecture)
@@ -206,13 +208,15 @@ def run_stage2(args):
     go(Stage2(model, train, validation, workers, **options), args, workers, resume)
 
 
-def begun_prefilter(args):
-    """A fresh pre-filter, or the one of --init-prefilter."""
+def begun_prefilter(args, display):
+    """A fresh pre-filter, or the one of --init-prefilter, which must be for the same display."""
     if not args.init_prefilter:
         return prefilter_network(args.prefilter_layers, args.prefilter_filters)
-    network, _ = checkpoint.load_network(args.init_prefilter)
+    network, its_display = checkpoint.load_network(args.init_prefilter)
     if not network.architecture.of_fields:
         raise ValueError(f"{args.init_prefilter}: it takes '{network.architecture.input}', a pre-filter takes a field")
+    if its_display != display:
+        raise ValueError(f"{args.init_prefilter} is for {its_display}, {args.init} for {display}")
     return network
 
 
@@ -349,13 +353,14 @@ def run_evaluate_encoding(args):
         del model.prefilter  # a module, which the file is not
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
     scenes = scenes_for(args, args.split, {model.hologram.architecture.input}, args.scenes)
-    results = encoding_figures(model, scenes)
+    results = encoding_figures(model, scenes, args.degraded)
     columns = list(next(iter(results.values())))
     print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
     for name, figures in results.items():
         print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
     if args.json:
-        evaluate.save({"data": scenes_of(args, scenes), "offset_mm": model.offset_m * 1e3, "results": results}, args.json)
+        facts = scenes_of(args, scenes) | {"depth": "degraded" if args.degraded else "clean"}
+        evaluate.save({"data": facts, "offset_mm": model.offset_m * 1e3, "results": results}, args.json)
 
 
 def run_card(args):

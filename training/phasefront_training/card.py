@@ -55,7 +55,8 @@ def describe(name, last, figures):
     lines += ["", "## Figures", ""]
     for each in figures:
         measured = each["data"]
-        lines += [f"On {measured['scenes']} scenes of the {measured['split']} split:", ""]
+        depth = f", {measured['depth']} depth" if "depth" in measured else ""
+        lines += [f"On {measured['scenes']} scenes of the {measured['split']} split{depth}:", ""]
         methods = {Path(method).name: found for method, found in each["results"].items()}
         if "offset_mm" in each:
             columns = list(next(iter(methods.values())))

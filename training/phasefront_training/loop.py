@@ -71,6 +71,8 @@ class Budget:
     def __post_init__(self):
         if (self.steps is None) == (self.minutes is None):
             raise ValueError("a budget is either steps or minutes")
+        if (self.minutes if self.steps is None else self.steps) <= 0:
+            raise ValueError("a budget is more than nothing")
 
     def progress(self, step, elapsed_s):
         return step / self.steps if self.steps else elapsed_s / (60 * self.minutes)

@@ -76,9 +76,7 @@ class Quantized(nn.Module):
         return float(np.float32((high if high > 0 else SILENT) / 255)), 0
 
     def activation(self, name, x):
-        scale, zero = self.parameters_of(name)
-        x = x.clamp(-zero * scale, (255 - zero) * scale)
-        return _through(x, torch.round(x / scale) * scale)
+        return torch.fake_quantize_per_tensor_affine(x, *self.parameters_of(name), 0, 255)
 
     def layer(self, i, input_name):
         """Rounded (weight, bias) of layer i."""

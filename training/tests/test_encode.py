@@ -8,7 +8,7 @@ from phasefront_training.checkpoint import Checkpoint
 from phasefront_training.encode import (
     DeepDoublePhase, anti_alias, aperture, band_limit, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
 )
-from phasefront_training.export import read_description
+from phasefront_training.export import float_model, read_description, write
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
 from phasefront_training.stage2 import prefilter_network
@@ -136,9 +136,15 @@ def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, 
         assert all(torch.equal(w, last.networks[name][1][k]) for k, w in begun.networks[name][1].items())
     assert main([*again, "--init-prefilter", str(first / "checkpoint.pt")]) == 1
     assert "a pre-filter takes a field" in capsys.readouterr().err
+    other = tmp_path / "other.onnx"
+    write(float_model(last.network("prefilter"), Display(pitch_m=6.4e-6), 1e-3), other)
+    assert main([*again, "--init-prefilter", str(other)]) == 1
+    assert "other.onnx is for Display(pitch_m=6.4" in capsys.readouterr().err
     assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder)]) == 0
     exact = capsys.readouterr().out
     assert "deep double phase" in exact and "anti-aliased" in exact
+    assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder), "--degraded"]) == 0
+    assert deep(capsys.readouterr().out) != deep(exact)
     int8 = tmp_path / "pre-int8.onnx"
     before = last.networks["hologram"][1]
     call = ["quantize", str(second / "checkpoint.pt"), "--network", "prefilter", *common, "-o", str(int8)]

@@ -28,6 +28,12 @@ def without_time(curve):
     return [{k: v for k, v in line.items() if k != "elapsed_s"} for line in curve]
 
 
+@pytest.mark.parametrize("budget", [{}, {"steps": 0}, {"minutes": -1}, {"steps": 1, "minutes": 1}], ids=str)
+def test_a_budget_is_one_and_more_than_nothing(budget):
+    with pytest.raises(ValueError, match="budget"):
+        Budget(**budget)
+
+
 @pytest.mark.parametrize("degraded", [0.0, 0.5])
 def test_a_resumed_training_gives_the_same_curve_and_weights(data_folder, tmp_path, degraded):
     budget = Budget(steps=12)
