@@ -11,7 +11,7 @@
 
 use crate::OUTPUTS;
 use crate::avx2::{quantise_row, rescale_row};
-use crate::avx512_vnni::{self, Constants, check_rows, requantise, requantise_sum};
+use crate::avx512_vnni::{self, check_rows, requantise};
 use crate::int8::{GROUP, Kernels, Packed, Taps};
 use crate::wavefront::{BLOCK, Geometry, Window};
 use std::arch::asm;
@@ -388,11 +388,6 @@ fn hidden_filters(
     geometry: Geometry,
 ) {
     let size = (layer.outputs - first).min(FILTERS);
-    let constants = Constants::new(layer, first, size);
-    let groups = first / GROUP * geometry.stride()..(first + size) / GROUP * geometry.stride();
-    let skip = skip.map(|skip| &skip[groups.clone()]);
-    let out = &mut out[groups];
-    let zero = _mm512_set1_epi8(constants.zero_point as i8);
     each_block(
         layer,
         window,
@@ -402,24 +397,13 @@ fn hidden_filters(
         |x, sums| {
             for g in 0..size / GROUP {
                 for (half, sums) in sums.0.iter().enumerate() {
-                    let at = g * geometry.stride() + geometry.start() + (x + half * TILE) * GROUP;
-                    let multiplier = &constants.multiplier[g * GROUP..][..GROUP];
-                    let out = &mut out[at..at + TILE * GROUP];
-                    // SAFETY: the features are this function's; the slices are 64 bytes long.
-                    unsafe {
-                        let four = std::array::from_fn(|k| {
-                            _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast())
-                        });
-                        let value = match (constants.skip, skip) {
-                            (Some(factors), Some(skip)) => {
-                                let skip = &skip[at..at + TILE * GROUP];
-                                let skip = _mm512_loadu_si512(skip.as_ptr().cast());
-                                requantise_sum(four, multiplier, factors, skip)
-                            }
-                            _ => requantise(four, multiplier),
-                        };
-                        _mm512_storeu_si512(out.as_mut_ptr().cast(), _mm512_adds_epu8(value, zero));
-                    }
+                    let group = (first / GROUP + g) * geometry.stride();
+                    let at = group + geometry.start() + (x + half * TILE) * GROUP;
+                    // SAFETY: a line of sums is 64 bytes long.
+                    let four = std::array::from_fn(|k| unsafe {
+                        _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast())
+                    });
+                    requantise(layer, first + g * GROUP, four, skip, out, at);
                 }
             }
         },

@@ -27,24 +27,10 @@ pub(crate) fn available() -> bool {
         && is_x86_feature_detected!("avx512vnni")
 }
 
-/// Filters computed together: their sums fill the 32 registers.
-fn sizes(outputs: usize) -> impl Iterator<Item = usize> {
-    let mut left = outputs;
-    std::iter::from_fn(move || {
-        let size = match left {
-            0 => return None,
-            OUTPUTS => OUTPUTS,
-            8..16 => 8,
-            16..24 => 16,
-            _ => 24,
-        };
-        left -= size;
-        Some(size)
-    })
-}
-
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
-    taps.dot_words(&sizes(taps.outputs()).collect::<Vec<_>>())
+    let outputs = taps.outputs();
+    let together = if outputs == OUTPUTS { OUTPUTS } else { GROUP };
+    taps.dot_words(&vec![together; outputs / together])
 }
 
 fn hidden_row(
@@ -55,48 +41,18 @@ fn hidden_row(
     geometry: Geometry,
 ) {
     let rows = window.rows();
-    let stride = geometry.stride();
-    let mut first = 0;
-    for size in sizes(layer.outputs) {
-        let words = 9 * layer.groups;
-        let weights = &layer.weights[first * words..][..size * words];
-        let constants = Constants::new(layer, first, size);
-        let groups = first / GROUP * stride..(first + size) / GROUP * stride;
-        let skip = skip.map(|skip| &skip[groups.clone()]);
-        let out = &mut out[groups];
-        // SAFETY: `kernels` has found the features. The slices hold what the functions state.
+    check_rows(&rows, layer.groups, geometry);
+    let mut x = 0;
+    while x < geometry.width {
+        let left = geometry.width - x;
+        // SAFETY: `kernels` has found the features, the rows are checked, and a row's blocks are whole.
         unsafe {
-            match size {
-                24 => filters::<24, 1>(
-                    &rows,
-                    layer.groups,
-                    weights,
-                    &constants,
-                    skip,
-                    out,
-                    geometry,
-                ),
-                16 => filters::<16, 1>(
-                    &rows,
-                    layer.groups,
-                    weights,
-                    &constants,
-                    skip,
-                    out,
-                    geometry,
-                ),
-                _ => filters::<8, 2>(
-                    &rows,
-                    layer.groups,
-                    weights,
-                    &constants,
-                    skip,
-                    out,
-                    geometry,
-                ),
+            x += match left {
+                49.. => block::<4>(layer, &rows, x, skip, out, geometry),
+                17.. => block::<2>(layer, &rows, x, skip, out, geometry),
+                _ => block::<1>(layer, &rows, x, skip, out, geometry),
             }
         }
-        first += size;
     }
 }
 
@@ -114,25 +70,6 @@ fn last_row(
     });
 }
 
-/// What follows the sums of some filters.
-pub(crate) struct Constants<'a> {
-    pub(crate) bias: &'a [i32],
-    pub(crate) multiplier: &'a [f32],
-    pub(crate) skip: Option<SkipSum>,
-    pub(crate) zero_point: u8,
-}
-
-impl<'a> Constants<'a> {
-    pub(crate) fn new(layer: &'a Packed, first: usize, size: usize) -> Self {
-        Constants {
-            bias: &layer.bias[first..first + size],
-            multiplier: &layer.multiplier[first..first + size],
-            skip: layer.skip,
-            zero_point: layer.zero_point,
-        }
-    }
-}
-
 /// Checks that three rows hold `groups` groups of blocks and margins, so that block reads stay inside.
 pub(crate) fn check_rows(rows: &[&[u8]; 3], groups: usize, geometry: Geometry) {
     assert!(
@@ -142,48 +79,33 @@ pub(crate) fn check_rows(rows: &[&[u8]; 3], groups: usize, geometry: Geometry) {
     assert!(geometry.group == GROUP && geometry.padded.is_multiple_of(BLOCK) && MARGIN >= 16);
 }
 
-/// `O` filters on a row, `B` registers of pixels at a time.
+/// All filters at `16·B` pixels, four at a time: while their sums are requantised, those of the next four run. Returns
+/// the pixels done.
+///
+/// # Safety
+/// `rows` and `geometry` have passed [`check_rows`], and `x + 16·B` is within the padded row.
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
-fn filters<const O: usize, const B: usize>(
+unsafe fn block<const B: usize>(
+    layer: &Packed,
     rows: &[&[u8]; 3],
-    groups: usize,
-    weights: &[i32],
-    constants: &Constants<'_>,
+    x: usize,
     skip: Option<&[u8]>,
     out: &mut [u8],
     geometry: Geometry,
-) {
-    let stride = geometry.stride();
-    check_rows(rows, groups, geometry);
-    assert!(weights.len() == O * 9 * groups && constants.bias.len() == O);
-    assert!(out.len() == O / GROUP * stride && skip.is_none_or(|skip| skip.len() == out.len()));
-    for x in (0..geometry.width).step_by(16 * B) {
-        // SAFETY: `x` is a block of the row; the asserts above hold for what is read.
-        let sums = unsafe { sums::<O, B>(rows, groups, weights, constants.bias, x, geometry) };
-        for g in 0..O / GROUP {
-            #[allow(clippy::needless_range_loop)]
-            for b in 0..B {
-                let at = g * stride + geometry.start() + (x + 16 * b) * GROUP;
-                let four: [__m512i; GROUP] = std::array::from_fn(|k| sums[g * GROUP + k][b]);
-                let multiplier = &constants.multiplier[g * GROUP..][..GROUP];
-                // SAFETY: 64 bytes at `at` lie in the group, whose blocks are whole.
-                unsafe {
-                    let value = match (constants.skip, skip) {
-                        (Some(factors), Some(skip)) => {
-                            let skip = _mm512_loadu_si512(skip.as_ptr().add(at).cast());
-                            requantise_sum(four, multiplier, factors, skip)
-                        }
-                        _ => requantise(four, multiplier),
-                    };
-                    let zero = _mm512_set1_epi8(constants.zero_point as i8);
-                    _mm512_storeu_si512(
-                        out.as_mut_ptr().add(at).cast(),
-                        _mm512_adds_epu8(value, zero),
-                    );
-                }
-            }
+) -> usize {
+    let words = GROUP * 9 * layer.groups;
+    for (g, weights) in layer.weights.chunks_exact(words).enumerate() {
+        let filter = g * GROUP;
+        let bias = &layer.bias[filter..][..GROUP];
+        // SAFETY: as the function's own.
+        let sums = unsafe { sums::<GROUP, B>(rows, layer.groups, weights, bias, x, geometry) };
+        #[allow(clippy::needless_range_loop)]
+        for b in 0..B {
+            let at = g * geometry.stride() + geometry.start() + (x + 16 * b) * GROUP;
+            requantise(layer, filter, sums.map(|sums| sums[b]), skip, out, at);
         }
     }
+    16 * B
 }
 
 /// The sums of `O` filters at `16·B` pixels from `x`.
@@ -260,10 +182,38 @@ fn last_block(
     }
 }
 
+/// From the sums of four filters at 16 pixels to their group in the next layer's input, `at` in its row `out`, as in that of
+/// the skip.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw")]
+pub(crate) fn requantise(
+    layer: &Packed,
+    filter: usize,
+    sums: [__m512i; GROUP],
+    skip: Option<&[u8]>,
+    out: &mut [u8],
+    at: usize,
+) {
+    let multiplier = &layer.multiplier[filter..][..GROUP];
+    let values = match (layer.skip, skip) {
+        (Some(factors), Some(skip)) => {
+            let skip = &skip[at..at + 16 * GROUP];
+            // SAFETY: a slice of 64 bytes.
+            let skip = unsafe { _mm512_loadu_si512(skip.as_ptr().cast()) };
+            with_skip(sums, multiplier, factors, skip)
+        }
+        _ => without_skip(sums, multiplier),
+    };
+    let value = _mm512_adds_epu8(values, _mm512_set1_epi8(layer.zero_point as i8));
+    let out = &mut out[at..at + 16 * GROUP];
+    // SAFETY: a slice of 64 bytes.
+    unsafe { _mm512_storeu_si512(out.as_mut_ptr().cast(), value) };
+}
+
 /// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
-pub(crate) fn requantise(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
+fn without_skip(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
     let values = std::array::from_fn(|k| {
         _mm512_cvtps_epi32(_mm512_mul_ps(
             _mm512_cvtepi32_ps(sums[k]),
@@ -276,7 +226,7 @@ pub(crate) fn requantise(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i 
 /// The same with the sum of a skip.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
-pub(crate) fn requantise_sum(
+fn with_skip(
     sums: [__m512i; GROUP],
     multiplier: &[f32],
     factors: SkipSum,
@@ -290,10 +240,7 @@ pub(crate) fn requantise_sum(
         let a = match factors.relu {
             Some(factor) => {
                 let v = _mm512_min_ps(v, _mm512_set1_ps(255.0));
-                _mm512_mul_ps(
-                    _mm512_cvtepi32_ps(_mm512_cvtps_epi32(v)),
-                    _mm512_set1_ps(factor),
-                )
+                _mm512_mul_ps(_mm512_roundscale_ps::<0>(v), _mm512_set1_ps(factor))
             }
             None => v,
         };

@@ -43,17 +43,19 @@ pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
     Isa::f32().contains(&isa).then(|| rate(burn, duration))
 }
 
-/// The sum of the threads' best rates: a thread that is interrupted tells nothing of the machine.
+/// The sum of the threads' median rates: like the frames beside it, neither a round that the system interrupted nor the
+/// clock's best moment.
 fn rate(burn: Burn, duration: Duration) -> f64 {
     let rates = rayon::broadcast(|_| {
         let start = Instant::now();
-        let mut best = 0.0f64;
-        while start.elapsed() < duration {
+        let mut rates = Vec::new();
+        while rates.is_empty() || start.elapsed() < duration {
             let round = Instant::now();
             let done = burn(ROUNDS);
-            best = best.max(done as f64 / round.elapsed().as_secs_f64());
+            rates.push(done as f64 / round.elapsed().as_secs_f64());
         }
-        best
+        let middle = rates.len() / 2;
+        *rates.select_nth_unstable_by(middle, f64::total_cmp).1
     });
     rates.into_iter().sum()
 }
