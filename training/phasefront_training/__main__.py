@@ -268,7 +268,9 @@ def run_quantize(args):
         return quantize_prefilter(args)
     network, display = checkpoint.load_network(args.file)
     train, validation = load(args, network.architecture)
-    ranges = quantize.calibrate(network, quantize.examples(train, network.architecture.coordinates))
+    seen = list(quantize.examples(train, network.architecture.coordinates))
+    quantize.balance(network, seen)
+    ranges = quantize.calibrate(network, seen)
     exact, rounded = quantize.figures(network, ranges, validation)
     quantize.report("after training", exact, rounded)
     quantized = quantize.Quantized(network, ranges)
@@ -283,7 +285,10 @@ def run_quantize(args):
 def quantize_prefilter(args):
     model = stage2_model(args.file, bf16=not args.f32)
     train, validation = load(args, model.hologram.architecture)
-    ranges = quantize.calibrate(model.prefilter, quantize.prefilter_examples(model, train))
+    with torch.no_grad():
+        seen = list(quantize.prefilter_examples(model, train))
+    quantize.balance(model.prefilter, seen)
+    ranges = quantize.calibrate(model.prefilter, seen)
     exact = quantize.encoded_figure(model, validation)
     model.prefilter = quantize.Quantized(model.prefilter, ranges)
     rounded = quantize.encoded_figure(model, validation)

@@ -11,9 +11,13 @@ Each tensor that a convolution or a skip reads is quantized once: `input`; `relu
 the sum before layer i, of the dequantized terms, rounded again; and `concat`, the one scale and zero point of
 the last layer's input: its features are quantized to it directly (never by a scale of their own first), and so is the
 network's input a second time. The last convolution's output is float. Rounding is half to even.
+
+As features and the network's input share that scale, and their weights in a filter of the last layer share another, both
+must be of one size: `balance` scales the features until they are, which the chain makes good elsewhere.
 """
 
 import copy
+import itertools
 import sys
 
 import numpy as np
@@ -28,6 +32,8 @@ from .stage2 import Stage2, encoding_figures
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
+BALANCES = [2.0**k for k in range(-6, 3)]  # powers of two, which no float32 weight is rounded by
+BALANCE_SCENES = 4
 SILENT = 1.0  # the range of a tensor that is 0 everywhere: any finer and the layer before it scales beyond all bounds
 
 
@@ -138,6 +144,34 @@ def calibrate(chain, examples):
         ranges["input"] = (-0.5, 0.5)
         ranges["concat"] = (min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5))
     return ranges
+
+
+def scale_features(chain, factor):
+    """Multiplies the features that a Chain's last layer reads, and divides what reads them: its output stays the same."""
+    a = chain.architecture
+    last = a.layers - 1
+    # Features that the last layer takes as a sum with a skip are sums of what every second layer gives.
+    writers, readers = (range(0, last, 2), range(1, last + 1, 2)) if a.has_skip(last) else ([last - 1], [last])
+    with torch.no_grad():
+        for i in writers:
+            chain.convs[i].weight *= factor
+            chain.convs[i].bias *= factor
+        for i in readers:
+            chain.convs[i].weight[:, : a.filters] /= factor
+
+
+def balance(chain, examples):
+    """Scales the features against the network's input by the power of two that loses least over inputs (C, H, W)."""
+    seen = list(itertools.islice(examples, BALANCE_SCENES))
+
+    def error(factor):
+        scaled = copy.deepcopy(chain)
+        scale_features(scaled, factor)
+        quantized = Quantized(scaled, calibrate(scaled, seen))
+        with torch.no_grad():
+            return sum(float((quantized(x[None]) - chain(x[None])).square().mean()) for x in seen)
+
+    scale_features(chain, min(BALANCES, key=error))
 
 
 def examples(scenes, coordinates=False):
