@@ -34,6 +34,8 @@ ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
 BALANCES = [2.0**k for k in range(-6, 3)]  # powers of two, which no float32 weight is rounded by
 BALANCE_SCENES = 4
+BINS = 4096  # of a tensor's values, where its range is chosen
+CLIPPED = [1 - 0.05 * k for k in range(17)]  # ends of ranges to choose among, of the greatest value
 SILENT = 1.0  # the range of a tensor that is 0 everywhere: any finer and the layer before it scales beyond all bounds
 
 
@@ -116,34 +118,62 @@ class Quantized(nn.Module):
         return torch.tanh(h) if a.head == "amplitude-phase" else h
 
 
-def calibrate(chain, examples):
-    """{tensor: (min, max)} of a Chain over inputs (N, C, H, W), one at a time."""
+def activations(chain, x):
+    """Yields the names of `tensors` with what is rounded there, for a network input (1, C, H, W)."""
     a = chain.architecture
     last = a.layers - 1
-    ranges = {}
+    yield "input", x
+    inputs, h = [], x
+    for i, conv in enumerate(chain.convs[:-1]):
+        if a.has_skip(i):
+            h = h + inputs[i - 2]
+            yield f"add_{i}", h
+        inputs.append(h)
+        h = F.relu(conv(h))
+        if i < last - 1 or a.has_skip(last):
+            yield f"relu_{i}", h
+    yield "concat", h + inputs[last - 2] if a.has_skip(last) else h
+    yield "concat", x
 
-    def see(name, *seen):
-        low, high = ranges.get(name, (0.0, 0.0))
-        ranges[name] = min([low, *(float(t.min()) for t in seen)]), max([high, *(float(t.max()) for t in seen)])
 
+def calibrate(chain, examples):
+    """{tensor: (min, max)} of a Chain over a list of inputs (C, H, W): the range whose rounding and clipping costs least,
+    for a few bright pixels are worth less than finer steps for all."""
     with torch.no_grad():
+        ranges = extremes(chain, examples)
+        counts = {name: 0 for name in ranges}
         for x in examples:
-            x = x[None]
-            see("input", x)
-            inputs, h = [], x
-            for i, conv in enumerate(chain.convs[:-1]):
-                if a.has_skip(i):
-                    h = h + inputs[i - 2]
-                    see(f"add_{i}", h)
-                inputs.append(h)
-                h = F.relu(conv(h))
-                if i < last - 1 or a.has_skip(last):
-                    see(f"relu_{i}", h)
-            see("concat", h + inputs[last - 2] if a.has_skip(last) else h, x)
-    if not a.of_fields:  # colours, depths and seeds have a range of their own, whatever the scenes hold
-        ranges["input"] = (-0.5, 0.5)
-        ranges["concat"] = (min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5))
+            for name, values in activations(chain, x[None]):
+                low, high = ranges[name]
+                at = (values - low) * ((BINS - 1) / max(high - low, SILENT * 1e-6))
+                counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
+        for name, (low, high) in ranges.items():
+            least = -low  # the image's own range is as far below 0 as above
+            if name != "input" and high > least:
+                ends = [max(end * high, least) for end in CLIPPED]
+                ranges[name] = low, min(ends, key=lambda end: rounding_error(low, high, end, counts[name]))
     return ranges
+
+
+def extremes(chain, examples):
+    """{tensor: (least, greatest value)} over inputs; of colours, depths and seeds the whole range that they can have."""
+    ranges = {}
+    for x in examples:
+        for name, values in activations(chain, x[None]):
+            low, high = ranges.get(name, (0.0, 0.0))
+            ranges[name] = min(low, float(values.min())), max(high, float(values.max()))
+    if not chain.architecture.of_fields:
+        ranges["input"] = (-0.5, 0.5)
+        ranges["concat"] = min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5)
+    return ranges
+
+
+def rounding_error(low, high, end, counts):
+    """The summed square error of values in `BINS` bins from low to high where they are rounded to steps from low to end."""
+    values = torch.linspace(low, high, BINS)
+    scale = (end - low) / (254 if low < 0 else 255)
+    rounded = torch.fake_quantize_per_tensor_affine(values, scale, round(-low / scale), 0, 255)
+    return float((counts * (rounded - values).double().square()).sum())
 
 
 def scale_features(chain, factor):
