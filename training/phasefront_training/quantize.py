@@ -136,25 +136,27 @@ def activations(chain, x):
     yield "concat", x
 
 
+@torch.no_grad()
 def calibrate(chain, examples):
     """{tensor: (min, max)} of a Chain over a list of inputs (C, H, W): the range whose rounding and clipping costs least,
     for a few bright pixels are worth less than finer steps for all."""
-    with torch.no_grad():
-        ranges = extremes(chain, examples)
-        counts = {name: 0 for name in ranges}
-        for x in examples:
-            for name, values in activations(chain, x[None]):
-                low, high = ranges[name]
-                at = (values - low) * ((BINS - 1) / max(high - low, SILENT * 1e-6))
-                counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
-        for name, (low, high) in ranges.items():
-            least = -low  # the image's own range is as far below 0 as above
-            if name != "input" and high > least:
-                ends = [max(end * high, least) for end in CLIPPED]
-                ranges[name] = low, min(ends, key=lambda end: rounding_error(low, high, end, counts[name]))
+    ranges = extremes(chain, examples)
+    counts = {name: 0 for name in ranges}
+    for x in examples:
+        for name, values in activations(chain, x[None]):
+            low, high = ranges[name]
+            # Where what a tensor can be was known beforehand, a few values may still lie outside.
+            at = (values.clamp(low, high) - low) * ((BINS - 1) / max(high - low, SILENT * 1e-6))
+            counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
+    for name, (low, high) in ranges.items():
+        least = -low  # the image's own range is as far below 0 as above
+        if name != "input" and high > least:
+            ends = [max(end * high, least) for end in CLIPPED]
+            ranges[name] = low, min(ends, key=lambda end: rounding_error(low, high, end, counts[name]))
     return ranges
 
 
+@torch.no_grad()
 def extremes(chain, examples):
     """{tensor: (least, greatest value)} over inputs; of colours, depths and seeds the whole range that they can have."""
     ranges = {}

@@ -12,7 +12,7 @@ from phasefront_training.export import write
 from phasefront_training.export_int8 import int8_model
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
-from phasefront_training.quantize import Quantized, balance, calibrate, scale_features, tensors
+from phasefront_training.quantize import Quantized, balance, calibrate, extremes, scale_features, tensors
 
 CASES = [Architecture(8), Architecture(5, 8), Architecture(4, 8, head="amplitude-phase"), Architecture(6, 8, "ldi2"), Architecture(8, 8, "field")]
 
@@ -76,6 +76,19 @@ def test_an_empty_channel_keeps_its_bias(tmp_path):
     _, bias = quantized.layer(1, "relu_0")
     assert torch.allclose(bias, chain.convs[1].bias, atol=1e-2)
     write(int8_model(quantized, Display()), tmp_path / "n.onnx")
+
+
+def test_ranges_end_where_the_error_is_least():
+    chain = network(Architecture(5, 8))
+    seen = 0.05 * torch.randn(3, 4, 64, 64) ** 3  # few values are large, some beyond what colours can be
+    ranges, widest = calibrate(chain, seen), extremes(chain, seen)
+    assert ranges["input"] == (-0.5, 0.5) and ranges["concat"][1] >= 0.5
+
+    def error(ranges):
+        with torch.no_grad():
+            return float((Quantized(chain, ranges)(seen) - chain(seen.clamp(-0.5, 0.5))).square().mean())
+
+    assert any(ranges[name][1] < widest[name][1] for name in ranges) and error(ranges) < error(widest)
 
 
 @pytest.mark.parametrize("architecture", [*CASES, Architecture(3, 8)], ids=str)

@@ -28,7 +28,7 @@ pub struct Tiling {
 }
 
 /// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as long as
-/// a twelfth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
+/// a sixteenth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
@@ -36,7 +36,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
         .sum();
     let threads = rayon::current_num_threads();
     // At each edge between two bands layer i computes layers − 1 − i rows on both sides.
-    let bands = 1 + height / (12 * layers.max(2) - 12);
+    let bands = 1 + height / (16 * layers.max(2) - 16);
     let bands_a_thread = (bands / threads).clamp(1, 3);
     let band_rows = height
         .div_ceil(threads * bands_a_thread)
