@@ -1,7 +1,7 @@
 """int8 networks: what is quantized how, calibration, and a Chain that quantizes as it goes (for evaluation and QAT).
 
 Weights are int8, one scale an output channel, symmetric: scale = max|w| / 127. Biases are int32 with the scale
-s_input · s_weight[c]. Activations are u8 with one scale and zero point a tensor, from ranges seen on training scenes:
+s_input · s_weight[c]. Activations are u8 with one scale and zero point a tensor, from ranges chosen on training scenes (`calibrate`):
 
 * behind a ReLU, and sums of two such: zero point 0, scale = max / 255;
 * the network's input, and what the last convolution reads (features and the network's input, concatenated):
@@ -17,7 +17,6 @@ must be of one size: `balance` scales the features until they are, which the cha
 """
 
 import copy
-import itertools
 import sys
 
 import numpy as np
@@ -51,6 +50,15 @@ def tensors(architecture):
     return [*names, "concat"]
 
 
+def quantizer(name, low, high):
+    """(scale, zero point) of the tensor `name` with values from low to high; the scale is a float32 value."""
+    if name in ("input", "concat"):
+        low, high = min(low, 0.0), max(high, 0.0)
+        scale = float(np.float32((high - low if high > low else SILENT) / 254))
+        return scale, round(-low / scale)
+    return float(np.float32((high if high > 0 else SILENT) / 255)), 0
+
+
 def weight_scale(weight, bias, input_scale):
     """Scales (O,) of a layer's weights (O, I, 3, 3); an empty channel gets one that its bias still fits by."""
     largest = weight.detach().abs().amax((1, 2, 3)) / 127
@@ -75,13 +83,7 @@ class Quantized(nn.Module):
         self.ranges = {name: tuple(map(float, ranges[name])) for name in tensors(self.architecture)}
 
     def parameters_of(self, name):
-        """(scale, zero point) of a tensor; the scale is a float32 value."""
-        low, high = self.ranges[name]
-        if name in ("input", "concat"):
-            low, high = min(low, 0.0), max(high, 0.0)
-            scale = float(np.float32((high - low if high > low else SILENT) / 254))
-            return scale, round(-low / scale)
-        return float(np.float32((high if high > 0 else SILENT) / 255)), 0
+        return quantizer(name, *self.ranges[name])
 
     def activation(self, name, x):
         return torch.fake_quantize_per_tensor_affine(x, *self.parameters_of(name), 0, 255)
@@ -141,18 +143,19 @@ def calibrate(chain, examples):
     """{tensor: (min, max)} of a Chain over a list of inputs (C, H, W): the range whose rounding and clipping costs least,
     for a few bright pixels are worth less than finer steps for all."""
     ranges = extremes(chain, examples)
-    counts = {name: 0 for name in ranges}
+    # The image is never clipped: its range is as far below 0 as above, and no end comes nearer than that.
+    counts = {name: 0 for name, (low, high) in ranges.items() if name != "input" and high > -low}
     for x in examples:
         for name, values in activations(chain, x[None]):
-            low, high = ranges[name]
-            # Where what a tensor can be was known beforehand, a few values may still lie outside.
-            at = (values.clamp(low, high) - low) * ((BINS - 1) / max(high - low, SILENT * 1e-6))
-            counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
-    for name, (low, high) in ranges.items():
-        least = -low  # the image's own range is as far below 0 as above
-        if name != "input" and high > least:
-            ends = [max(end * high, least) for end in CLIPPED]
-            ranges[name] = low, min(ends, key=lambda end: rounding_error(low, high, end, counts[name]))
+            if name in counts:
+                low, high = ranges[name]
+                # Where what a tensor can be was known beforehand, a few values may still lie outside.
+                at = (values.clamp(low, high) - low) * ((BINS - 1) / (high - low))
+                counts[name] += torch.bincount(at.round().long().flatten(), minlength=BINS)
+    for name, seen in counts.items():
+        low, high = ranges[name]
+        ends = [max(end * high, -low) for end in CLIPPED]
+        ranges[name] = low, min(ends, key=lambda end: rounding_error(name, low, high, end, seen))
     return ranges
 
 
@@ -170,11 +173,10 @@ def extremes(chain, examples):
     return ranges
 
 
-def rounding_error(low, high, end, counts):
-    """The summed square error of values in `BINS` bins from low to high where they are rounded to steps from low to end."""
+def rounding_error(name, low, high, end, counts):
+    """The summed square error of the tensor's values, counted in `BINS` bins from low to high, where its range is low to end."""
     values = torch.linspace(low, high, BINS)
-    scale = (end - low) / (254 if low < 0 else 255)
-    rounded = torch.fake_quantize_per_tensor_affine(values, scale, round(-low / scale), 0, 255)
+    rounded = torch.fake_quantize_per_tensor_affine(values, *quantizer(name, low, end), 0, 255)
     return float((counts * (rounded - values).double().square()).sum())
 
 
@@ -193,15 +195,17 @@ def scale_features(chain, factor):
 
 
 def balance(chain, examples):
-    """Scales the features against the network's input by the power of two that loses least over inputs (C, H, W)."""
-    seen = list(itertools.islice(examples, BALANCE_SCENES))
+    """Scales the features against the network's input by the power of two that loses least over a list of inputs (C, H, W)."""
+    seen = examples[:BALANCE_SCENES]
+    with torch.no_grad():
+        exact = [chain(x[None]) for x in seen]
 
     def error(factor):
         scaled = copy.deepcopy(chain)
         scale_features(scaled, factor)
         quantized = Quantized(scaled, calibrate(scaled, seen))
         with torch.no_grad():
-            return sum(float((quantized(x[None]) - chain(x[None])).square().mean()) for x in seen)
+            return sum(float((quantized(x[None]) - y).square().mean()) for x, y in zip(seen, exact))
 
     scale_features(chain, min(BALANCES, key=error))
 

@@ -45,7 +45,8 @@ fn hidden_row(
     let mut x = 0;
     while x < geometry.width {
         let left = geometry.width - x;
-        // SAFETY: `kernels` has found the features, the rows are checked, and a row's blocks are whole.
+        // SAFETY: `kernels` has found the features, the rows are checked, and they are padded to 64 pixels: `x` is a
+        // multiple of 64 until fewer are left, so that no step ends after the padding.
         unsafe {
             x += match left {
                 49.. => block::<4>(layer, &rows, x, skip, out, geometry),

@@ -1,4 +1,4 @@
-//! The most multiply-accumulates that an instruction set does here: registers alone, no memory. What a kernel is
+//! The multiply-accumulates that an instruction set does here at its best: registers alone, no memory. What a kernel is
 //! measured against, in the same run, on the same threads.
 
 use crate::Isa;
