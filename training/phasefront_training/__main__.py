@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, revive, seeds, shards
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, seeds, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -181,10 +181,7 @@ def begun(args, wanted, train):
     if found.input != wanted.input:
         network = grow.widen(network, wanted.input)
     seen = list(itertools.islice(quantize.examples(train, network.architecture.coordinates), BEGINNING_SCENES))
-    grown = grow.grow(network, args.layers, seen)
-    if revived := revive.revive(grown, seen):
-        print(f"{args.init}: {revived} units that never fire begin again", file=sys.stderr)
-    return grown
+    return grow.grow(network, args.layers, seen)
 
 
 def run_stage2(args):

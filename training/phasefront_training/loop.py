@@ -48,6 +48,10 @@ class Task:
         """The batch of a step, on the CPU or the device; called from a thread where a GPU trains."""
         raise NotImplementedError
 
+    def revive(self, step, progress):
+        """Gives units of the module that never fire fresh weights, if it is time to; returns how many there were."""
+        return 0
+
     def loss(self, module, batch, step):
         """(loss, {name: tensor of a term}) for a batch; `module` is `module()`, perhaps wrapped."""
         raise NotImplementedError
@@ -105,6 +109,12 @@ class Workers:
         together = torch.tensor(values, dtype=torch.float64, device=self.device)
         distributed.all_reduce(together)
         return together.tolist()
+
+    def share(self, module):
+        """Gives all processes the first one's weights."""
+        if self.count > 1:
+            for parameter in module.parameters():
+                distributed.broadcast(parameter.data, 0)
 
 
 class Prefetch:
@@ -186,7 +196,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
     last_log = int(LOGS * budget.progress(step, before))
     last_validation = int(VALIDATIONS * budget.progress(step, before))
     batches = Prefetch(task.sample, step, loaders)
-    sums, summed = {}, 0
+    sums, summed, revived = {}, 0, 0
     try:
         with _Signals() as signals:
             while True:
@@ -197,6 +207,9 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                 now = rate(learning_rate, step, progress)
                 optimiser.set_rate(now)
                 batch = to_device(batches.take(), workers.device)
+                if begun_again := task.revive(step, progress):
+                    workers.share(module)
+                    revived += begun_again
                 loss, terms = task.loss(trained, batch, step)
                 module.zero_grad(set_to_none=True)
                 loss.backward()
@@ -217,7 +230,8 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                         last_log = int(LOGS * progress)
                         line = {"step": step, "elapsed_s": round(elapsed(), 1), "lr": now}
                         line |= {name: float(f"{float(value) / summed:.6g}") for name, value in sums.items()}
-                        sums, summed = {}, 0
+                        line |= {"revived": revived} if revived else {}
+                        sums, summed, revived = {}, 0, 0
                         if int(VALIDATIONS * progress) > last_validation:
                             last_validation = int(VALIDATIONS * progress)
                             line |= task.validate()

@@ -15,7 +15,7 @@ SILENT = 1e-3  # the share of pixels under which a unit counts as dead
 def revive(network, examples):
     """Gives fresh weights to the dead units of a Chain, layer by layer; returns how many there were.
 
-    examples: network inputs (C, H, W) of one size, a few.
+    examples: network inputs (N, C, H, W), a few.
     """
     revived = 0
 
@@ -43,7 +43,7 @@ def revive(network, examples):
         for i, conv in enumerate(network.convs[:-1])
     ]
     with torch.no_grad():
-        network(torch.stack(list(examples)))
+        network(examples)
     for hook in hooks:
         hook.remove()
     return revived

@@ -1,7 +1,8 @@
 """Stage 1: the hologram network learns the midpoint hologram, supervised.
 
 Loss: field + amplitude + 2·focal stack + total variation (losses.py). The focal stack takes all 20 planes where the
-machine allows, or a few of them at random in each step, which has the same mean.
+machine allows, or a few of them at random in each step, which has the same mean. Units that no longer fire begin again
+(revive.py) every hundred steps of the first part.
 """
 
 import numpy as np
@@ -11,13 +12,17 @@ from .data import Sampler
 from .evaluate import evaluate, torch_predictor
 from .loop import Task
 from .losses import field_terms, fill_invalid, focal_stack_terms
-from .networks import head_field
+from .networks import Chain, head_field
+from .revive import revive
 
 FOCAL_WEIGHT = 2.0
 VARIATION_WEIGHT = 1.0
 PLANES_ON_CPU = 1
 PLANES_ON_GPU = 20
 LIGHT_REACH_PX = 16
+REVIVAL_STEPS = 100
+REVIVALS_END = 0.6  # of the training: what begins again needs time to learn
+REVIVAL_SCENES = 4  # whose crops show which units fire
 
 
 def margin(network_layers):
@@ -43,12 +48,20 @@ class Stage1(Task):
         self.facts = scenes.facts
         cut, coordinates = margin(network.architecture.layers), network.architecture.coordinates
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
+        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, coordinates)
 
     def module(self):
         return self.network
 
     def sample(self, step):
         return self.sampler.draw(step)
+
+    def revive(self, step, progress):
+        if step % REVIVAL_STEPS or progress >= REVIVALS_END or not isinstance(self.network, Chain):
+            return 0
+        with torch.random.fork_rng():
+            torch.manual_seed(int(np.random.default_rng([self.seed, step]).integers(2**62)))
+            return revive(self.network, self.revival.draw(step).input.to(self.device))
 
     def loss(self, module, batch, step):
         x = batch.input.contiguous(memory_format=torch.channels_last)

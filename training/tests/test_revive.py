@@ -1,8 +1,11 @@
 import torch
 from torch.nn import functional as F
 
+from phasefront_training.data import Manifest, Scenes
+from phasefront_training.loop import Budget, Workers, fit, read_curve
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.revive import revive
+from phasefront_training.stage1 import REVIVAL_STEPS, Stage1
 
 
 def firing(network, x):
@@ -42,3 +45,17 @@ def test_what_lives_stays_as_it_is():
     before = [p.clone() for p in network.parameters()]
     assert revive(network, x) == 0
     assert all(torch.equal(a, b) for a, b in zip(before, network.parameters()))
+
+
+def test_a_training_revives_in_its_first_part(data_folder, tmp_path):
+    torch.manual_seed(0)
+    network = Chain(Architecture(5, 8))
+    with torch.no_grad():
+        network.convs[1].bias[:3] = -100
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    here = Workers(0, 1, torch.device("cpu"))
+    task = Stage1(network, scenes, scenes, here, crop=32, planes=0, bf16=False)
+    assert task.revive(1, 0.0) == task.revive(REVIVAL_STEPS, 0.9) == 0
+    fit(task, Budget(steps=2), 1e-3, tmp_path, here)
+    assert read_curve(tmp_path / "curve.jsonl")[0]["revived"] >= 3
+    assert (network.convs[1].bias > -10).all()
