@@ -1,14 +1,17 @@
 //! What seeded networks are trained on: the sweep's fields of a data set's scenes, on depths that were given.
 //!
 //! A folder holds for each scene `depth_000123.npy`, uint16 (V, H, W): V variants of its visible depth, d·65535, clean or
-//! as a phone would measure it; the training package makes them. To each, [`make`] adds `seed_000123.npy`, int16
-//! (V, 6, H, W): the real planes of the field's three colours and its three imaginary ones, times [`SCALE`]; and to all,
-//! `seeds.json`, which says by which sweep.
+//! as a phone would measure it; the training package makes them. To each, [`make`] adds `refined_000123.npy`, uint16
+//! (R, H, W): a sensor's readings of the first, each with faults of its own, as the core refines them; `seed_000123.npy`,
+//! int16 (V + R, 6, H, W): the real planes of the field's three colours and its three imaginary ones, times [`SCALE`], on
+//! all of them; and to the folder, `seeds.json`, which says by which sweep and what R is.
 
 use crate::dataset::{self, Manifest};
+use crate::depth_study::{Degradation, RATIO, degrade, refine};
 use crate::error::{Error, Result};
 use crate::files;
-use ndarray::{Array2, Array3, Array4, Axis};
+use crate::scene::dice::Dice;
+use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, concatenate, s};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use num_complex::Complex32;
 use phasefront::sweep::SweepPlan;
@@ -23,29 +26,45 @@ pub const SCALE: f32 = 8192.0;
 /// The first words of `seeds.json`.
 const FORMAT: &str = "phasefront-seeds-1";
 
-/// Makes the seeds of the data set in `data`, which `manifest` describes, for all depths in `dir` that have none yet, by
-/// `sweep`. `made` hears of each that is there.
+/// Most noise of a refined depth's readings, of the volume's depth.
+const MOST_NOISE: f64 = 0.008;
+/// Farthest that refined depth stands beside the colour, display pixels.
+const MOST_SHIFT: usize = 3;
+
+/// Makes the seeds of the data set in `data`, which `manifest` describes, for all depths in `dir` that have none yet, and
+/// for `refined` more of each scene, by `sweep`. `made` hears of each that is there.
 ///
 /// # Errors
-/// Depths that are of another shape than the scenes, seeds of another sweep, or a folder that cannot be written.
+/// Depths that are of another shape than the scenes, scenes that a sensor's readings do not divide, seeds of another
+/// sweep, or a folder that cannot be written.
 pub fn make(
     manifest: &Manifest,
     data: &Path,
     dir: &Path,
     sweep: Sweep,
+    refined: usize,
     made: &(dyn Fn() + Sync),
 ) -> Result<()> {
     let place = dir.join("seeds.json");
     let description = serde_json::json!({
         "format": FORMAT, "scale": SCALE, "planes": sweep.planes, "taps": sweep.taps,
-        "hidden_layers": sweep.hidden_layers, "between_planes": sweep.between_planes,
+        "hidden_layers": sweep.hidden_layers, "between_planes": sweep.between_planes, "refined": refined,
     });
+    if refined > 0 && !manifest.size.is_multiple_of(RATIO) {
+        return Err(Error::file(
+            data,
+            format!(
+                "scenes are {0}×{0}; refined depth takes a multiple of {RATIO}",
+                manifest.size
+            ),
+        ));
+    }
     match std::fs::read(&place) {
         Ok(bytes) => {
             if serde_json::from_slice::<serde_json::Value>(&bytes).ok() != Some(description) {
                 return Err(Error::file(
                     place,
-                    "the folder holds seeds of another sweep; choose another folder or the same sweep",
+                    "the folder holds seeds of another sweep or of other refined depths; choose another folder or the same ones",
                 ));
             }
         }
@@ -60,7 +79,15 @@ pub fn make(
         if depths.exists() && !seeds.exists() {
             let pair = dataset::read_pair(manifest, data, index)?;
             let colour = crate::evaluate::visible_rgb(&pair.ldi);
-            let fields = fields(&plan, &colour, &read_depths(&depths, manifest.size)?)?;
+            let mut depths = read_depths(&depths, manifest.size)?;
+            if refined > 0 {
+                let more = refined_depths(depths.slice(s![0, .., ..]), &colour, index, refined)?;
+                files::write_atomically(&file("refined"), |file| {
+                    more.write_npy(file).map_err(std::io::Error::other)
+                })?;
+                depths = concatenate![Axis(0), depths, more];
+            }
+            let fields = fields(&plan, &colour, depths.view())?;
             files::write_atomically(&seeds, |file| {
                 fields.write_npy(file).map_err(std::io::Error::other)
             })?;
@@ -82,14 +109,48 @@ fn read_depths(path: &Path, size: usize) -> Result<Array3<u16>> {
     }
 }
 
+/// `count` depths of scene `index` as a sensor with faults reads its true `depth` and the core refines that.
+fn refined_depths(
+    depth: ArrayView2<'_, u16>,
+    colour: &Array3<f32>,
+    index: usize,
+    count: usize,
+) -> Result<Array3<u16>> {
+    let (height, width) = depth.dim();
+    let depth = depth.mapv(real);
+    let mut all = Array3::zeros((count, height, width));
+    for (variant, mut to) in all.outer_iter_mut().enumerate() {
+        let seed = ((index as u64) << 32) + variant as u64;
+        let mut dice = Dice::new(seed);
+        let how = Degradation {
+            name: "drawn",
+            noise: dice.range(0.0, MOST_NOISE) as f32,
+            shift: dice.integer(0, MOST_SHIFT),
+            holes: dice.chance(0.5),
+        };
+        let refined = refine(&degrade(depth.view(), &how, seed), colour)?;
+        to.zip_mut_with(&refined, |to, d| *to = (d * 65535.0).round() as u16);
+    }
+    Ok(all)
+}
+
+/// The depth that a stored one stands for.
+fn real(stored: u16) -> f32 {
+    f32::from(stored) / 65535.0
+}
+
 /// The fields of one scene on all its depths.
-fn fields(plan: &SweepPlan, colour: &Array3<f32>, depths: &Array3<u16>) -> Result<Array4<i16>> {
+fn fields(
+    plan: &SweepPlan,
+    colour: &Array3<f32>,
+    depths: ArrayView3<'_, u16>,
+) -> Result<Array4<i16>> {
     let (variants, height, width) = depths.dim();
     let mut fields = Array4::zeros((variants, 6, height, width));
     let mut scratch = plan.scratch();
     let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
     for (depth, mut planes) in depths.outer_iter().zip(fields.outer_iter_mut()) {
-        let depth: Array2<f32> = depth.mapv(|d| f32::from(d) / 65535.0);
+        let depth: Array2<f32> = depth.mapv(real);
         let frame = RgbdFrame::new(colour.clone(), depth)?;
         let values = field.as_slice_mut().expect("standard layout");
         plan.field(&frame, values, &mut scratch)?;

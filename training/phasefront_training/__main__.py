@@ -333,9 +333,9 @@ def run_evaluate(args):
     if scenes.seeded:
         methods["the sweep"] = evaluate.seed_as_field
     methods |= {name: predict for name, (predict, _) in predictors.items()}
-    conditions = {"clean": False} if args.clean_only or scenes.ldi_layers > 1 else {"clean": False, "degraded": True}
+    depths = ("clean",) if args.clean_only else evaluate.depths(scenes)
     results = {
-        name: {c: evaluate.evaluate(predict, scenes, degraded, progress=True) for c, degraded in conditions.items()}
+        name: {depth: evaluate.evaluate(predict, scenes, depth, progress=True) for depth in depths}
         for name, predict in methods.items()
     }
     print(evaluate.table(results))
@@ -355,13 +355,14 @@ def run_evaluate_encoding(args):
         del model.prefilter  # a module, which the file is not
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
     scenes = scenes_for(args, args.split, {model.hologram.architecture.input}, args.scenes)
-    results = encoding_figures(model, scenes, args.degraded)
+    depth = "degraded" if args.degraded else "clean"
+    results = encoding_figures(model, scenes, depth)
     columns = list(next(iter(results.values())))
     print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
     for name, figures in results.items():
         print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
     if args.json:
-        facts = scenes_of(args, scenes) | {"depth": "degraded" if args.degraded else "clean"}
+        facts = scenes_of(args, scenes) | {"depth": depth}
         evaluate.save({"data": facts, "offset_mm": model.offset_m * 1e3, "results": results}, args.json)
 
 

@@ -139,6 +139,7 @@ class Scenes:
             raise DataError(f"{manifest.folder}: no readable pair in the split '{split}'")
         self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
         self.seeded = seeds is not None
+        self.refined = seeds.refined if seeds else 0
         if self.seeded:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))
@@ -162,7 +163,7 @@ class Scenes:
 
 
     def variant(self, i, v):
-        """Depth (1, H, W) and seed (6, H, W) of variant v of scene i; v = 0 is clean."""
+        """Depth (1, H, W) and seed (6, H, W) of variant v of scene i; v = 0 is clean, the last `refined` are refined."""
         return self.variant_depth[i, v][None].float(), self.variant_seed[i, v].float()
 
 

@@ -2,7 +2,8 @@
 
 Amplitude PSNR and SSIM (peak 1) of the midpoint hologram, and the same as the mean over a focal stack of five planes
 inside the volume; means over scenes. Beside the network stand 'RGB as the field', the front layer's image with phase 0,
-and 'SM-LBM of what is visible', exact waves from the front layer alone. With degraded depth, each scene's degradation is fixed by its number, so figures compare.
+and 'SM-LBM of what is visible', exact waves from the front layer alone. Depth is clean, or degraded as a phone's, fixed by the scene's number
+so that figures compare; or, where there are seeds on such depth, a sensor's that the core has refined.
 """
 
 import json
@@ -137,22 +138,30 @@ def degradation(number, variant=0):
     return np.random.default_rng([7, number] if variant == 0 else [8, number, variant])
 
 
-def scene_as_seen(scenes, i, degraded):
-    """Colour, depth (degraded or clean), seed (None where there is none) and truth of a scene."""
+def depths(scenes):
+    """The kinds of depth that scenes can be judged on."""
+    if scenes.ldi_layers > 1:
+        return ("clean",)
+    return ("clean", "degraded", "refined") if scenes.refined else ("clean", "degraded")
+
+
+def scene_as_seen(scenes, i, kind):
+    """Colour, depth of one of the kinds of `depths`, seed (None where there is none) and truth of a scene."""
     colour, depth, truth = scenes.scene(i)
     if scenes.seeded:
-        return colour, *scenes.variant(i, int(degraded)), truth
-    if degraded:
+        variant = {"clean": 0, "degraded": 1, "refined": -scenes.refined}[kind]
+        return colour, *scenes.variant(i, variant), truth
+    if kind == "degraded":
         depth = torch.cat([degrade_depth(colour[:3], depth[0], degradation(scenes.numbers[i]))[None], depth[1:]])
     return colour, depth, None, truth
 
 
-def evaluate(predict, scenes, degraded=False, full=True, progress=False):
+def evaluate(predict, scenes, depth="clean", full=True, progress=False):
     """{figure: mean, 'worst': …} of a predictor over scenes."""
     rows = []
     for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
-        colour, depth, seed, truth = scene_as_seen(scenes, i, degraded)
-        rows.append(compare(predict(colour, depth, seed), truth, scenes.display, full))
+        colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
+        rows.append(compare(predict(colour, seen, seed), truth, scenes.display, full))
     means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
     worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
     return means | {

@@ -213,7 +213,7 @@ def balance(chain, examples):
 def examples(scenes, coordinates=False):
     """Network inputs of the first scenes, for calibration."""
     for i in range(min(len(scenes), CALIBRATION_SCENES)):
-        colour, depth, seed, _ = scene_as_seen(scenes, i, degraded=False)
+        colour, depth, seed, _ = scene_as_seen(scenes, i, "clean")
         yield network_input(colour, depth, seed, coordinates)
 
 

@@ -2,9 +2,10 @@
 
 A folder beside a data set, made by `python -m phasefront_training seeds`. This package writes the depths,
 `depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are degraded
-(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront seeds` adds to each the fields
-that the SDK computes, `seed_000123.npy`, int16 (V, 6, H, W), real parts, then imaginary parts, times the scale that
-`seeds.json` says.
+(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront seeds` may add R more, read by a
+sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W); and adds to all of them the fields that the SDK
+computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale that `seeds.json`
+says.
 """
 
 import json
@@ -54,6 +55,7 @@ class Seeds:
 
     folder: Path
     scale: float
+    refined: int = 0
 
     @classmethod
     def read(cls, folder):
@@ -66,11 +68,13 @@ class Seeds:
             raise DataError(f"{path}: not JSON ({error})") from None
         if table.get("format") != FORMAT:
             raise DataError(f"{path}: the format is '{table.get('format')}', expected '{FORMAT}'")
-        return cls(Path(folder), float(table["scale"]))
+        return cls(Path(folder), float(table["scale"]), int(table.get("refined", 0)))
 
     def of(self, number):
-        """Depths float16 (V, H, W) and fields float16 (V, 6, H, W) of a scene."""
+        """Depths float16 (V + R, H, W) and fields float16 (V + R, 6, H, W) of a scene; refined depths come last."""
         depths, fields = (self._array(f"{name}_{number:06d}.npy") for name in ("depth", "seed"))
+        if self.refined:
+            depths = np.concatenate([depths, self._array(f"refined_{number:06d}.npy")])
         if fields.shape != (len(depths), 6, *depths.shape[1:]):
             raise DataError(f"{self.folder}: depths {depths.shape} and fields {fields.shape} of scene {number} do not belong together")
         return (depths / np.float32(65535)).astype(np.float16), (fields / np.float32(self.scale)).astype(np.float16)

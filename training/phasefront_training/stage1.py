@@ -85,5 +85,5 @@ class Stage1(Task):
         predict = torch_predictor(self.network, self.bf16)
         line = {"validation_psnr": evaluate(predict, self.validation, full=False)["amplitude_psnr"]}
         if self.degraded:
-            line["validation_degraded_psnr"] = evaluate(predict, self.validation, degraded=True, full=False)["amplitude_psnr"]
+            line["validation_degraded_psnr"] = evaluate(predict, self.validation, "degraded", full=False)["amplitude_psnr"]
         return line

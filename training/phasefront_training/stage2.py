@@ -100,7 +100,7 @@ class Stage2(_OnHolograms):
         return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
 
 
-def encoding_figures(model, scenes, degraded=False, full=True, others=True):
+def encoding_figures(model, scenes, depth="clean", full=True, others=True):
     """{method: mean figures} of what an encoded hologram shows: DDPM, and after the same hologram network AA-DPM and BL-DPM
     with a weak and a strong filter, and plain double phase (`others`); `wraps` is the share of phases outside (−π, π] and
     `brightness` the mean amplitude over the true."""
@@ -108,9 +108,9 @@ def encoding_figures(model, scenes, degraded=False, full=True, others=True):
     device = next(model.parameters()).device
     with torch.no_grad():
         for i in range(len(scenes)):
-            colour, depth, seed, truth = scene_as_seen(scenes, i, degraded)
+            colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
             a = model.hologram.architecture
-            x = network_input(colour, depth, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
+            x = network_input(colour, seen, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
             midpoint = model.hologram.field(x)
             there = propagate(midpoint, model.offset_m, model.display)
             methods = {"deep double phase": model.filtered(midpoint)}

@@ -7,7 +7,7 @@ import torch
 from phasefront_training.__main__ import main
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes
 from phasefront_training.degrade import degrade_depth
-from phasefront_training.evaluate import degradation, evaluate, seed_as_field, torch_predictor
+from phasefront_training.evaluate import degradation, depths, evaluate, scene_as_seen, seed_as_field, torch_predictor
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.seeds import Seeds
 
@@ -20,13 +20,16 @@ def stored(field):
 
 @pytest.fixture
 def seeds_folder(data_folder, tmp_path):
-    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on degraded depth half of it."""
+    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on degraded depth half of it; the one
+    refined depth is 0.25 throughout."""
     folder = tmp_path / "seeds"
     main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront", "true"])
     for i in range(8):
         truth = np.load(data_folder / f"pair_{i:06d}.npz")["hologram"]
-        np.save(folder / f"seed_{i:06d}.npy", np.stack([stored(truth), stored(truth / 2), stored(truth / 2)]))
-    (folder / "seeds.json").write_text(json.dumps({"format": "phasefront-seeds-1", "scale": SCALE, "planes": 3}))
+        np.save(folder / f"seed_{i:06d}.npy", np.stack([stored(truth)] + [stored(truth / 2)] * 3))
+        np.save(folder / f"refined_{i:06d}.npy", np.full((1, *truth.shape[1:]), 1 << 14, np.uint16))
+    table = {"format": "phasefront-seeds-1", "scale": SCALE, "planes": 3, "refined": 1}
+    (folder / "seeds.json").write_text(json.dumps(table))
     return folder
 
 
@@ -42,15 +45,16 @@ def test_depths_are_the_clean_one_and_those_that_scenes_are_judged_on(data_folde
         degraded = degrade_depth(colour[:3], depth[0], degradation(found.numbers[i]))
         assert torch.allclose(found.variant(i, 1)[0][0], degraded, atol=1e-3)
         assert not torch.equal(found.variant(i, 1)[0], found.variant(i, 2)[0])
+        assert torch.allclose(scene_as_seen(found, i, "refined")[1], torch.tensor(0.25), atol=1e-3)
 
 
 def test_a_network_that_adds_nothing_gives_the_seed(data_folder, seeds_folder):
     found = scenes(data_folder, seeds_folder, "validation")
     network = Chain(Architecture(4, 8, "seeded"))
     torch.nn.init.zeros_(network.convs[-1].weight)
-    for degraded in (False, True):
-        alone = evaluate(seed_as_field, found, degraded, full=False)["amplitude_psnr"]
-        assert evaluate(torch_predictor(network), found, degraded, full=False)["amplitude_psnr"] == pytest.approx(alone, abs=1e-3)
+    for depth in depths(found):
+        alone = evaluate(seed_as_field, found, depth, full=False)["amplitude_psnr"]
+        assert evaluate(torch_predictor(network), found, depth, full=False)["amplitude_psnr"] == pytest.approx(alone, abs=1e-3)
     assert evaluate(seed_as_field, found, full=False)["amplitude_psnr"] > 60
 
 

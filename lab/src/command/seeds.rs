@@ -21,6 +21,9 @@ pub(crate) struct Seeds {
     /// Taps of the sweep's filter [default: what suits planes and display]
     #[arg(long, value_name = "N")]
     taps: Option<usize>,
+    /// Depths of each scene to add: read by a sensor with faults, and refined by the core
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    refined: usize,
     /// Folder of the depths; the fields are put there too
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
@@ -31,7 +34,15 @@ impl Seeds {
         let manifest = Manifest::read(&self.data)?;
         let sweep = sweep_for(&manifest.display, self.planes, self.taps);
         let bar = progress_bar(manifest.scenes as u64, "scenes");
-        seeds::make(&manifest, &self.data, &self.output, sweep, &|| bar.inc(1))?;
+        let made = || bar.inc(1);
+        seeds::make(
+            &manifest,
+            &self.data,
+            &self.output,
+            sweep,
+            self.refined,
+            &made,
+        )?;
         bar.finish_and_clear();
         super::print(
             json,
