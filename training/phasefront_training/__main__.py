@@ -106,7 +106,7 @@ def machine_flags(p):
 
 def evaluation_flags(p):
     p.add_argument("--data", required=True, help="folder of the data set")
-    p.add_argument("--seeds", help="folder of its seeds, for seeded networks; the sweep alone is judged too")
+    p.add_argument("--seeds", help="folder of its seeds: for seeded networks, and to judge on refined depth; the sweep alone is judged too")
     p.add_argument("--split", choices=data.SPLITS, default="test")
     p.add_argument("--scenes", type=int, help="only the first so many")
     p.add_argument("--json", metavar="FILE", help="write the figures there too")
@@ -115,7 +115,7 @@ def evaluation_flags(p):
 
 def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
     p.add_argument("--data", required=True, help="folder of the data set")
-    p.add_argument("--seeds", help="folder of its seeds, for seeded networks")
+    p.add_argument("--seeds", help="folder of its seeds: for seeded networks, and for refined depth among the degraded")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
@@ -180,7 +180,7 @@ def begun(args, wanted, train):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
     if found.input != wanted.input:
         network = grow.widen(network, wanted.input)
-    seen = list(itertools.islice(quantize.examples(train, network.architecture.coordinates), BEGINNING_SCENES))
+    seen = list(itertools.islice(quantize.examples(train, network.architecture.input), BEGINNING_SCENES))
     return grow.grow(network, args.layers, seen)
 
 
@@ -265,7 +265,7 @@ def run_quantize(args):
         return quantize_prefilter(args)
     network, display = checkpoint.load_network(args.file)
     train, validation = load(args, network.architecture)
-    seen = list(quantize.examples(train, network.architecture.coordinates))
+    seen = list(quantize.examples(train, network.architecture.input))
     quantize.balance(network, seen)
     ranges = quantize.calibrate(network, seen)
     exact, rounded = quantize.figures(network, ranges, validation)

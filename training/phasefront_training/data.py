@@ -192,17 +192,17 @@ def _gather(parts, k, device):
     return whole
 
 
-def network_input(colour, depth, seed=None, coordinates=False):
-    """The network's input (..., 4·L, H, W): colour and depth of each layer in turn, each minus 0.5.
+def network_input(colour, depth, kind="rgbd", seed=None):
+    """The input of a network of this kind (networks.py): colour and depth of each layer in turn, each minus 0.5.
 
-    A seed (..., 6, H, W) comes behind: half of (real part minus 0.5), half of the imaginary part, so that all fit
-    one range. With `coordinates` of a whole frame (4·L, H, W) two more channels come behind, its `place`.
+    For seeded networks the seed (..., 6, H, W) comes behind: half of (real part minus 0.5), half of the imaginary part,
+    so that all fit one range. For rgbdxy, of a whole frame (4, H, W), two more channels come behind, its `place`.
     """
     colour = colour.unflatten(-3, (-1, 3))
     layers = torch.cat([colour, depth.unsqueeze(-3)], -3).flatten(-4, -3) - 0.5
-    if coordinates:
+    if kind == "rgbdxy":
         return torch.cat([layers, place(*depth.shape[-2:]).to(layers)], -3)
-    if seed is None:
+    if kind != "seeded":
         return layers
     return torch.cat([layers, 0.5 * (seed[..., :3, :, :] - 0.5), 0.5 * seed[..., 3:, :, :]], -3)
 
@@ -233,13 +233,13 @@ class Batch:
 
 
 class Sampler:
-    """Draws batches; batch `step` of a seed is always the same, whatever was drawn before.
+    """Draws batches for networks of one `kind`; batch `step` of a seed is always the same, whatever was drawn before.
 
-    With `coordinates` inputs say where in the frame they lie. Samples of holograms that correct an aberration are
+    Samples of holograms that correct an aberration are
     neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates.
     """
 
-    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, coordinates=False):
+    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, kind="rgbd"):
         if degraded and scenes.ldi_layers > 1:
             raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
         height, width = scenes.shape
@@ -250,8 +250,9 @@ class Sampler:
         if 4 * margin > self.crop[0] and self.crop != scenes.shape:
             raise ValueError(f"a margin of {margin} px leaves too little of crops of {crop} px")
         self.margin, self.seed, self.rank = margin, seed, rank
-        self.place = place(height, width) if coordinates else None
-        self.flips = not (scenes.corrected or coordinates)
+        self.kind = kind
+        self.place = place(height, width) if kind == "rgbdxy" else None
+        self.flips = not (scenes.corrected or kind == "rgbdxy")
 
     def draw(self, step):
         rng = np.random.default_rng([self.seed, self.rank, step])
@@ -277,13 +278,17 @@ class Sampler:
             margin if x > 0 else 0 : w - margin if x + w < width else w,
         ] = 1
         degraded = rng.random() < self.degraded
+        field = None
         if scenes.seeded:
             v = int(rng.integers(1, scenes.variant_depth.shape[1])) if degraded else 0
-            seen = network_input(colour, scenes.variant_depth[i, v][window][None].float(), scenes.variant_seed[i, v][window].float())
+            measured = scenes.variant_depth[i, v][window][None].float()
+            field = scenes.variant_seed[i, v][window].float()
         else:
-            seen = network_input(colour, degrade_depth(colour, depth[0], rng)[None] if degraded else depth)
-        if self.place is not None:
-            seen = torch.cat([seen, self.place[window].to(seen)])
+            measured = degrade_depth(colour, depth[0], rng)[None] if degraded else depth
+        if self.place is None:
+            seen = network_input(colour, measured, self.kind, field)
+        else:
+            seen = torch.cat([network_input(colour, measured), self.place[window].to(measured)])
         members = [seen, target, depth[:1], valid]
         flip_y, flip_x, transpose = rng.random(3) < (0.5 if self.flips else 0)
         axes = [axis for axis, flip in ((-2, flip_y), (-1, flip_x)) if flip]

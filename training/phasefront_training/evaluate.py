@@ -62,10 +62,9 @@ def seed_as_field(colour, depth, seed):
 def torch_predictor(network, autocast=False):
     """colour, depth, seed -> field (3, H, W) by a network in memory."""
     device = next(network.parameters()).device
-    seeded = network.architecture.input == "seeded"
 
     def predict(colour, depth, seed=None):
-        x = network_input(colour, depth, seed if seeded else None, network.architecture.coordinates)[None]
+        x = network_input(colour, depth, network.architecture.input, seed)[None]
         x = x.to(device).contiguous(memory_format=torch.channels_last)
         with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=autocast):
             output = network(x)
@@ -103,8 +102,7 @@ def onnx_predictor(path, threads=None):
     meaning = network.architecture
 
     def predict(colour, depth, seed=None):
-        seed = seed.cpu() if meaning.input == "seeded" else None
-        x = network_input(colour.cpu(), depth.cpu(), seed, meaning.coordinates)[None]
+        x = network_input(colour.cpu(), depth.cpu(), meaning.input, None if seed is None else seed.cpu())[None]
         return head_field(meaning, network(x), x)[0]
 
     return predict, meaning

@@ -67,11 +67,6 @@ class Architecture:
         return self.input in ("field", "blurred-field")
 
     @property
-    def coordinates(self):
-        """Whether the input ends with the place in the frame."""
-        return self.input == "rgbdxy"
-
-    @property
     def input_channels(self):
         return {"field": 6, "blurred-field": 6, "rgbdxy": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
 

@@ -210,11 +210,11 @@ def balance(chain, examples):
     scale_features(chain, min(BALANCES, key=error))
 
 
-def examples(scenes, coordinates=False):
-    """Network inputs of the first scenes, for calibration."""
+def examples(scenes, kind):
+    """Inputs of networks of this kind on the first scenes, for calibration."""
     for i in range(min(len(scenes), CALIBRATION_SCENES)):
         colour, depth, seed, _ = scene_as_seen(scenes, i, "clean")
-        yield network_input(colour, depth, seed, coordinates)
+        yield network_input(colour, depth, kind, seed)
 
 
 class QuantizationAware(Stage1):
@@ -246,7 +246,7 @@ class PrefilterQuantizationAware(Stage2):
 
 def prefilter_examples(model, scenes):
     """Inputs of a DeepDoublePhase's pre-filter on the first scenes, for calibration."""
-    for x in examples(scenes, model.hologram.architecture.coordinates):
+    for x in examples(scenes, model.hologram.architecture.input):
         yield model.seen_by_prefilter(model.hologram.field(x[None]))[0]
 
 

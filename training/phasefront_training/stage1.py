@@ -46,9 +46,9 @@ class Stage1(Task):
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.facts = scenes.facts
-        cut, coordinates = margin(network.architecture.layers), network.architecture.coordinates
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
-        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, coordinates)
+        cut, kind = margin(network.architecture.layers), network.architecture.input
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind)
+        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind)
 
     def module(self):
         return self.network

@@ -44,8 +44,7 @@ class _OnHolograms(Task):
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
         self.facts = scenes.facts
-        coordinates = model.hologram.architecture.coordinates
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, coordinates)
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, model.hologram.architecture.input)
 
     def sample(self, step):
         return self.sampler.draw(step)
@@ -109,8 +108,7 @@ def encoding_figures(model, scenes, depth="clean", full=True, others=True):
     with torch.no_grad():
         for i in range(len(scenes)):
             colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
-            a = model.hologram.architecture
-            x = network_input(colour, seen, seed if a.input == "seeded" else None, a.coordinates)[None].to(device)
+            x = network_input(colour, seen, model.hologram.architecture.input, seed)[None].to(device)
             midpoint = model.hologram.field(x)
             there = propagate(midpoint, model.offset_m, model.display)
             methods = {"deep double phase": model.filtered(midpoint)}

@@ -109,15 +109,15 @@ def test_degraded_layered_inputs_are_refused(data_folder):
 def test_coordinates_say_where_a_crop_lies_and_nothing_is_flipped(data_folder):
     scenes = Scenes(Manifest.read(data_folder), "train")
     height, width = scenes.shape
-    whole = network_input(*scenes.scene(0)[:2], coordinates=True)
+    whole = network_input(*scenes.scene(0)[:2], kind="rgbdxy")
     assert whole.shape[0] == 6
     assert whole[4, 3, 0] == pytest.approx(0.5 / width - 0.5) and whole[5, -1, 2] == pytest.approx(0.5 - 0.5 / height)
-    sampler = Sampler(scenes, 1, 16, 2, coordinates=True)
+    sampler = Sampler(scenes, 1, 16, 2, kind="rgbdxy")
     for step in range(20):
         given = sampler.draw(step).input[0]
         assert given.shape[0] == 6
         # Of all scenes the one whose pixels at that place are these.
         x, y = round(((given[4, 0, 0] + 0.5) * width - 0.5).item()), round(((given[5, 0, 0] + 0.5) * height - 0.5).item())
         window = (..., slice(y, y + 16), slice(x, x + 16))
-        inputs = (network_input(*scenes.scene(i)[:2], coordinates=True)[window] for i in range(len(scenes)))
+        inputs = (network_input(*scenes.scene(i)[:2], kind="rgbdxy")[window] for i in range(len(scenes)))
         assert any(torch.allclose(given, each) for each in inputs)

@@ -61,10 +61,19 @@ def test_a_network_that_adds_nothing_gives_the_seed(data_folder, seeds_folder):
 def test_samples_hold_the_seed_of_their_depth(data_folder, seeds_folder):
     found = scenes(data_folder, seeds_folder)
     for degraded, factor in ((0.0, 1.0), (1.0, 0.5)):
-        batch = Sampler(found, 4, 48, 4, degraded).draw(0)
+        batch = Sampler(found, 4, 48, 4, degraded, kind="seeded").draw(0)
         real, imaginary = 2 * batch.input[:, 4:7] + 0.5, 2 * batch.input[:, 7:]
         assert torch.allclose(real, factor * batch.target.real, atol=2e-3)
         assert torch.allclose(imaginary, factor * batch.target.imag, atol=2e-3)
+
+
+def test_other_networks_take_depth_from_the_seeds_folder(data_folder, seeds_folder):
+    found = scenes(data_folder, seeds_folder)
+    batches = [Sampler(found, 8, 48, 4, 1.0, seed).draw(0) for seed in range(3)]
+    depths = torch.cat([batch.input[:, 3] + 0.5 for batch in batches])
+    assert batches[0].input.shape[1] == 4
+    refined = (depths - 0.25).abs().amax((1, 2)) < 1e-3
+    assert 0 < refined.sum() < len(depths)
 
 
 def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_folder, tmp_path, capsys):
