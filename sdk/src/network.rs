@@ -22,6 +22,7 @@ mod tensor;
 pub use chain::Precision;
 pub use filter::{FilterPlan, FilterScratch};
 pub use head::Head;
+use metadata::Description;
 pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::{Error, Result};
@@ -55,6 +56,7 @@ pub struct Network {
     input: InputKind,
     head: Head,
     display: TrainedDisplay,
+    seed_planes: Option<usize>,
     #[cfg(feature = "tract")]
     proto: ModelProto,
 }
@@ -85,7 +87,12 @@ impl Network {
             .as_ref()
             .ok_or_else(|| Error::Network("not an ONNX file: it holds no graph".into()))?;
         let chain = onnx::chain(graph)?;
-        let (input, head, display) = metadata::read(&proto.metadata_props)?;
+        let Description {
+            input,
+            head,
+            display,
+            seed_planes,
+        } = metadata::read(&proto.metadata_props)?;
         if chain.inputs != input.channels() {
             return Err(Error::Network(format!(
                 "phasefront.input is '{input}' with {} channels, but the graph's input has {}",
@@ -117,6 +124,7 @@ impl Network {
             input,
             head,
             display,
+            seed_planes,
             #[cfg(feature = "tract")]
             proto,
         })
@@ -155,6 +163,11 @@ impl Network {
     /// The display it was trained for; another needs another network.
     pub fn display(&self) -> &TrainedDisplay {
         &self.display
+    }
+
+    /// Planes of the sweep whose field a seeded network was trained to correct, where its file says so.
+    pub fn seed_planes(&self) -> Option<usize> {
+        self.seed_planes
     }
 
     /// Prepares the network for frames of `height` × `width` pixels, on the fastest path that runs it.

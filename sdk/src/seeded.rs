@@ -11,6 +11,15 @@ use crate::network::{Engine, Network, NetworkPlan, NetworkScratch, Source};
 use crate::sweep::{Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
 
+/// The sweep whose field `network` was trained to correct: of as many planes as its file says, or else what suits
+/// `display`.
+pub fn seed(network: &Network, display: &Display) -> Sweep {
+    match network.seed_planes() {
+        Some(planes) => Sweep::of_planes(display, planes),
+        None => Sweep::for_display(display),
+    }
+}
+
 /// A plan of a seeded network for one frame shape and display. Immutable; shared between threads.
 pub struct SeededPlan {
     sweep: SweepPlan,
@@ -26,13 +35,13 @@ pub struct SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`crate::network::InputKind::Seeded`], for (`height`, `width`) frames. The seed is
-    /// [`Sweep::for_display`]'s at the midpoint.
+    /// Plans `network`, whose input is [`crate::network::InputKind::Seeded`], for (`height`, `width`) frames, on the field
+    /// of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// A network or a sweep that cannot be planned.
     pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
-        let sweep = Sweep::for_display(display);
+        let sweep = seed(network, display);
         Ok(SeededPlan {
             sweep: SweepPlan::new(height, width, display, sweep, 0.0)?,
             network: network.plan(height, width)?,

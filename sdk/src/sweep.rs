@@ -73,6 +73,11 @@ impl Sweep {
         let reach = reach_px(display, display.volume_depth_m());
         let planes = (reach * 4.0 / 3.0).ceil() as usize;
         let planes = planes.clamp(*Self::USUAL_PLANES.start(), *Self::USUAL_PLANES.end());
+        Self::of_planes(display, planes)
+    }
+
+    /// A sweep of `planes` planes for `display`, with as many taps as its steps need.
+    pub fn of_planes(display: &Display, planes: usize) -> Self {
         Sweep {
             planes,
             taps: Self::taps_for(display, planes),

@@ -729,6 +729,27 @@ fn broken_numbers_are_refused() {
 }
 
 #[test]
+fn a_seeded_network_may_say_the_planes_of_its_seed() {
+    let of = |input: &'static str, inputs: usize, seed_planes: Option<usize>| {
+        let model = Model {
+            input,
+            inputs,
+            seed_planes,
+            ..Model::new(3, 8)
+        };
+        Network::from_onnx(&model.bytes())
+    };
+    assert_eq!(of("seeded", 10, Some(80)).unwrap().seed_planes(), Some(80));
+    assert_eq!(of("seeded", 10, None).unwrap().seed_planes(), None);
+    assert_eq!(of("rgbd", 4, Some(80)).unwrap().seed_planes(), None);
+    for wrong in [0, 1025] {
+        let message = of("seeded", 10, Some(wrong)).unwrap_err().to_string();
+        let right = format!("'phasefront.seed_planes' is '{wrong}'; a number from 1 to 1024");
+        assert!(message.contains(&right), "{message}");
+    }
+}
+
+#[test]
 fn missing_or_wrong_metadata_is_refused() {
     let model = Model::new(3, 8);
     for key in [

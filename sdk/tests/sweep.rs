@@ -213,12 +213,21 @@ fn a_seeded_network_corrects_the_sweep() {
     let (height, width) = (37, 45);
     let display = Display::default();
     let frame = frame(height, width);
-    let sweep = SweepPlan::new(height, width, &display, Sweep::for_display(&display), 0.0).unwrap();
-    let seed = run(&sweep, &frame);
-    for (model, tolerance) in [(Model::new(4, 8), 1e-5), (Model::int8(5, 8), 0.05)] {
+    for (model, tolerance, planes) in [
+        (Model::new(4, 8), 1e-5, None),
+        (Model::int8(5, 8), 0.05, None),
+        (Model::new(4, 8), 1e-5, Some(24)),
+    ] {
+        let sweep = match planes {
+            Some(planes) => Sweep::of_planes(&display, planes),
+            None => Sweep::for_display(&display),
+        };
+        let sweep = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
+        let seed = run(&sweep, &frame);
         let model = Model {
             inputs: 10,
             input: "seeded",
+            seed_planes: planes,
             ..model
         };
         let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());

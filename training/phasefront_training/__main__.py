@@ -276,7 +276,7 @@ def run_quantize(args):
         task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
         go(task, args, workers, None, folder=f"{args.output}.qat")
         quantize.report("trained through the rounding", exact, quantize.figures(network.cpu(), ranges, validation)[1])
-    export.write(export_int8.int8_model(quantized.cpu(), display), args.output)
+    export.write(export_int8.int8_model(quantized.cpu(), display, seed_planes=train.facts.get("seed_planes")), args.output)
 
 
 def quantize_prefilter(args):
@@ -318,8 +318,8 @@ def run_export(args):
     last = Checkpoint.load(args.checkpoint)
     if args.network not in last.networks:
         raise ValueError(f"{args.checkpoint}: no {args.network}, only {', '.join(last.networks)}")
-    model = export.float_model(last.network(args.network), last.display, last.extra.get("offset_m", 0.0))
-    export.write(model, args.output)
+    offset_m, seed_planes = last.extra.get("offset_m", 0.0), last.extra["data"].get("seed_planes")
+    export.write(export.float_model(last.network(args.network), last.display, offset_m, seed_planes), args.output)
 
 
 def run_evaluate(args):

@@ -140,6 +140,8 @@ class Scenes:
         self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
         self.seeded = seeds is not None
         self.refined = seeds.refined if seeds else 0
+        if seeds:
+            self.origin["seed_planes"] = seeds.planes
         if self.seeded:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))

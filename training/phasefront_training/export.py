@@ -4,7 +4,7 @@ The graph is written node by node, so that its names are stable and a network's 
 input `rgbd` (1, 4, H, W) (`ldi` or `field` for the other kinds), nodes `conv_0`, `relu_0`, …, `add_3` before each
 layer that has a skip, `concat_L` before the last convolution, `tanh` behind it for the amplitude-phase head, output
 `field` (1, 6, H, W) (`filtered` where the input is `field`), the six channels of the last layer as networks.py gives them. H and W are dynamic. What the
-network is stands in `metadata_props`, keys `phasefront.*`. The int8 form is written by export_int8.py.
+network is stands in `metadata_props`, keys `phasefront.*`; of a seeded one also of how many planes its seed was. The int8 form is written by export_int8.py.
 """
 
 import os
@@ -37,9 +37,9 @@ def output_name(architecture):
     return "filtered" if architecture.of_fields else "field"
 
 
-def metadata(architecture, display, offset_m=0.0):
-    """The key-value pairs that say what a network is and which display it was trained for."""
-    return {
+def metadata(architecture, display, offset_m=0.0, seed_planes=None):
+    """The key-value pairs that say what a network is and which display, and seed, it was trained for."""
+    found = {
         "phasefront.input": architecture.input,
         "phasefront.head": architecture.head,
         "phasefront.pitch_um": _number(display.pitch_m * 1e6),
@@ -47,6 +47,7 @@ def metadata(architecture, display, offset_m=0.0):
         "phasefront.volume_depth_mm": _number(display.volume_depth_m * 1e3),
         "phasefront.offset_mm": _number(offset_m * 1e3),
     }
+    return found | ({"phasefront.seed_planes": str(seed_planes)} if architecture.input == "seeded" and seed_planes else {})
 
 
 def _number(value):
@@ -76,7 +77,7 @@ def conv_node(i, inputs, output):
     return helper.make_node("Conv", inputs, [output], f"conv_{i}", kernel_shape=[3, 3], pads=[1, 1, 1, 1], strides=[1, 1])
 
 
-def float_model(network, display, offset_m=0.0):
+def float_model(network, display, offset_m=0.0, seed_planes=None):
     """The float32 model of a Chain."""
     a = network.architecture
     nodes, initializers, inputs = [], [], []
@@ -102,7 +103,7 @@ def float_model(network, display, offset_m=0.0):
             h = f"relu_{i}_out"
         elif tanh:
             nodes.append(helper.make_node("Tanh", [h], [output_name(a)], "tanh"))
-    return build(a, nodes, initializers, metadata(a, display, offset_m))
+    return build(a, nodes, initializers, metadata(a, display, offset_m, seed_planes))
 
 
 def write(model, path):

@@ -25,7 +25,7 @@ from .export import build, conv_node, input_name, metadata, output_name
 from .quantize import tensors, weight_scale
 
 
-def int8_model(quantized, display, offset_m=0.0):
+def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
     """The QDQ model of a Quantized network."""
     a = quantized.architecture
     last = a.layers - 1
@@ -87,4 +87,4 @@ def int8_model(quantized, display, offset_m=0.0):
     layer(last, h, "concat", f"conv_{last}_out" if tanh else output_name(a))
     if tanh:
         nodes.append(helper.make_node("Tanh", [f"conv_{last}_out"], [output_name(a)], "tanh"))
-    return build(a, nodes, constants, metadata(a, display, offset_m))
+    return build(a, nodes, constants, metadata(a, display, offset_m, seed_planes))

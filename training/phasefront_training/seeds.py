@@ -55,7 +55,8 @@ class Seeds:
 
     folder: Path
     scale: float
-    refined: int = 0
+    planes: int
+    refined: int
 
     @classmethod
     def read(cls, folder):
@@ -68,7 +69,7 @@ class Seeds:
             raise DataError(f"{path}: not JSON ({error})") from None
         if table.get("format") != FORMAT:
             raise DataError(f"{path}: the format is '{table.get('format')}', expected '{FORMAT}'")
-        return cls(Path(folder), float(table["scale"]), int(table.get("refined", 0)))
+        return cls(Path(folder), float(table["scale"]), int(table["planes"]), int(table.get("refined", 0)))
 
     def of(self, number):
         """Depths float16 (V + R, H, W) and fields float16 (V + R, 6, H, W) of a scene; refined depths come last."""

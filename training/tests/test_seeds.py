@@ -8,6 +8,7 @@ from phasefront_training.__main__ import main
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes
 from phasefront_training.degrade import degrade_depth
 from phasefront_training.evaluate import degradation, depths, evaluate, scene_as_seen, seed_as_field, torch_predictor
+from phasefront_training.export import read_description
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.seeds import Seeds
 
@@ -84,6 +85,9 @@ def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_fol
     assert main(["quantize", checkpoint, *common, "-o", onnx, "--steps", "2", "--crop", "48"]) == 0
     assert main(["evaluate", checkpoint, onnx, *common]) == 0
     assert "the sweep" in capsys.readouterr().out
+    assert main(["export", checkpoint, "-o", str(tmp_path / "small-f32.onnx")]) == 0
+    for file in (onnx, tmp_path / "small-f32.onnx"):
+        assert read_description(file)["seed_planes"] == "3"
     assert main(["evaluate", checkpoint, "--data", str(data_folder)]) == 1
     assert "--seeds" in capsys.readouterr().err
 

@@ -124,11 +124,12 @@ pub(super) fn sweep_for(
     planes: Option<usize>,
     taps: Option<usize>,
 ) -> Sweep {
-    let usual = Sweep::for_display(display);
-    let planes = planes.unwrap_or(usual.planes);
+    let usual = match planes {
+        Some(planes) => Sweep::of_planes(display, planes),
+        None => Sweep::for_display(display),
+    };
     Sweep {
-        planes,
-        taps: taps.unwrap_or_else(|| Sweep::taps_for(display, planes)),
+        taps: taps.unwrap_or(usual.taps),
         ..usual
     }
 }

@@ -8,7 +8,8 @@ use super::{Error, Result};
 use crate::display::Display;
 use crate::method::{Method, sweep_plan};
 use crate::network::Network;
-use crate::sweep::{Sweep, SweepPlan};
+use crate::seeded::seed;
+use crate::sweep::SweepPlan;
 use std::sync::Arc;
 
 /// A method for one frame size.
@@ -84,7 +85,7 @@ impl MethodPlan {
                 (packer, Way::Sweep(sweep))
             }
             Method::Seeded(network) => {
-                let sweep = Sweep::for_display(display);
+                let sweep = seed(network, display);
                 let plan = SweepPlan::new(height, width, display, sweep, 0.0)?;
                 let (packer, sweep) = swept(plan)?;
                 let numbers = numbers(network)?;

@@ -1,6 +1,7 @@
 //! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
 
 use super::Head;
+use crate::sweep::MAX_PLANES;
 use crate::{Error, Result};
 use tract_onnx::pb::StringStringEntryProto;
 
@@ -88,10 +89,17 @@ pub struct TrainedDisplay {
     pub offset_m: f64,
 }
 
-/// Reads all that the metadata must say.
-pub(super) fn read(
-    metadata: &[StringStringEntryProto],
-) -> Result<(InputKind, Head, TrainedDisplay)> {
+/// What a file says of its network.
+pub(super) struct Description {
+    pub(super) input: InputKind,
+    pub(super) head: Head,
+    pub(super) display: TrainedDisplay,
+    /// Of a seeded network, if it says so.
+    pub(super) seed_planes: Option<usize>,
+}
+
+/// Reads all that the metadata must say, and what it may.
+pub(super) fn read(metadata: &[StringStringEntryProto]) -> Result<Description> {
     let input = text(metadata, "input", INPUTS)?;
     let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;
     let heads = "'amplitude-phase' or 'real-imaginary'";
@@ -125,19 +133,35 @@ pub(super) fn read(
             v.is_finite()
         })? * 1e-3,
     };
-    Ok((input, head, display))
+    let seed_planes = match found(metadata, "seed_planes") {
+        Some(planes) if input == InputKind::Seeded => {
+            let right = format!("a number from 1 to {MAX_PLANES}");
+            let known = (planes.parse().ok()).filter(|n| (1..=MAX_PLANES).contains(n));
+            Some(known.ok_or_else(|| wrong("seed_planes", planes, &right))?)
+        }
+        _ => None,
+    };
+    Ok(Description {
+        input,
+        head,
+        display,
+        seed_planes,
+    })
 }
 
-fn text<'a>(metadata: &'a [StringStringEntryProto], key: &str, right: &str) -> Result<&'a str> {
+fn found<'a>(metadata: &'a [StringStringEntryProto], key: &str) -> Option<&'a str> {
     metadata
         .iter()
         .find(|entry| entry.key.strip_prefix("phasefront.") == Some(key))
         .map(|entry| entry.value.trim())
-        .ok_or_else(|| {
-            Error::Network(format!(
-                "metadata 'phasefront.{key}' is missing; {right} is right"
-            ))
-        })
+}
+
+fn text<'a>(metadata: &'a [StringStringEntryProto], key: &str, right: &str) -> Result<&'a str> {
+    found(metadata, key).ok_or_else(|| {
+        Error::Network(format!(
+            "metadata 'phasefront.{key}' is missing; {right} is right"
+        ))
+    })
 }
 
 fn number(

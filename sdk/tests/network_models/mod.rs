@@ -19,6 +19,7 @@ pub struct Model {
     pub head: &'static str,
     pub input: &'static str,
     pub offset_mm: &'static str,
+    pub seed_planes: Option<usize>,
 }
 
 impl Model {
@@ -34,6 +35,7 @@ impl Model {
             head: "real-imaginary",
             input: "rgbd",
             offset_mm: "0",
+            seed_planes: None,
         }
     }
 
@@ -142,7 +144,8 @@ impl Model {
                 outputs.push(format!("relu{i}_out"));
             }
         }
-        let metadata = [
+        let seed_planes = self.seed_planes.map(|n| n.to_string());
+        let mut metadata = vec![
             ("input", self.input),
             ("head", self.head),
             ("pitch_um", "8.0"),
@@ -150,6 +153,7 @@ impl Model {
             ("volume_depth_mm", "6.0"),
             ("offset_mm", self.offset_mm),
         ];
+        metadata.extend(seed_planes.as_deref().map(|n| ("seed_planes", n)));
         ModelProto {
             ir_version: 8,
             opset_import: vec![OperatorSetIdProto {
