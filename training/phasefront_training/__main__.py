@@ -1,13 +1,14 @@
 """The command: `python -m phasefront_training COMMAND`. Flags are defined here, once; the work is elsewhere."""
 
 import argparse
+import copy
 import itertools
 import sys
 from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, quantize, seeds, shards
+from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -266,17 +267,20 @@ def run_quantize(args):
     network, display = checkpoint.load_network(args.file)
     train, validation = load(args, network.architecture)
     seen = list(quantize.examples(train, network.architecture.input))
-    quantize.balance(network, seen)
-    ranges = quantize.calibrate(network, seen)
-    exact, rounded = quantize.figures(network, ranges, validation)
+    exact = quantize.figure(network, validation)
+    quantized = prepare.prepare(network, seen)
+    settled = copy.deepcopy(quantized)
+    rounding.round_in_order(settled, seen)
+    rounded = quantize.figure(settled, validation)
     quantize.report("after training", exact, rounded)
-    quantized = quantize.Quantized(network, ranges)
     if worth_training(args, exact - rounded):
         workers = loop.Workers.start(args.device)
         task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
         go(task, args, workers, None, folder=f"{args.output}.qat")
-        quantize.report("trained through the rounding", exact, quantize.figures(network.cpu(), ranges, validation)[1])
-    export.write(export_int8.int8_model(quantized.cpu(), display, seed_planes=train.facts.get("seed_planes")), args.output)
+        settled = quantized.cpu()
+        rounding.round_in_order(settled, seen)
+        quantize.report("trained through the rounding", exact, quantize.figure(settled, validation))
+    export.write(export_int8.int8_model(settled, display, seed_planes=train.facts.get("seed_planes")), args.output)
 
 
 def quantize_prefilter(args):
@@ -284,16 +288,19 @@ def quantize_prefilter(args):
     train, validation = load(args, model.hologram.architecture)
     with torch.no_grad():
         seen = list(quantize.prefilter_examples(model, train))
-    quantize.balance(model.prefilter, seen)
-    ranges = quantize.calibrate(model.prefilter, seen)
     exact = quantize.encoded_figure(model, validation)
-    model.prefilter = quantize.Quantized(model.prefilter, ranges)
+    trainable = prepare.prepare(model.prefilter, seen)
+    model.prefilter = copy.deepcopy(trainable)
+    rounding.round_in_order(model.prefilter, seen)
     rounded = quantize.encoded_figure(model, validation)
     quantize.report("after training", exact, rounded)
     if worth_training(args, exact - rounded):
         workers = loop.Workers.start(args.device)
+        model.prefilter = trainable
         task = quantize.PrefilterQuantizationAware(model, train, validation, workers, **sampling(args))
         go(task, args, workers, None, folder=f"{args.output}.qat")
+        model = model.cpu()
+        rounding.round_in_order(model.prefilter, seen)
         quantize.report("trained through the rounding", exact, quantize.encoded_figure(model, validation))
     export.write(export_int8.int8_model(model.prefilter.cpu(), model.display, model.offset_m), args.output)
 

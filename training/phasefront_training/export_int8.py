@@ -22,7 +22,7 @@ import numpy as np
 from onnx import helper, numpy_helper
 
 from .export import build, conv_node, input_name, metadata, output_name
-from .quantize import tensors, weight_scale
+from .quantize import tensors
 
 
 def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
@@ -49,7 +49,7 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
     def layer(i, source, parameters, output):
         conv = quantized.chain.convs[i]
         unit = quantized.parameters_of(parameters)[0]
-        scale = weight_scale(conv.weight, conv.bias, unit)
+        scale = quantized.scale(i, parameters)
         weight = (conv.weight.detach() / scale[:, None, None, None]).round().clamp(-127, 127)
         bias = (conv.bias.detach() / (scale * unit)).round()
         name = f"conv_{i}"

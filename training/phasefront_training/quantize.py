@@ -13,10 +13,9 @@ the last layer's input: its features are quantized to it directly (never by a sc
 network's input a second time. The last convolution's output is float. Rounding is half to even.
 
 As features and the network's input share that scale, and their weights in a filter of the last layer share another, both
-must be of one size: `balance` scales the features until they are, which the chain makes good elsewhere.
+must be of one size, as must channels of one tensor: prepare.py sees to it. Weights are rounded in order (rounding.py), last.
 """
 
-import copy
 import sys
 
 import numpy as np
@@ -31,8 +30,6 @@ from .stage2 import Stage2, encoding_figures
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
-BALANCES = [2.0**k for k in range(-6, 3)]  # powers of two, which no float32 weight is rounded by
-BALANCE_SCENES = 4
 BINS = 4096  # of a tensor's values, where its range is chosen
 CLIPPED = [1 - 0.05 * k for k in range(17)]  # ends of ranges to choose among, of the greatest value
 SILENT = 1.0  # the range of a tensor that is 0 everywhere: any finer and the layer before it scales beyond all bounds
@@ -73,7 +70,8 @@ def _through(exact, rounded):
 class Quantized(nn.Module):
     """A Chain whose forward pass rounds weights and activations as its int8 file does.
 
-    ranges: {tensor: (min, max)} for the names of `tensors`.
+    ranges: {tensor: (min, max)} for the names of `tensors`. scales: {layer: (O,)} of layers whose weights' scales are
+    settled (rounding.py); the others' follow from their weights.
     """
 
     def __init__(self, chain, ranges):
@@ -81,6 +79,7 @@ class Quantized(nn.Module):
         self.chain = chain
         self.architecture = chain.architecture
         self.ranges = {name: tuple(map(float, ranges[name])) for name in tensors(self.architecture)}
+        self.scales = {}
 
     def parameters_of(self, name):
         return quantizer(name, *self.ranges[name])
@@ -88,10 +87,17 @@ class Quantized(nn.Module):
     def activation(self, name, x):
         return torch.fake_quantize_per_tensor_affine(x, *self.parameters_of(name), 0, 255)
 
+    def scale(self, i, input_name):
+        """Scales (O,) of the weights of layer i, which reads the tensor `input_name`."""
+        if i in self.scales:
+            return self.scales[i]
+        conv = self.chain.convs[i]
+        return weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0])
+
     def layer(self, i, input_name):
         """Rounded (weight, bias) of layer i."""
         conv = self.chain.convs[i]
-        scale = weight_scale(conv.weight, conv.bias, self.parameters_of(input_name)[0])
+        scale = self.scale(i, input_name)
         wide = scale[:, None, None, None]
         weight = _through(conv.weight, torch.round(conv.weight / wide).clamp(-127, 127) * wide)
         unit = scale * self.parameters_of(input_name)[0]
@@ -102,6 +108,16 @@ class Quantized(nn.Module):
             return self._rounded(x.float())
 
     def _rounded(self, x):
+        walk = self.walk(x)
+        i, h, name = next(walk)
+        while True:
+            try:
+                i, h, name = walk.send(F.conv2d(h, *self.layer(i, name), padding=1))
+            except StopIteration as end:
+                return end.value
+
+    def walk(self, x):
+        """Yields each layer's number, what it reads and as which tensor; is sent what it gives, and returns the output."""
         a = self.architecture
         last = a.layers - 1
         inputs, name = [], "input"
@@ -113,7 +129,7 @@ class Quantized(nn.Module):
             inputs.append(h)
             if i == last:
                 h, name = torch.cat([h, self.activation("concat", x)], 1), "concat"
-            h = F.conv2d(h, *self.layer(i, name), padding=1)
+            h = yield i, h, name
             if i < last:
                 name = f"relu_{i}" if i < last - 1 or a.has_skip(last) else "concat"
                 h = self.activation(name, F.relu(h))
@@ -180,36 +196,6 @@ def rounding_error(name, low, high, end, counts):
     return float((counts * (rounded - values).double().square()).sum())
 
 
-def scale_features(chain, factor):
-    """Multiplies the features that a Chain's last layer reads, and divides what reads them: its output stays the same."""
-    a = chain.architecture
-    last = a.layers - 1
-    # Features that the last layer takes as a sum with a skip are sums of what every second layer gives.
-    writers, readers = (range(0, last, 2), range(1, last + 1, 2)) if a.has_skip(last) else ([last - 1], [last])
-    with torch.no_grad():
-        for i in writers:
-            chain.convs[i].weight *= factor
-            chain.convs[i].bias *= factor
-        for i in readers:
-            chain.convs[i].weight[:, : a.filters] /= factor
-
-
-def balance(chain, examples):
-    """Scales the features against the network's input by the power of two that loses least over a list of inputs (C, H, W)."""
-    seen = examples[:BALANCE_SCENES]
-    with torch.no_grad():
-        exact = [chain(x[None]) for x in seen]
-
-    def error(factor):
-        scaled = copy.deepcopy(chain)
-        scale_features(scaled, factor)
-        quantized = Quantized(scaled, calibrate(scaled, seen))
-        with torch.no_grad():
-            return sum(float((quantized(x[None]) - y).square().mean()) for x, y in zip(seen, exact))
-
-    scale_features(chain, min(BALANCES, key=error))
-
-
 def examples(scenes, kind):
     """Inputs of networks of this kind on the first scenes, for calibration."""
     for i in range(min(len(scenes), CALIBRATION_SCENES)):
@@ -250,10 +236,9 @@ def prefilter_examples(model, scenes):
         yield model.seen_by_prefilter(model.hologram.field(x[None]))[0]
 
 
-def figures(chain, ranges, scenes):
-    """Amplitude PSNR (float32, int8) on scenes."""
-    quantized = Quantized(copy.deepcopy(chain), ranges)
-    return tuple(evaluate(torch_predictor(n), scenes, full=False)["amplitude_psnr"] for n in (chain, quantized))
+def figure(network, scenes):
+    """Amplitude PSNR of a Chain or a Quantized on scenes."""
+    return evaluate(torch_predictor(network), scenes, full=False)["amplitude_psnr"]
 
 
 def encoded_figure(model, scenes):

@@ -12,7 +12,7 @@ from phasefront_training.export import write
 from phasefront_training.export_int8 import int8_model
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
-from phasefront_training.quantize import Quantized, balance, calibrate, extremes, scale_features, tensors
+from phasefront_training.quantize import Quantized, calibrate, extremes, tensors
 
 CASES = [Architecture(8), Architecture(5, 8), Architecture(4, 8, head="amplitude-phase"), Architecture(6, 8, "ldi2"), Architecture(8, 8, "field")]
 
@@ -89,34 +89,6 @@ def test_ranges_end_where_the_error_is_least():
             return float((Quantized(chain, ranges)(seen) - chain(seen.clamp(-0.5, 0.5))).square().mean())
 
     assert any(ranges[name][1] < widest[name][1] for name in ranges) and error(ranges) < error(widest)
-
-
-@pytest.mark.parametrize("architecture", [*CASES, Architecture(3, 8)], ids=str)
-def test_scaled_features_change_nothing(architecture):
-    chain = network(architecture)
-    x = torch.rand(2, architecture.input_channels, 17, 13) - 0.5
-    with torch.no_grad():
-        before = chain(x)
-        scale_features(chain, 0.25)
-        assert torch.equal(chain(x), before)
-
-
-@pytest.mark.parametrize("layers", [8, 7])
-def test_features_are_balanced_against_the_input(layers):
-    chain = network(Architecture(layers, 8))
-    with torch.no_grad():
-        chain.convs[-1].weight[:, 8:] = 0
-        chain.convs[-1].weight[:3, 8:11, 1, 1] = -torch.eye(3)  # as trained networks take part of the image away
-        chain.convs[-1].weight[:, :8] *= 0.1
-    seen = torch.rand(3, 4, 32, 32) - 0.5
-
-    def error():
-        with torch.no_grad():
-            return float((Quantized(chain, calibrate(chain, seen))(seen) - chain(seen)).square().mean())
-
-    before = error()
-    balance(chain, seen)
-    assert error() < 0.5 * before
 
 
 def test_quantization_aware_training_reaches_the_weights():
