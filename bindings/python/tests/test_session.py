@@ -96,6 +96,7 @@ def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
     with Session(options, RunningMode.LIVE_STREAM, events) as session:
         for i in range(50):
             session.submit(still(timestamp_ns=1000 + i))
+        events.wait(50)  # closing would drop what still waits, on a busy machine all of it
     made = [e.hologram.info.timestamp_ns for e in events.all if isinstance(e, Made)]
     dropped = [e.timestamp_ns for e in events.all if isinstance(e, Dropped)]
     assert sorted(made + dropped) == list(range(1000, 1050))
