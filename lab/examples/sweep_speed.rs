@@ -43,11 +43,8 @@ fn main() -> Result<()> {
             ..usual
         }];
     } else {
-        cases.extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep {
-            planes,
-            taps: Sweep::taps_for(&display, planes),
-            ..usual
-        }));
+        cases
+            .extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep::of_planes(&display, planes)));
         cases.extend([0, 1].map(|hidden_layers| Sweep {
             hidden_layers,
             ..usual

@@ -211,7 +211,8 @@ fn to_codes(layer: &LdiLayer) -> (Vec<u8>, Vec<u16>) {
     (rgba, depth)
 }
 
-fn depth_of_code(code: u16) -> f32 {
+/// The depth that 16 bits of a file stand for.
+pub(crate) fn depth_of_code(code: u16) -> f32 {
     f32::from(code) / 65535.0
 }
 

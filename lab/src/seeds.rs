@@ -10,6 +10,7 @@ use crate::dataset::{self, Manifest};
 use crate::depth_study::{Degradation, RATIO, degrade, refine};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::ldi::depth_of_code;
 use crate::scene::dice::Dice;
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, concatenate, s};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
@@ -117,7 +118,7 @@ fn refined_depths(
     count: usize,
 ) -> Result<Array3<u16>> {
     let (height, width) = depth.dim();
-    let depth = depth.mapv(real);
+    let depth = depth.mapv(depth_of_code);
     let mut all = Array3::zeros((count, height, width));
     for (variant, mut to) in all.outer_iter_mut().enumerate() {
         let seed = ((index as u64) << 32) + variant as u64;
@@ -134,11 +135,6 @@ fn refined_depths(
     Ok(all)
 }
 
-/// The depth that a stored one stands for.
-fn real(stored: u16) -> f32 {
-    f32::from(stored) / 65535.0
-}
-
 /// The fields of one scene on all its depths.
 fn fields(
     plan: &SweepPlan,
@@ -150,7 +146,7 @@ fn fields(
     let mut scratch = plan.scratch();
     let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
     for (depth, mut planes) in depths.outer_iter().zip(fields.outer_iter_mut()) {
-        let depth: Array2<f32> = depth.mapv(real);
+        let depth: Array2<f32> = depth.mapv(depth_of_code);
         let frame = RgbdFrame::new(colour.clone(), depth)?;
         let values = field.as_slice_mut().expect("standard layout");
         plan.field(&frame, values, &mut scratch)?;

@@ -171,13 +171,8 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
     settings.push(("usual", words, usual.planes, sweep(usual)));
     for tenths in [4, 6, 8, 12, 16, 24, 32] {
         let planes = (usual.planes * tenths).div_ceil(10);
-        let taps = Sweep::taps_for(display, planes);
-        let words = format!("{planes} planes of {taps} taps");
-        let way = Sweep {
-            planes,
-            taps,
-            ..usual
-        };
+        let way = Sweep::of_planes(display, planes);
+        let words = format!("{planes} planes of {} taps", way.taps);
         settings.push(("planes", words, planes, sweep(way)));
     }
     for more in [-4, -2, 2, 4, 8] {

@@ -68,7 +68,7 @@ def describe(name, last, figures):
     seed = f"--seed {data['seed']} --size {data['size']} --planes {data['planes']}"
     seeds = ""
     if any(a.input == "seeded" for a, _ in last.networks.values()):
-        seeds = f" and its seeds: `python -m phasefront_training seeds --data DATA -o SEEDS -- --planes {data['seed_planes']}`,"
+        seeds = f" and its seeds: `python -m phasefront_training seeds --data DATA -o SEEDS -- --planes {data['seed_planes']} --refined {data['refined']}`,"
     lines += [
         "## To make it again", "",
         f"The data set: `python -m phasefront_training data -o DATA -- {seed} --scenes …`,{seeds} then", "",

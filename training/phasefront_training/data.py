@@ -141,7 +141,7 @@ class Scenes:
         self.seeded = seeds is not None
         self.refined = seeds.refined if seeds else 0
         if seeds:
-            self.origin["seed_planes"] = seeds.planes
+            self.origin |= {"seed_planes": seeds.planes, "refined": seeds.refined}
         if self.seeded:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))

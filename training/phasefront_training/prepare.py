@@ -81,11 +81,12 @@ def _factors(levels):
 
 def balance(chain, examples):
     """Scales the features against the network's input by the power of two that loses least over a list of inputs (C, H, W)."""
+    exact = _outputs(chain, examples)
 
     def error(factor):
         scaled = copy.deepcopy(chain)
         scale_features(scaled, factor)
-        return _loss(chain, Quantized(scaled, calibrate(scaled, examples[:SCENES])), examples)
+        return _loss(exact, Quantized(scaled, calibrate(scaled, examples[:SCENES])), examples)
 
     scale_features(chain, min(BALANCES, key=error))
 
@@ -93,16 +94,21 @@ def balance(chain, examples):
 def share(chain, ranges, examples):
     """The ranges, each sum's, from the last to the first, that of the sum after it where this loses less."""
     sums = [name for name in ranges if name.startswith("add")]
-    least = _loss(chain, Quantized(chain, ranges), examples)
+    exact = _outputs(chain, examples)
+    least = _loss(exact, Quantized(chain, ranges), examples)
     for name, after in reversed(list(zip(sums, sums[1:]))):
         shared = ranges | {name: ranges[after]}
-        loss = _loss(chain, Quantized(chain, shared), examples)
+        loss = _loss(exact, Quantized(chain, shared), examples)
         if loss < least:
             ranges, least = shared, loss
     return ranges
 
 
-def _loss(chain, quantized, examples):
-    """The mean square of what rounding changes."""
+def _outputs(network, examples):
     with torch.no_grad():
-        return sum(float((quantized(x[None]) - chain(x[None])).square().mean()) for x in examples[:SCENES])
+        return [network(x[None]) for x in examples[:SCENES]]
+
+
+def _loss(exact, quantized, examples):
+    """The mean square by which a Quantized's outputs differ from the exact ones."""
+    return sum(float((a - b).square().mean()) for a, b in zip(_outputs(quantized, examples), exact))

@@ -204,13 +204,16 @@ def examples(scenes, kind):
 
 
 class QuantizationAware(Stage1):
-    """Stage 1 once more, through the rounding; ranges stay as calibrated."""
+    """Stage 1 once more, through the rounding; ranges stay as calibrated, and dead units dead."""
 
     kind = "qat"
 
     def __init__(self, network, *args, **options):
         super().__init__(network, *args, bf16=False, **options)
         self.networks = {"hologram": network.chain}
+
+    def revive(self, step, progress):
+        return 0
 
     def extra(self):
         return super().extra() | {"ranges": self.network.ranges}

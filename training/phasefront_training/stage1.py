@@ -12,7 +12,7 @@ from .data import Sampler
 from .evaluate import evaluate, torch_predictor
 from .loop import Task
 from .losses import field_terms, fill_invalid, focal_stack_terms
-from .networks import Chain, head_field
+from .networks import head_field
 from .revive import revive
 
 FOCAL_WEIGHT = 2.0
@@ -57,7 +57,7 @@ class Stage1(Task):
         return self.sampler.draw(step)
 
     def revive(self, step, progress):
-        if step % REVIVAL_STEPS or progress >= REVIVALS_END or not isinstance(self.network, Chain):
+        if step % REVIVAL_STEPS or progress >= REVIVALS_END:
             return 0
         with torch.random.fork_rng():
             torch.manual_seed(int(np.random.default_rng([self.seed, step]).integers(2**62)))
