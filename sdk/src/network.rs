@@ -217,7 +217,7 @@ impl Network {
     }
 
     /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels. A blur that
-    /// it asks for ([`InputKind::BlurredField`]) is the caller's.
+    /// it asks for ([`InputKind::is_blurred`]) is the caller's.
     ///
     /// # Errors
     /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
@@ -235,6 +235,7 @@ impl Network {
         Ok(FilterPlan {
             engine: self.fused_engine(&chain),
             chain,
+            input: self.input,
             head: self.head,
             size: (height, width),
         })

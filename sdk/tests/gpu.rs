@@ -612,6 +612,11 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
             input: "blurred-field",
             ..Model::new(4, 8)
         },
+        Model {
+            inputs: 12,
+            input: "split-blurred-field",
+            ..Model::int8(4, 8)
+        },
     ];
     for model in models {
         let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());

@@ -303,7 +303,7 @@ fn refocus_agrees_with_equation_2_from_any_offset() {
 
 #[test]
 fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
-    for input in ["field", "blurred-field"] {
+    for input in ["field", "blurred-field", "split-blurred-field"] {
         deep_encoding(input);
     }
 }
@@ -311,6 +311,7 @@ fn deep_encoding_is_the_pre_filter_and_then_double_phase() {
 fn deep_encoding(input: &'static str) {
     let model = Model {
         input,
+        inputs: if input.starts_with("split") { 12 } else { 6 },
         ..Model::prefilter("6")
     };
     let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
@@ -327,7 +328,7 @@ fn deep_encoding(input: &'static str) {
         .map(|i| Complex32::from_polar(0.5 + 0.3 * (i as f32).sin(), i as f32 * 0.01))
         .collect();
     let mut filtered = field.clone();
-    if input == "blurred-field" {
+    if input != "field" {
         let blur = AntiAlias::new(0.7, 3).unwrap();
         (filtered.chunks_exact_mut(h * w)).for_each(|plane| blur.filter(plane, w));
     }

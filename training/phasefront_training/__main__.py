@@ -4,6 +4,8 @@ import argparse
 import copy
 import itertools
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -70,7 +72,9 @@ def parser():
     p = add("quantize", run_quantize, "Write a network as int8 ONNX; trains it through the rounding where that costs over 0.1 dB.")
     p.add_argument("file", help="a checkpoint or a float32 .onnx")
     p.add_argument("--network", default="hologram", choices=("hologram", "prefilter"), help="which, of a stage 2 checkpoint (default %(default)s)")
-    p.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
+    whether = p.add_mutually_exclusive_group()
+    whether.add_argument("--always-train", action="store_true", help="train though the rounding costs less")
+    whether.add_argument("--never-train", action="store_true", help="leave it as it is though the rounding costs more")
     training_flags(p, output="the .onnx file; training goes on in FILE.qat", rate=1e-4)
 
     p = add("export", run_export, "Write a checkpoint's network as float32 ONNX.")
@@ -262,55 +266,75 @@ def go(task, args, workers, resume, folder=None):
 
 
 def run_quantize(args):
-    if args.network == "prefilter":
-        return quantize_prefilter(args)
-    network, display = checkpoint.load_network(args.file)
-    train, validation = load(args, network.architecture)
-    seen = list(quantize.examples(train, network.architecture.input))
-    exact = quantize.figure(network, validation)
-    quantized = prepare.prepare(network, seen)
-    settled = copy.deepcopy(quantized)
-    rounding.round_in_order(settled, seen)
-    rounded = quantize.figure(settled, validation)
-    quantize.report("after training", exact, rounded)
-    if worth_training(args, exact - rounded):
+    subject = (quantized_prefilter if args.network == "prefilter" else quantized_hologram)(args)
+    exact = subject.figure(subject.chain)
+    trainable = prepare.prepare(subject.chain, subject.examples)
+
+    def settled(how):
+        """The rounded network, which is told how it came about and how good it is."""
+        network = copy.deepcopy(trainable).cpu()
+        rounding.round_in_order(network, subject.examples)
+        rounded = subject.figure(network)
+        print(f"{how}: float32 {exact:.2f} dB, int8 {rounded:.2f} dB on the validation scenes", file=sys.stderr)
+        return network, exact - rounded
+
+    network, loss_db = settled("after training")
+    if worth_training(args, loss_db):
         workers = loop.Workers.start(args.device)
-        task = quantize.QuantizationAware(quantized, train, validation, workers, **sampling(args))
-        go(task, args, workers, None, folder=f"{args.output}.qat")
-        settled = quantized.cpu()
-        rounding.round_in_order(settled, seen)
-        quantize.report("trained through the rounding", exact, quantize.figure(settled, validation))
-    export.write(export_int8.int8_model(settled, display, seed_planes=train.facts.get("seed_planes")), args.output)
+        go(subject.training(trainable, workers), args, workers, None, folder=f"{args.output}.qat")
+        network, _ = settled("trained through the rounding")
+    export.write(export_int8.int8_model(network, **subject.trained_for), args.output)
 
 
-def quantize_prefilter(args):
+@dataclass(frozen=True)
+class Subject:
+    """What `quantize` works on."""
+
+    chain: networks.Chain
+    examples: list  # its inputs on the first scenes, (C, H, W)
+    figure: Callable  # of a network in its place: PSNR on the validation scenes, dB
+    training: Callable  # the task that trains a Quantized in its place, on workers
+    trained_for: dict  # as the file's metadata say
+
+
+def quantized_hologram(args):
+    chain, display = checkpoint.load_network(args.file)
+    train, validation = load(args, chain.architecture)
+    return Subject(
+        chain,
+        list(quantize.examples(train, chain.architecture.input)),
+        lambda network: quantize.figure(network, validation),
+        lambda network, workers: quantize.QuantizationAware(network, train, validation, workers, **sampling(args)),
+        {"display": display, "seed_planes": train.facts.get("seed_planes")},
+    )
+
+
+def quantized_prefilter(args):
     model = stage2_model(args.file, bf16=not args.f32)
+    model.prefilter = prepare.in_two_parts(model.prefilter)
     train, validation = load(args, model.hologram.architecture)
+
+    def behind(network):
+        model.prefilter = network
+        return model
+
     with torch.no_grad():
-        seen = list(quantize.prefilter_examples(model, train))
-    exact = quantize.encoded_figure(model, validation)
-    trainable = prepare.prepare(model.prefilter, seen)
-    model.prefilter = copy.deepcopy(trainable)
-    rounding.round_in_order(model.prefilter, seen)
-    rounded = quantize.encoded_figure(model, validation)
-    quantize.report("after training", exact, rounded)
-    if worth_training(args, exact - rounded):
-        workers = loop.Workers.start(args.device)
-        model.prefilter = trainable
-        task = quantize.PrefilterQuantizationAware(model, train, validation, workers, **sampling(args))
-        go(task, args, workers, None, folder=f"{args.output}.qat")
-        model = model.cpu()
-        rounding.round_in_order(model.prefilter, seen)
-        quantize.report("trained through the rounding", exact, quantize.encoded_figure(model, validation))
-    export.write(export_int8.int8_model(model.prefilter.cpu(), model.display, model.offset_m), args.output)
+        examples = list(quantize.prefilter_examples(model, train))
+    return Subject(
+        model.prefilter,
+        examples,
+        lambda network: quantize.encoded_figure(behind(network).cpu(), validation),
+        lambda network, workers: quantize.PrefilterQuantizationAware(behind(network), train, validation, workers, **sampling(args)),
+        {"display": model.display, "offset_m": model.offset_m},
+    )
 
 
 def worth_training(args, loss_db):
     """Whether to train through the rounding; it needs a budget then."""
-    if not args.always_train and loss_db <= quantize.ALLOWED_LOSS_DB:
+    if args.never_train or not args.always_train and loss_db <= quantize.ALLOWED_LOSS_DB:
         return False
     if args.minutes is None and args.steps is None:
-        raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps")
+        raise ValueError("the rounding costs over 0.1 dB: give quantization-aware training a budget, --minutes or --steps, or say --never-train")
     return True
 
 

@@ -9,7 +9,7 @@ import math
 import torch
 from torch.nn import functional as F
 
-from .networks import head_field
+from .networks import head_field, split
 from .optics import padded_shape, propagate, transfer
 
 LARGEST = 1 - 1e-6  # of the normalized amplitude, so that the slope of acos stays finite
@@ -75,7 +75,9 @@ class DeepDoublePhase(torch.nn.Module):
     def seen_by_prefilter(self, midpoint):
         """The pre-filter's input (N, 6, H, W): the field at the modulator's plane, blurred where it asks for that."""
         there = propagate(midpoint, self.offset_m, self.display) if self.offset_m else midpoint
-        return channels(anti_alias(there) if self.prefilter.architecture.input == "blurred-field" else there)
+        kind = self.prefilter.architecture.input
+        x = channels(there if kind == "field" else anti_alias(there))
+        return split(x) if kind == "split-blurred-field" else x
 
     def filtered(self, midpoint):
         """Eq. 6: the pre-encoding field at the modulator's plane; the carrier-free ASM has its phase correction."""

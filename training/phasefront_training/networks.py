@@ -14,9 +14,9 @@ Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``rgbdxy`` (the s
 -0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (4·N channels: rgb0,
 depth0, rgb1, ..., each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of
 rgbd, then the plane sweep's field as data.network_input lays it; the field is the base), ``field`` (6 channels: the
-real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method) and
+real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method),
 ``blurred-field`` (the same of a field that AA-DPM's blur has gone over: what is left for the network is small, so that
-its rounding is too).
+its rounding is too) and ``split-blurred-field`` (12 channels: the same in two parts, see `split`, for int8).
 """
 
 import math
@@ -29,6 +29,8 @@ from torch.nn import functional as F
 from .data import seed_of_input
 
 HEADS = ("real-imaginary", "amplitude-phase")
+SPLIT_STEP = 1 / 64  # of the first part of a split field
+REMAINDER_GAIN = 16  # of the second
 
 
 @dataclass(frozen=True)
@@ -59,16 +61,17 @@ class Architecture:
         count = self.input.removeprefix("ldi")
         if self.input.startswith("ldi") and count.isdigit() and int(count) > 0:
             return int(count)
-        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...), field or blurred-field, not '{self.input}'")
+        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...), field, blurred-field or split-blurred-field, not '{self.input}'")
 
     @property
     def of_fields(self):
         """Whether it is a pre-filter: what it takes is a field."""
-        return self.input in ("field", "blurred-field")
+        return self.input in ("field", "blurred-field", "split-blurred-field")
 
     @property
     def input_channels(self):
-        return {"field": 6, "blurred-field": 6, "rgbdxy": 6, "seeded": 10}.get(self.input) or 4 * self.ldi_layers
+        known = {"field": 6, "blurred-field": 6, "split-blurred-field": 12, "rgbdxy": 6, "seeded": 10}
+        return known.get(self.input) or 4 * self.ldi_layers
 
     def channels(self, i):
         """(input, output) channels of layer i."""
@@ -125,6 +128,15 @@ class Chain(nn.Module):
         return head_field(self.architecture, self(x), x)
 
 
+def split(x):
+    """A field's channels (N, 6, H, W) in two parts (N, 12, H, W): in steps of 1/64, and what is left, 16 times.
+
+    u8 activations hold the first exactly and the second to 1/2048.
+    """
+    first = torch.round(x / SPLIT_STEP) * SPLIT_STEP
+    return torch.cat([first, REMAINDER_GAIN * (x - first)], 1)
+
+
 def head_field(architecture, output, x):
     """The complex field (N, 3, H, W) that the output (N, 6, H, W) means for the input x."""
     output = output.float()
@@ -136,7 +148,10 @@ def head_field(architecture, output, x):
         real, imaginary = seed_of_input(base)
         return torch.complex(real + output[:, :3], imaginary + output[:, 3:])
     if architecture.of_fields:
-        return torch.complex(base[:, :3] + output[:, :3], base[:, 3:] + output[:, 3:])
+        field = base[:, :6]
+        if architecture.input == "split-blurred-field":
+            field = field + base[:, 6:] / REMAINDER_GAIN
+        return torch.complex(field[:, :3] + output[:, :3], field[:, 3:] + output[:, 3:])
     return torch.complex(base[:, :3] + 0.5 + output[:, :3], output[:, 3:].contiguous())
 
 

@@ -1,22 +1,25 @@
 """From a trained Chain to a Quantized one, without training: what is done so that rounding costs little.
 
-Channels are scaled against each other (`equalise`), and features against the network's input beside which the last layer
-reads them (`balance`); neither changes what the network gives, for a ReLU scales with what it reads. Then ranges are
-chosen (`calibrate`), and sums take the same steps as the sums after them where that loses less (`share`): what a branch
-adds nothing to then passes on without being rounded anew.
+A pre-filter first takes its field in two parts (`in_two_parts`). Channels are scaled against each other (`equalise`), and
+features against the network's input beside which the last layer reads them (`balance`); none of this changes what the
+network gives, for a ReLU scales with what it reads. Then ranges are chosen (`calibrate`), and sums take the same steps as
+the sums after them where that loses less (`share`): what a branch adds nothing to then passes on without being rounded
+anew.
 """
 
 import copy
+from dataclasses import replace
 
 import torch
 
+from .networks import REMAINDER_GAIN, Chain
 from .quantize import Quantized, activations, calibrate
 
 LEVEL = 0.999  # of a channel's values lie under what counts as its greatest
 EVERY = 7  # pixel counts for that
 EVENNESS = 0.5  # 1 makes all channels of a tensor one size, which costs the weights more than the tensor gains
 MOST_SCALED = 8.0
-BALANCES = [2.0**k for k in range(-6, 3)]  # powers of two, which no float32 weight is rounded by
+BALANCES = [2.0**k for k in range(-6, 5)]  # powers of two, which no float32 weight is rounded by
 SCENES = 4  # that scales and ranges are compared on
 
 
@@ -25,6 +28,20 @@ def prepare(chain, examples):
     equalise(chain, examples)
     balance(chain, examples)
     return Quantized(chain, share(chain, calibrate(chain, examples), examples))
+
+
+def in_two_parts(prefilter):
+    """The same pre-filter for a split field: dark pixels, at which the modulator's light cancels, cannot bear a field rounded to u8."""
+    old = prefilter.architecture
+    if old.input != "blurred-field":
+        return prefilter
+    network = Chain(replace(old, input="split-blurred-field"))
+    with torch.no_grad():
+        for conv, known in zip(network.convs, prefilter.convs):
+            conv.bias.copy_(known.bias)
+            of_remainders = known.weight[:, -6:] / REMAINDER_GAIN
+            conv.weight.copy_(torch.cat([known.weight, of_remainders], 1)[:, : conv.in_channels])
+    return network
 
 
 def scale_channels(chain, writers, readers, factors):

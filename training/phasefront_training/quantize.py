@@ -16,8 +16,6 @@ As features and the network's input share that scale, and their weights in a fil
 must be of one size, as must channels of one tensor: prepare.py sees to it. Weights are rounded in order (rounding.py), last.
 """
 
-import sys
-
 import numpy as np
 import torch
 from torch import nn
@@ -25,6 +23,7 @@ from torch.nn import functional as F
 
 from .data import network_input
 from .evaluate import evaluate, scene_as_seen, torch_predictor
+from .networks import SPLIT_STEP
 from .stage1 import Stage1
 from .stage2 import Stage2, encoding_figures
 
@@ -177,13 +176,16 @@ def calibrate(chain, examples):
 
 @torch.no_grad()
 def extremes(chain, examples):
-    """{tensor: (least, greatest value)} over inputs; of colours, depths and seeds the whole range that they can have."""
+    """{tensor: (least, greatest value)} over inputs; of colours, depths and seeds the whole range that they can have, of a
+    split field the one whose steps are its own."""
     ranges = {}
     for x in examples:
         for name, values in activations(chain, x[None]):
             low, high = ranges.get(name, (0.0, 0.0))
             ranges[name] = min(low, float(values.min())), max(high, float(values.max()))
-    if not chain.architecture.of_fields:
+    if chain.architecture.input == "split-blurred-field":
+        ranges["input"] = ranges["concat"] = -127 * SPLIT_STEP, 127 * SPLIT_STEP
+    elif not chain.architecture.of_fields:
         ranges["input"] = (-0.5, 0.5)
         ranges["concat"] = min(ranges["concat"][0], -0.5), max(ranges["concat"][1], 0.5)
     return ranges
@@ -247,7 +249,3 @@ def figure(network, scenes):
 def encoded_figure(model, scenes):
     """Amplitude PSNR on scenes of what a DeepDoublePhase's holograms show."""
     return encoding_figures(model, scenes, full=False, others=False)["deep double phase"]["amplitude_psnr"]
-
-
-def report(name, exact, rounded):
-    print(f"{name}: float32 {exact:.2f} dB, int8 {rounded:.2f} dB on the validation scenes", file=sys.stderr)

@@ -3,10 +3,13 @@ import copy
 import pytest
 import torch
 
+from phasefront_training.encode import DeepDoublePhase
 from phasefront_training.networks import Architecture, Chain
-from phasefront_training.prepare import balance, equalise, prepare, scale_features, share
+from phasefront_training.optics import Display
+from phasefront_training.prepare import balance, equalise, in_two_parts, prepare, scale_features, share
 from phasefront_training.quantize import Quantized, calibrate
 from phasefront_training.rounding import in_order, round_in_order
+from phasefront_training.stage2 import prefilter_network
 
 CASES = [Architecture(layers, 8, input) for layers in (3, 4, 7, 8) for input in ("rgbd", "seeded")]
 
@@ -111,3 +114,26 @@ def test_in_order_an_error_is_made_good_by_what_goes_together():
     rounded = in_order(torch.tensor([[1.4, 1.4, 0.0]], dtype=torch.float64), torch.ones(1, dtype=torch.float64), products)
     assert rounded[0, 0] == 1 and rounded[0, 1] == 2
     assert abs(float(rounded.sum()) - 2.8) < 1e-3
+
+
+def test_a_field_in_two_parts_is_the_same_field_and_rounds_less():
+    chain = prefilter_network(4)
+    with torch.no_grad():
+        chain.convs[-1].weight[:3, 8:11, 1, 1] = 0.5 * torch.eye(3)  # pre-filters undo part of the blur
+    field = torch.polar(torch.rand(2, 3, 40, 40) ** 4, 0.3 * torch.randn(2, 3, 40, 40))
+
+    def filtered(prefilter):
+        with torch.no_grad():
+            return DeepDoublePhase(Chain(Architecture(3, 8)), prefilter, 0.0, Display()).filtered(field)
+
+    def lost(prefilter):
+        model = DeepDoublePhase(Chain(Architecture(3, 8)), prefilter, 0.0, Display())
+        seen = list(model.seen_by_prefilter(field))
+        quantized = prepare(copy.deepcopy(prefilter), seen)
+        round_in_order(quantized, seen)
+        return float((filtered(quantized) - exact).abs().square().mean())
+
+    exact, split = filtered(chain), in_two_parts(chain)
+    assert split.architecture.input == "split-blurred-field" and in_two_parts(split) is split
+    assert torch.allclose(filtered(split), exact, atol=1e-5)
+    assert 0 < lost(split) < 0.1 * lost(chain)

@@ -8,14 +8,14 @@ use super::anti_alias::{AntiAlias, AntiAliasScratch};
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::method::check_display;
-use crate::network::{FilterPlan, FilterScratch, InputKind, Network};
+use crate::network::{FilterPlan, FilterScratch, Network};
 use num_complex::Complex32;
 
 /// How far the modulator may stand from where a pre-filter was trained for: what light spreads over it stays below a
 /// tenth of a pixel of 8 µm.
 const OFFSET_TOLERANCE_M: f64 = 20e-6;
 
-/// The blur that pre-filters for [`InputKind::BlurredField`] are trained behind.
+/// The blur that pre-filters for blurred fields ([`InputKind::is_blurred`](crate::network::InputKind::is_blurred)) are trained behind.
 ///
 /// # Errors
 /// None.
@@ -43,7 +43,7 @@ impl Deep {
     /// # Errors
     /// A network that is no pre-filter, or that the kernels do not take.
     pub fn new(height: usize, width: usize, network: &Network) -> Result<Self> {
-        let blurred = network.input() == InputKind::BlurredField;
+        let blurred = network.input().is_blurred();
         Ok(Deep {
             shape: (height, width),
             blur: blurred.then(blur).transpose()?,

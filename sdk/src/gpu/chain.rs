@@ -345,11 +345,15 @@ impl Maker<'_> {
         let head = match end {
             End::Planes => 0,
             End::Field(Head::AmplitudePhase, _) => 1,
-            End::Field(Head::RealImaginary, InputKind::Field) => 3,
+            End::Field(Head::RealImaginary, InputKind::Field | InputKind::BlurredField) => 3,
             End::Field(Head::RealImaginary, InputKind::Seeded) => 4,
+            End::Field(Head::RealImaginary, InputKind::SplitBlurredField) => 5,
             End::Field(Head::RealImaginary, _) => 2,
         };
-        let more = format!("const HEAD: u32 = {head}u;\nconst TANH: bool = {tanh};\n");
+        let more = format!(
+            "const HEAD: u32 = {head}u;\nconst TANH: bool = {tanh};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            InputKind::REMAINDER_GAIN
+        );
         let source = self.source(layer, &weights, false, &more) + include_str!("chain_last.wgsl");
         let program = self.device.program("the last layer", source, "last");
         let mut arguments = self.arguments(&weights, from, &input.last);

@@ -67,6 +67,12 @@ fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
         } else if (HEAD == 3u) {
             re += base(at).xyz;
             im += vec3f(base(at).w, base(frame.plane + at).xy);
+        } else if (HEAD == 5u) {
+            // A field in two parts.
+            let second = base(frame.plane + at);
+            let third = base(2u * frame.plane + at);
+            re += base(at).xyz + vec3f(second.zw, third.x) / REMAINDER_GAIN;
+            im += vec3f(base(at).w, second.xy) + third.yzw / REMAINDER_GAIN;
         } else {
             // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
             let seed = base(frame.plane + at);

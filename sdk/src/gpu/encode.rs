@@ -13,7 +13,7 @@ use crate::encode::anti_alias::AntiAlias;
 use crate::encode::band_limit::BandLimit;
 use crate::encode::deep;
 use crate::illumination::Illumination;
-use crate::network::{InputKind, Network};
+use crate::network::Network;
 use crate::slm::{Response, per_pixel};
 
 /// Taps to one side up to which the blur is done in the same sweep as what follows it.
@@ -145,7 +145,7 @@ impl Encoder {
             }
             Encoding::Deep(network) => {
                 let mut made = Prefilter::new(device, network, field, size, options)?;
-                if network.input() == InputKind::BlurredField {
+                if network.input().is_blurred() {
                     let blur = deep::blur()?;
                     let blur = Blur {
                         device,
@@ -344,10 +344,10 @@ impl Prefilter {
             device,
             Form::Chain(chain, numbers),
             size,
-            Source::Field(field),
+            Source::Field(field, network.input()),
             None,
         )?;
-        let end = End::Field(network.head(), InputKind::Field);
+        let end = End::Field(network.head(), network.input());
         let (input, fusion) = (&packer.input, options.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
         Ok(Prefilter {

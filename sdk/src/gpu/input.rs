@@ -7,6 +7,7 @@ use super::{Error, Result};
 use crate::frame::{
     ColourFormat, ColourImage, ColourPlan, Orientation, Plane, RgbdFrame, yuv_constants,
 };
+use crate::network::InputKind;
 use crate::network::chain::{Chain, Quantisation};
 use ndarray::{Array2, Array3};
 
@@ -145,8 +146,8 @@ impl Form<'_> {
 pub(super) enum Source<'a> {
     /// The network's input planes themselves, f32, of any number, in its own buffer.
     Planes,
-    /// A complex field on the GPU.
-    Field(&'a wgpu::Buffer),
+    /// A complex field on the GPU, and how a pre-filter takes it.
+    Field(&'a wgpu::Buffer, InputKind),
     /// A frame's surfaces on the GPU, and the sweep's field of it.
     Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
     /// A frame, in its own buffers.
@@ -247,7 +248,13 @@ impl Packer {
                     0,
                 )
             }
-            Source::Field(field) => {
+            Source::Field(field, kind) => {
+                header += &format!(
+                    "const SPLIT: bool = {};\nconst SPLIT_STEP: f32 = {:?};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+                    kind == InputKind::SplitBlurredField,
+                    InputKind::SPLIT_STEP,
+                    InputKind::REMAINDER_GAIN
+                );
                 source_text += include_str!("input_field.wgsl");
                 (field.clone(), 0)
             }
@@ -304,7 +311,7 @@ impl Packer {
         match source {
             Source::Frame(..) => arguments.push((2, depth.as_entire_binding())),
             Source::Seeded(_, seed) => arguments.push((2, seed.as_entire_binding())),
-            Source::Planes | Source::Field(_) => {}
+            Source::Planes | Source::Field(..) => {}
         }
         let steps = match form {
             Form::Chain(chain, Numbers::Int8) => Some(steps(device, chain)?),

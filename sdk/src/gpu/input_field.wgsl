@@ -1,4 +1,5 @@
-// Channels from a complex field: the real parts of its colours, then the imaginary ones. Goes behind input.wgsl.
+// Channels from a complex field: the real parts of its colours, then the imaginary ones; of a split one both in two parts.
+// Goes behind input.wgsl.
 
 @group(0) @binding(1) var<storage, read> colour: array<vec2f>;
 
@@ -7,5 +8,18 @@ fn channels(group: u32, x: u32, y: u32) -> vec4f {
     let red = colour[at];
     let green = colour[frame.plane + at];
     let blue = colour[2u * frame.plane + at];
-    return select(vec4f(green.y, blue.y, 0, 0), vec4f(red.x, green.x, blue.x, red.y), group == 0u);
+    let re = vec3f(red.x, green.x, blue.x);
+    let im = vec3f(red.y, green.y, blue.y);
+    if (!SPLIT) { return select(vec4f(im.yz, 0, 0), vec4f(re, im.x), group == 0u); }
+    let first_re = in_steps(re);
+    let first_im = in_steps(im);
+    let rest_re = REMAINDER_GAIN * (re - first_re);
+    let rest_im = REMAINDER_GAIN * (im - first_im);
+    if (group == 0u) { return vec4f(first_re, first_im.x); }
+    if (group == 1u) { return vec4f(first_im.yz, rest_re.xy); }
+    return vec4f(rest_re.z, rest_im);
+}
+
+fn in_steps(values: vec3f) -> vec3f {
+    return round(values / SPLIT_STEP) * SPLIT_STEP;
 }

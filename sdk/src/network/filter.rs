@@ -2,7 +2,7 @@
 //! a second field is never held.
 
 use super::fused::{FusedChain, FusedScratch, tanh};
-use super::{Engine, Head};
+use super::{Engine, Head, InputKind};
 use num_complex::Complex32;
 use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
 
@@ -10,6 +10,7 @@ use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
 /// threads, each with its own scratch.
 pub struct FilterPlan {
     pub(super) chain: FusedChain,
+    pub(super) input: InputKind,
     pub(super) head: Head,
     pub(super) size: (usize, usize),
     pub(super) engine: Engine,
@@ -61,6 +62,7 @@ impl FilterPlan {
             }
         }
         let rows = InPlace {
+            input: self.input,
             head: self.head,
             tanh: self.chain.has_tanh(),
             borders: &scratch.borders,
@@ -76,6 +78,7 @@ impl FilterPlan {
 }
 
 struct InPlace<'a> {
+    input: InputKind,
     head: Head,
     tanh: bool,
     borders: &'a [Complex32],
@@ -88,8 +91,9 @@ impl Rows<3> for InPlace<'_> {
     type Value = Complex32;
 
     fn read(&self, row: usize, from: usize, band: &Band<'_, Complex32, 3>, into: &mut [f32]) {
-        let count = into.len() / 6;
-        let (re, im) = into.split_at_mut(3 * count);
+        let count = into.len() / self.input.channels();
+        let (field, remainders) = into.split_at_mut(6 * count);
+        let (re, im) = field.split_at_mut(3 * count);
         let parts = re.chunks_exact_mut(count).zip(im.chunks_exact_mut(count));
         for (plane, (re, im)) in parts.enumerate() {
             let values = match self.kept_row(row, &band.rows()) {
@@ -105,6 +109,11 @@ impl Rows<3> for InPlace<'_> {
                 }
             });
         }
+        wide!({
+            for (value, remainder) in field.iter_mut().zip(remainders) {
+                (*value, *remainder) = InputKind::split(*value);
+            }
+        });
     }
 
     fn write(

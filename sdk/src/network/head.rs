@@ -98,6 +98,16 @@ impl Head {
                         base(c, at, &mut re[..count]);
                         base(3 + c, at, &mut im[..count]);
                     }
+                    InputKind::SplitBlurredField => {
+                        for (plane, part) in [(c, &mut re), (3 + c, &mut im)] {
+                            let mut remainder = [0.0; PIECE];
+                            base(plane, at, &mut part[..count]);
+                            base(6 + plane, at, &mut remainder[..count]);
+                            for (value, remainder) in part.iter_mut().zip(&remainder) {
+                                *value += remainder / InputKind::REMAINDER_GAIN;
+                            }
+                        }
+                    }
                     InputKind::Seeded => {
                         // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
                         base(4 + c, at, &mut re[..count]);

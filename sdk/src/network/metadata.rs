@@ -26,9 +26,24 @@ pub enum InputKind {
     /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network is
     /// small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
     BlurredField,
+    /// "split-blurred-field": the same in two parts, for networks whose input is rounded to 8 bits: its six planes in steps
+    /// of [`InputKind::SPLIT_STEP`], then of each what is left, [`InputKind::REMAINDER_GAIN`] times.
+    SplitBlurredField,
 }
 
 impl InputKind {
+    /// The steps that a split field is rounded to in its first part.
+    pub const SPLIT_STEP: f32 = 1.0 / 64.0;
+    /// What the remainders of a split field are multiplied by.
+    pub const REMAINDER_GAIN: f32 = 16.0;
+
+    /// A value of a field in the two parts of a split one: `value = first + second / REMAINDER_GAIN`.
+    #[inline(always)]
+    pub fn split(value: f32) -> (f32, f32) {
+        let first = (value / Self::SPLIT_STEP).round_ties_even() * Self::SPLIT_STEP;
+        (first, Self::REMAINDER_GAIN * (value - first))
+    }
+
     /// Planes of the input.
     pub fn channels(self) -> usize {
         match self {
@@ -37,12 +52,18 @@ impl InputKind {
             InputKind::Ldi { layers } => 4 * layers,
             InputKind::Seeded => 10,
             InputKind::Field | InputKind::BlurredField => 6,
+            InputKind::SplitBlurredField => 12,
         }
     }
 
     /// Whether a network for it is a pre-filter.
     pub fn is_field(self) -> bool {
-        matches!(self, InputKind::Field | InputKind::BlurredField)
+        self == InputKind::Field || self.is_blurred()
+    }
+
+    /// Whether what it reads is a field that the blur of AA-DPM has gone over.
+    pub fn is_blurred(self) -> bool {
+        matches!(self, InputKind::BlurredField | InputKind::SplitBlurredField)
     }
 
     fn from_name(name: &str) -> Option<InputKind> {
@@ -52,6 +73,7 @@ impl InputKind {
             b"seeded" => Some(InputKind::Seeded),
             b"field" => Some(InputKind::Field),
             b"blurred-field" => Some(InputKind::BlurredField),
+            b"split-blurred-field" => Some(InputKind::SplitBlurredField),
             [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
                 layers: usize::from(n - b'0'),
             }),
@@ -69,12 +91,13 @@ impl std::fmt::Display for InputKind {
             InputKind::Seeded => f.write_str("seeded"),
             InputKind::Field => f.write_str("field"),
             InputKind::BlurredField => f.write_str("blurred-field"),
+            InputKind::SplitBlurredField => f.write_str("split-blurred-field"),
         }
     }
 }
 
 /// What `phasefront.input` may be.
-const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field' or 'blurred-field'";
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
