@@ -10,11 +10,11 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards
+from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
-from .stage2 import Identity, Stage2, encoding_figures, prefilter_network
+from .stage2 import Identity, Stage2, prefilter_network
 
 FAILURES = (data.DataError, checkpoint.CheckpointError, export.ExportError, loop.LossNotFinite, ValueError, OSError)
 BEGINNING_SCENES = 4  # that show which units never fire, and what a grown last layer is fitted to
@@ -91,6 +91,7 @@ def parser():
     p.add_argument("checkpoint")
     p.add_argument("--prefilter", metavar="FILE", help="an .onnx to judge instead of the checkpoint's own pre-filter, such as its int8 form")
     p.add_argument("--degraded", action="store_true", help="on depth as phones give it")
+    p.add_argument("--picture", metavar="FILE", help="draw the scene there on which deep double phase is worst, by all encodings (.png, .jpg)")
     evaluation_flags(p)
 
     p = add("card", run_card, "Write a network's card from its checkpoint and its measured figures.")
@@ -387,11 +388,10 @@ def run_evaluate_encoding(args):
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
     scenes = scenes_for(args, args.split, {model.hologram.architecture.input}, args.scenes)
     depth = "degraded" if args.degraded else "clean"
-    results = encoding_figures(model, scenes, depth)
-    columns = list(next(iter(results.values())))
-    print("| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|", sep="\n")
-    for name, figures in results.items():
-        print(f"| {name} | " + " | ".join(f"{figures[c]:.4g}" for c in columns) + " |")
+    results = evaluate_encoding.encoding_figures(model, scenes, depth)
+    if args.picture:
+        evaluate_encoding.draw_worst(model, scenes, results, args.picture, depth)
+    print(evaluate_encoding.table(results))
     if args.json:
         facts = scenes_of(args, scenes) | {"depth": depth}
         evaluate.save({"data": facts, "offset_mm": model.offset_m * 1e3, "results": results}, args.json)

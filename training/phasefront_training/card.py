@@ -4,7 +4,7 @@ import json
 import shlex
 from pathlib import Path
 
-from .evaluate import table
+from . import evaluate, evaluate_encoding
 from .files import replacing
 from .networks import multiplies_per_pixel
 
@@ -59,11 +59,9 @@ def describe(name, last, figures):
         lines += [f"On {measured['scenes']} scenes of the {measured['split']} split{depth}:", ""]
         methods = {Path(method).name: found for method, found in each["results"].items()}
         if "offset_mm" in each:
-            columns = list(next(iter(methods.values())))
-            lines += ["| encoding | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
-            lines += [f"| {m} | " + " | ".join(f"{f[c]:.4g}" for c in columns) + " |" for m, f in methods.items()]
+            lines.append(evaluate_encoding.table(methods))
         else:
-            lines.append(table(methods))
+            lines.append(evaluate.table(methods))
         lines.append("")
     seed = f"--seed {data['seed']} --size {data['size']} --planes {data['planes']}"
     seeds = ""

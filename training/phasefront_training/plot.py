@@ -1,4 +1,4 @@
-"""Curves of trainings as a picture: the loss, and the figures on validation scenes, over minutes."""
+"""Pictures: the curves of trainings, the loss and the figures on validation scenes over minutes; and views of a scene."""
 
 from pathlib import Path
 
@@ -31,5 +31,20 @@ def plot(folders, output):
     for axes in (left, right):
         axes.grid(alpha=0.3)
         axes.legend(fontsize=8)
+    figure.savefig(output, dpi=120)
+    pyplot.close(figure)
+
+
+def pictures(views, output):
+    """Draws {title: amplitude (3, H, W)}, four in a row, into one picture; amplitude 1 is white."""
+    columns = min(len(views), 4)
+    rows = -(-len(views) // columns)
+    height, width = next(iter(views.values())).shape[-2:]
+    figure, axes = pyplot.subplots(rows, columns, figsize=(3 * columns, (3 * height / width + 0.3) * rows), layout="constrained", squeeze=False)
+    for place in axes.flat:
+        place.axis("off")
+    for place, (title, view) in zip(axes.flat, views.items()):
+        place.imshow(view.clamp(0, 1).permute(1, 2, 0).numpy())
+        place.set_title(title, fontsize=9)
     figure.savefig(output, dpi=120)
     pyplot.close(figure)

@@ -23,9 +23,10 @@ from torch.nn import functional as F
 
 from .data import network_input
 from .evaluate import evaluate, scene_as_seen, torch_predictor
+from .evaluate_encoding import DEEP, encoding_figures
 from .networks import SPLIT_STEP
 from .stage1 import Stage1
-from .stage2 import Stage2, encoding_figures
+from .stage2 import Stage2
 
 ALLOWED_LOSS_DB = 0.1  # without quantization-aware training
 CALIBRATION_SCENES = 16
@@ -248,4 +249,4 @@ def figure(network, scenes):
 
 def encoded_figure(model, scenes):
     """Amplitude PSNR on scenes of what a DeepDoublePhase's holograms show."""
-    return encoding_figures(model, scenes, full=False, others=False)["deep double phase"]["amplitude_psnr"]
+    return encoding_figures(model, scenes, full=False, others=False)[DEEP]["amplitude_psnr"]

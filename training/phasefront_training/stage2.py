@@ -10,11 +10,9 @@ times the phase regulariser; the truth of the field itself is left out on purpos
 import numpy as np
 import torch
 
-from .data import Sampler, network_input
-from .encode import (
-    DeepDoublePhase, anti_alias, band_limit, double_phase, phase_regulariser, reconstruct, scale_of, wraps,
-)
-from .evaluate import compare, scene_as_seen
+from .data import Sampler
+from .encode import phase_regulariser
+from .evaluate_encoding import DEEP, encoding_figures
 from .loop import Task
 from .losses import fill_invalid, focal_stack_terms
 from .networks import Architecture, Chain, head_field
@@ -23,8 +21,6 @@ from .stage1 import PLANES_ON_CPU, PLANES_ON_GPU, margin
 
 STACK_WEIGHT = 20.0
 PHASE_WEIGHT = 0.07
-STRONG_BLUR = (1.5, 7)  # σ in pixels and taps, and the bound of BL-DPM, that leave hardly any artefacts
-STRONG_BAND_LIMIT = 0.1
 
 
 def prefilter_network(layers=8, filters=8):
@@ -95,38 +91,5 @@ class Stage2(_OnHolograms):
         return STACK_WEIGHT * (terms["focal"] + terms["variation"]) + PHASE_WEIGHT * terms["phase"], terms
 
     def validate(self):
-        figures = encoding_figures(self.model, self.validation, full=False, others=False)["deep double phase"]
+        figures = encoding_figures(self.model, self.validation, full=False, others=False)[DEEP]
         return {"validation_psnr": figures["amplitude_psnr"], "validation_wraps": figures["wraps"]}
-
-
-def encoding_figures(model, scenes, depth="clean", full=True, others=True):
-    """{method: mean figures} of what an encoded hologram shows: DDPM, and after the same hologram network AA-DPM and BL-DPM
-    with a weak and a strong filter, and plain double phase (`others`); `wraps` is the share of phases outside (−π, π] and
-    `brightness` the mean amplitude over the true."""
-    rows = {}
-    device = next(model.parameters()).device
-    with torch.no_grad():
-        for i in range(len(scenes)):
-            colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
-            x = network_input(colour, seen, model.hologram.architecture.input, seed)[None].to(device)
-            midpoint = model.hologram.field(x)
-            there = propagate(midpoint, model.offset_m, model.display)
-            methods = {"deep double phase": model.filtered(midpoint)}
-            if others:
-                methods |= {
-                    "anti-aliased double phase": anti_alias(there),
-                    "anti-aliased, strong": anti_alias(there, *STRONG_BLUR),
-                    "band-limited double phase": band_limit(there),
-                    "band-limited, strong": band_limit(there, STRONG_BAND_LIMIT),
-                    "double phase": there,
-                }
-            for name, field in methods.items():
-                centred = field * torch.exp(-1j * field.angle().mean((-1, -2), keepdim=True)) if "deep" not in name else field
-                scale = scale_of(centred)
-                phase = double_phase(centred, scale)
-                shown = reconstruct(phase, scale, model.offset_m, model.display)
-                # The taken-out mean phase does not change amplitudes, so they compare as they are.
-                row = compare(shown[0], truth, model.display, full)
-                row |= {"wraps": wraps(phase), "brightness": float(shown.abs().mean() / truth.abs().mean())}
-                rows.setdefault(name, []).append(row)
-    return {name: {k: round(float(np.mean([r[k] for r in each])), 4) for k in each[0]} for name, each in rows.items()}

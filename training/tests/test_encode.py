@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 import torch
 from conftest import asm
+from matplotlib import pyplot
 
 from phasefront_training.__main__ import main
 from phasefront_training.checkpoint import Checkpoint
@@ -140,9 +141,11 @@ def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, 
     write(float_model(last.network("prefilter"), Display(pitch_m=6.4e-6), 1e-3), other)
     assert main([*again, "--init-prefilter", str(other)]) == 1
     assert "other.onnx is for Display(pitch_m=6.4" in capsys.readouterr().err
-    assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder)]) == 0
+    picture = tmp_path / "worst.png"
+    assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder), "--picture", str(picture)]) == 0
+    assert pyplot.imread(picture).std() > 0
     exact = capsys.readouterr().out
-    assert "deep double phase" in exact and "anti-aliased" in exact
+    assert "deep double phase" in exact and "anti-aliased" in exact and "worst_scene" in exact
     assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder), "--degraded"]) == 0
     assert deep(capsys.readouterr().out) != deep(exact)
     int8 = tmp_path / "pre-int8.onnx"
