@@ -160,12 +160,16 @@ def evaluate(predict, scenes, depth="clean", full=True, progress=False):
     for i in tqdm(range(len(scenes)), disable=not (progress and sys.stderr.isatty())):
         colour, seen, seed, truth = scene_as_seen(scenes, i, depth)
         rows.append(compare(predict(colour, seen, seed), truth, scenes.display, full))
+    return means_and_worst(rows, scenes) | {"scenes": len(rows)}
+
+
+def means_and_worst(rows, scenes):
+    """{figure: mean} of the scenes' rows of `compare`, and the least amplitude PSNR and whose it is."""
     means = {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
     worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
     return means | {
-        "scenes": len(rows),
-        "worst_scene": scenes.numbers[worst],
         "worst_amplitude_psnr": round(rows[worst]["amplitude_psnr"], 4),
+        "worst_scene": scenes.numbers[worst],
     }
 
 

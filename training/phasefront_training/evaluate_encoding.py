@@ -1,11 +1,10 @@
 """What encoded holograms show: the deep double phase method beside AA-DPM, BL-DPM and plain double phase (Fig. 5)."""
 
-import numpy as np
 import torch
 
 from .data import network_input
 from .encode import anti_alias, band_limit, double_phase, reconstruct, scale_of, wraps
-from .evaluate import compare, scene_as_seen
+from .evaluate import compare, means_and_worst, scene_as_seen
 from .optics import propagate
 from .plot import pictures
 
@@ -15,11 +14,10 @@ STRONG_BAND_LIMIT = 0.1
 
 
 @torch.no_grad()
-def encodings(model, scenes, i, depth="clean", others=True):
-    """Yields (method, phase map, midpoint hologram that it shows) of scene i, both (1, 3, H, W): the DeepDoublePhase `model`,
-    and with `others` those after its hologram network, with a weak and a strong filter."""
-    colour, seen, seed, _ = scene_as_seen(scenes, i, depth)
-    x = network_input(colour, seen, model.hologram.architecture.input, seed)[None]
+def encodings(model, colour, depth, seed, others=True):
+    """Yields (method, phase map, midpoint hologram that it shows), both (1, 3, H, W), of a scene as `scene_as_seen` gives it:
+    the DeepDoublePhase `model`, and with `others` those after its hologram network, with a weak and a strong filter."""
+    x = network_input(colour, depth, model.hologram.architecture.input, seed)[None]
     midpoint = model.hologram.field(x.to(next(model.parameters()).device))
     there = propagate(midpoint, model.offset_m, model.display)
     fields = {DEEP: model.filtered(midpoint)}
@@ -44,21 +42,12 @@ def encoding_figures(model, scenes, depth="clean", full=True, others=True):
     over the true, and `worst_scene` the one of the least amplitude PSNR."""
     rows = {}
     for i in range(len(scenes)):
-        truth = scenes.scene(i)[2]
-        for method, phase, shown in encodings(model, scenes, i, depth, others):
+        *seen, truth = scene_as_seen(scenes, i, depth)
+        for method, phase, shown in encodings(model, *seen, others):
             row = compare(shown[0], truth, model.display, full)
             row |= {"wraps": wraps(phase), "brightness": float(shown.abs().mean() / truth.abs().mean())}
             rows.setdefault(method, []).append(row)
-    return {method: _means(each) | _worst(each, scenes) for method, each in rows.items()}
-
-
-def _means(rows):
-    return {figure: round(float(np.mean([row[figure] for row in rows])), 4) for figure in rows[0]}
-
-
-def _worst(rows, scenes):
-    worst = int(np.argmin([row["amplitude_psnr"] for row in rows]))
-    return {"worst_amplitude_psnr": round(rows[worst]["amplitude_psnr"], 4), "worst_scene": scenes.numbers[worst]}
+    return {method: means_and_worst(each, scenes) for method, each in rows.items()}
 
 
 def table(results):
@@ -74,6 +63,7 @@ def draw_worst(model, scenes, results, output, depth="clean"):
     """Draws the true amplitude and what each encoding shows into one picture, of the scene that is worst for the deep
     double phase method in `results`, which `encoding_figures` gave."""
     i = scenes.numbers.index(results[DEEP]["worst_scene"])
-    views = {"the true hologram": scenes.scene(i)[2].abs()}
-    views |= {method: shown[0].abs().cpu() for method, _, shown in encodings(model, scenes, i, depth)}
+    *seen, truth = scene_as_seen(scenes, i, depth)
+    views = {"the true hologram": truth.abs()}
+    views |= {method: shown[0].abs().cpu() for method, _, shown in encodings(model, *seen)}
     pictures(views, output)

@@ -15,7 +15,7 @@ use num_complex::Complex32;
 /// tenth of a pixel of 8 µm.
 const OFFSET_TOLERANCE_M: f64 = 20e-6;
 
-/// The blur that pre-filters for blurred fields ([`InputKind::is_blurred`](crate::network::InputKind::is_blurred)) are trained behind.
+/// The blur that pre-filters for blurred fields are trained behind.
 ///
 /// # Errors
 /// None.
