@@ -24,6 +24,9 @@ pub fn options(name: Option<&str>) -> DeviceOptions {
 
 /// Keeps what was compiled for the next run. A cache that cannot be written costs time and nothing else.
 pub fn keep_programs(device: &Device) {
+    if let Some(why) = device.programs_refused() {
+        log::info!("the programs of earlier runs were not taken: {why}");
+    }
     if let (Some(path), Some(programs)) = (programs(), device.programs()) {
         let write = || -> std::io::Result<()> {
             let folder = path.parent().unwrap_or(&path);

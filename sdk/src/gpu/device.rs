@@ -1,13 +1,20 @@
 //! A GPU that was opened: its limits, its programs, its memory, and what it has against us as errors.
 //!
 //! Nothing here knows what is computed.
-#![allow(unsafe_code)]
+
+mod cache;
+mod memory;
+mod program;
+#[cfg(test)]
+pub(super) mod testing;
+
+pub(crate) use memory::{Constants, copy_mapped};
+pub(crate) use program::{Dispatch, Program};
 
 use super::{Error, Result};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 /// How long a frame may take before a device counts as hung: drivers themselves give up after some seconds.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -20,7 +27,8 @@ pub struct DeviceOptions {
     /// A part of the adapter's name, in any case; without one the fastest that is hardware is taken. Drivers in
     /// software are taken by name only: they are slower than the CPU path.
     pub name: Option<String>,
-    /// What [`Device::programs`] gave on an earlier run. What another GPU or driver compiled is ignored.
+    /// What [`Device::programs`] gave on an earlier run. What another GPU or driver compiled, or what was damaged
+    /// since, is ignored. A driver trusts the rest: keep it where only the app itself writes.
     pub programs: Option<Vec<u8>>,
 }
 
@@ -60,6 +68,8 @@ pub struct Device {
     limits: wgpu::Limits,
     features: Features,
     cache: Option<wgpu::PipelineCache>,
+    /// Why the programs of an earlier run were not taken.
+    programs_refused: Option<&'static str>,
     /// How long a frame may take before the device counts as hung.
     patience: Duration,
     /// By entry and text: layers that are alike, and frames of all sizes, share their programs.
@@ -124,9 +134,10 @@ impl Device {
         device.on_uncaptured_error(Arc::new(move |why: wgpu::Error| {
             note(&state, one_line(why));
         }));
-        let cache = granted
+        let (cache, programs_refused) = granted
             .contains(wgpu::Features::PIPELINE_CACHE)
-            .then(|| pipeline_cache(&device, programs));
+            .then(|| cache::open(&device, &info, programs))
+            .unzip();
         Device {
             patience: match info.device_type {
                 wgpu::DeviceType::Cpu => SOFTWARE_PATIENCE,
@@ -141,6 +152,7 @@ impl Device {
             },
             info,
             cache,
+            programs_refused: programs_refused.flatten(),
             compiled: Mutex::default(),
             lost,
         }
@@ -163,7 +175,13 @@ impl Device {
 
     /// The programs compiled so far, to be kept for the next run; none where the platform keeps them itself.
     pub fn programs(&self) -> Option<Vec<u8>> {
-        self.cache.as_ref().and_then(wgpu::PipelineCache::get_data)
+        let programs = self.cache.as_ref()?.get_data()?;
+        Some(cache::seal(&programs, &self.info))
+    }
+
+    /// Why [`DeviceOptions::programs`] were not taken, if they were not.
+    pub fn programs_refused(&self) -> Option<&str> {
+        self.programs_refused
     }
 
     /// The device and the queue themselves, for an app that shows what is computed.
@@ -243,227 +261,6 @@ impl Device {
             None => done,
         }
     }
-
-    /// Memory of `bytes`, zeros, for programs and copies.
-    pub(crate) fn buffer(&self, what: &str, bytes: usize) -> Result<wgpu::Buffer> {
-        let usage = wgpu::BufferUsages::STORAGE
-            | wgpu::BufferUsages::COPY_SRC
-            | wgpu::BufferUsages::COPY_DST;
-        let most = self
-            .limits
-            .max_storage_buffer_binding_size
-            .min(self.limits.max_buffer_size);
-        if bytes as u64 > most {
-            return Err(Error::Refused(format!(
-                "{what} of {} MB is too large for {}, which takes {} MB; smaller frames are right",
-                bytes >> 20,
-                self.name(),
-                most >> 20
-            )));
-        }
-        Ok(self.inner.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(what),
-            // Bindings hold a whole value at least.
-            size: (bytes.max(16) as u64).next_multiple_of(16),
-            usage,
-            mapped_at_creation: false,
-        }))
-    }
-
-    /// Memory that the CPU reads.
-    pub(crate) fn readable(&self, what: &str, bytes: usize) -> wgpu::Buffer {
-        self.inner.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(what),
-            size: (bytes as u64).next_multiple_of(16),
-            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        })
-    }
-
-    /// Constants: in uniform memory where they fit, which every GPU has the fastest way to.
-    pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
-        let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
-        if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
-            return Err(Error::Refused(format!("{what} do not fit {}", self.name())));
-        }
-        let usage = match uniform {
-            true => wgpu::BufferUsages::UNIFORM,
-            false => wgpu::BufferUsages::STORAGE,
-        };
-        let buffer = self.inner.create_buffer_init(&BufferInitDescriptor {
-            label: Some(what),
-            contents,
-            usage: usage | wgpu::BufferUsages::COPY_DST,
-        });
-        Ok(Constants { buffer, uniform })
-    }
-
-    /// Constants that threads look up each at another place.
-    pub(crate) fn table(&self, what: &str, contents: &[u8]) -> Result<Constants> {
-        let buffer = self.buffer(what, contents.len())?;
-        self.queue.write_buffer(&buffer, 0, contents);
-        Ok(Constants {
-            buffer,
-            uniform: false,
-        })
-    }
-
-    /// Compiles `source`, the text of a program of this crate, unless that was done before.
-    pub(crate) fn program(&self, what: &str, source: String, entry: &'static str) -> Program {
-        let key = (entry, source);
-        if let Some(known) = lock(&self.compiled).get(&key) {
-            return known.clone();
-        }
-        let program = self.compile(what, &key.1, entry);
-        lock(&self.compiled).insert(key, program.clone());
-        program
-    }
-
-    fn compile(&self, what: &str, source: &str, entry: &str) -> Program {
-        let descriptor = wgpu::ShaderModuleDescriptor {
-            label: Some(what),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        };
-        // SAFETY: only this crate's own sources come here. Their loops have constant bounds, and every index is held
-        // to the size of what it indexes where it is computed; the tests run each one on frames of odd sizes.
-        let module = unsafe {
-            self.inner
-                .create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked())
-        };
-        let pipeline = self
-            .inner
-            .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-                label: Some(what),
-                layout: None,
-                module: &module,
-                entry_point: Some(entry),
-                compilation_options: wgpu::PipelineCompilationOptions {
-                    // Every value is written before it is read.
-                    zero_initialize_workgroup_memory: false,
-                    ..Default::default()
-                },
-                cache: self.cache.as_ref(),
-            });
-        Program(pipeline)
-    }
-
-    /// Has `forged` run wherever `source` is to run: a driver that compiles wrongly.
-    #[cfg(test)]
-    pub(crate) fn forge(&self, entry: &'static str, source: &str, forged: &str) {
-        let program = self.compile("forged", forged, entry);
-        lock(&self.compiled).insert((entry, source.to_owned()), program);
-    }
-
-    /// Reads `buffer` back, once what was submitted is done: for tests and for looking at what is between stages.
-    pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
-        let target = self.readable("read back", bytes);
-        let mut encoder = self.inner.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(buffer, 0, &target, 0, target.size());
-        let submission = self.queue.submit([encoder.finish()]);
-        let mut all = vec![0; bytes];
-        self.map(&target, &submission)?;
-        copy_mapped(&target, &mut all)?;
-        Ok(all)
-    }
-
-    /// Maps a readable buffer that `submission` writes.
-    pub(crate) fn map(
-        &self,
-        buffer: &wgpu::Buffer,
-        submission: &wgpu::SubmissionIndex,
-    ) -> Result<()> {
-        let (send, receive) = std::sync::mpsc::channel();
-        buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
-            // The receiver waits below, or has given up.
-            let _ = send.send(mapped);
-        });
-        self.wait(submission)?;
-        // Another thread that polls the device may be the one that says so.
-        match receive.recv_timeout(self.patience) {
-            Ok(Ok(())) => Ok(()),
-            Ok(Err(why)) => Err(Error::Lost(one_line(why))),
-            Err(why) => Err(Error::Lost(one_line(why))),
-        }
-    }
-}
-
-/// Copies a mapped buffer's first bytes.
-pub(crate) fn copy_mapped(buffer: &wgpu::Buffer, into: &mut [u8]) -> Result<()> {
-    let view = buffer
-        .get_mapped_range(..)
-        .map_err(|why| Error::Lost(one_line(why)))?;
-    into.copy_from_slice(&view[..into.len()]);
-    Ok(())
-}
-
-/// Constants of a program and where they lie.
-pub(crate) struct Constants {
-    pub(crate) buffer: wgpu::Buffer,
-    uniform: bool,
-}
-
-impl Constants {
-    /// The address space as WGSL calls it.
-    pub(crate) fn space(&self) -> &'static str {
-        match self.uniform {
-            true => "uniform",
-            false => "storage, read",
-        }
-    }
-}
-
-/// A compiled program.
-#[derive(Clone)]
-pub(crate) struct Program(wgpu::ComputePipeline);
-
-impl Program {
-    /// The program on its arguments, in the order of their bindings, for a grid of so many workgroups.
-    pub(crate) fn on(
-        &self,
-        device: &Device,
-        arguments: &[(u32, wgpu::BindingResource<'_>)],
-        grid: [usize; 3],
-    ) -> Result<Dispatch> {
-        let most = device.limits.max_compute_workgroups_per_dimension as usize;
-        if grid.iter().any(|&n| n > most) {
-            return Err(Error::Refused(format!(
-                "{grid:?} workgroups are too many for {}, which takes {most} a side; smaller frames are right",
-                device.name()
-            )));
-        }
-        let entries: Vec<_> = arguments
-            .iter()
-            .map(|(binding, resource)| wgpu::BindGroupEntry {
-                binding: *binding,
-                resource: resource.clone(),
-            })
-            .collect();
-        Ok(Dispatch {
-            pipeline: self.0.clone(),
-            arguments: device.inner.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: None,
-                layout: &self.0.get_bind_group_layout(0),
-                entries: &entries,
-            }),
-            grid: grid.map(|n| n as u32),
-        })
-    }
-}
-
-/// A program with its arguments, ready to run as often as wanted.
-pub(crate) struct Dispatch {
-    pipeline: wgpu::ComputePipeline,
-    arguments: wgpu::BindGroup,
-    grid: [u32; 3],
-}
-
-impl Dispatch {
-    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        let [x, y, z] = self.grid;
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.arguments, &[]);
-        pass.dispatch_workgroups(x, y, z);
-    }
 }
 
 /// The adapter of that name, or the fastest that is hardware.
@@ -508,18 +305,6 @@ fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapt
     })
 }
 
-fn pipeline_cache(device: &wgpu::Device, programs: Option<&[u8]>) -> wgpu::PipelineCache {
-    // SAFETY: the bytes are those of `Device::programs` on an earlier run, which its documentation asks for; wgpu
-    // checks their header against this driver and falls back to an empty cache.
-    unsafe {
-        device.create_pipeline_cache(&wgpu::PipelineCacheDescriptor {
-            label: None,
-            data: programs,
-            fallback: true,
-        })
-    }
-}
-
 fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -530,77 +315,6 @@ pub(crate) fn one_line(error: impl std::fmt::Display) -> String {
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
-}
-
-/// What the tests of stages share.
-#[cfg(test)]
-pub(super) mod testing {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-    use num_complex::Complex32;
-    use std::sync::OnceLock;
-
-    /// The device of all tests: a GPU, or a driver in software; none where there is neither, which is said.
-    pub(crate) fn device() -> Option<Arc<Device>> {
-        static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
-        let opened = DEVICE.get_or_init(|| {
-            let opened =
-                Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
-            opened.ok().map(Arc::new)
-        });
-        if opened.is_none() {
-            println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
-        }
-        opened.clone()
-    }
-
-    pub(crate) fn software() -> DeviceOptions {
-        DeviceOptions {
-            name: Some("llvmpipe".into()),
-            programs: None,
-        }
-    }
-
-    pub(crate) fn upload(device: &Device, field: &[Complex32]) -> wgpu::Buffer {
-        let buffer = device.buffer("field", size_of_val(field)).unwrap();
-        device
-            .queue
-            .write_buffer(&buffer, 0, bytemuck::cast_slice(field));
-        buffer
-    }
-
-    pub(crate) fn read(device: &Device, buffer: &wgpu::Buffer, count: usize) -> Vec<Complex32> {
-        bytemuck::pod_collect_to_vec(&device.read(buffer, 8 * count).unwrap())
-    }
-
-    pub(crate) fn run(device: &Device, work: impl Fn(&mut wgpu::ComputePass<'_>)) {
-        let mut encoder = device.inner.create_command_encoder(&Default::default());
-        work(&mut encoder.begin_compute_pass(&Default::default()));
-        device.queue.submit([encoder.finish()]);
-        device.check().unwrap();
-    }
-
-    /// Three planes of a smooth field with noise.
-    pub(crate) fn field(size: usize) -> Vec<Complex32> {
-        (0..3 * size)
-            .map(|i| {
-                let t = i as f32;
-                Complex32::from_polar(0.6 + 0.4 * (t * 0.37).sin(), t * 0.011 + (t * 1.7).cos())
-            })
-            .collect()
-    }
-
-    /// The largest difference, of the largest amplitude.
-    pub(crate) fn apart(a: &[Complex32], b: &[Complex32]) -> f32 {
-        assert_eq!(a.len(), b.len());
-        let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);
-        let worst = |worst: f32, d: f32| if d > worst || d.is_nan() { d } else { worst };
-        a.iter()
-            .zip(b)
-            .map(|(a, b)| (a - b).norm())
-            .fold(0.0, worst)
-            / most
-    }
 }
 
 #[cfg(test)]
@@ -703,46 +417,6 @@ mod tests {
         let waited = device.wait(&device.queue.submit([encoder.finish()]));
         assert_eq!(waited, Err(Error::Lost("no answer for 1ms".into())));
         assert!(device.check().is_err());
-    }
-
-    #[test]
-    fn programs_are_kept_from_run_to_run() {
-        let Ok(first) = Device::open(&software()) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
-            return;
-        };
-        let Some(before) = first.programs() else {
-            println!("skipped: {first:?} keeps its programs itself");
-            return;
-        };
-        let source = "
-            @group(0) @binding(0) var<storage, read_write> result: array<u32>;
-            @compute @workgroup_size(1) fn seven() { result[0] = 7u; }";
-        let seven = |device: &Device| {
-            let buffer = device.guarded(|| {
-                let result = device.buffer("result", 16)?;
-                let program = device.program("seven", source.into(), "seven");
-                let step = program.on(device, &[(0, result.as_entire_binding())], [1, 1, 1])?;
-                let mut encoder = device.inner.create_command_encoder(&Default::default());
-                step.run(&mut encoder.begin_compute_pass(&Default::default()));
-                device.queue.submit([encoder.finish()]);
-                Ok(result)
-            });
-            device.read(&buffer.unwrap(), 4).unwrap()
-        };
-        assert_eq!(seven(&first), [7, 0, 0, 0]);
-        let programs = first.programs().unwrap();
-        assert!(programs.len() >= before.len());
-        // Those of this driver are taken, those of another or of nobody are ignored.
-        let mut foreign = programs.clone();
-        foreign.iter_mut().for_each(|byte| *byte ^= 0x55);
-        for programs in [programs, foreign, vec![1, 2, 3], Vec::new()] {
-            let options = DeviceOptions {
-                programs: Some(programs),
-                ..software()
-            };
-            assert_eq!(seven(&Device::open(&options).unwrap()), [7, 0, 0, 0]);
-        }
     }
 
     #[test]

@@ -1,0 +1,202 @@
+//! Compiled programs, kept from run to run: sealed on their way out, and taken back only as they were.
+//!
+//! Drivers trust these bytes, and a file in a cache directory may be cut short, changed on its disk, or of the driver
+//! before an update. So what is handed to a driver is whole, and its own. The seal finds damage and is no signature:
+//! programs are to be kept where only the app itself writes.
+#![allow(unsafe_code)]
+
+use std::hash::{DefaultHasher, Hasher};
+
+/// What sealed programs begin with; the version stands at its end.
+const MAGIC: [u8; 16] = *b"phasefront gpu 1";
+/// The magic, the digest of the GPU and its driver, the digest of the programs.
+const HEADER: usize = MAGIC.len() + 16;
+
+/// What a driver gave, with who gave it.
+pub(super) fn seal(programs: &[u8], info: &wgpu::AdapterInfo) -> Vec<u8> {
+    [&header(programs, info)[..], programs].concat()
+}
+
+/// A cache of a driver's own for `device`, with what was sealed on an earlier run; or without it, and why.
+pub(super) fn open(
+    device: &wgpu::Device,
+    info: &wgpu::AdapterInfo,
+    sealed: Option<&[u8]>,
+) -> (wgpu::PipelineCache, Option<&'static str>) {
+    let (programs, refused) = match sealed.map(|sealed| unseal(sealed, info)) {
+        Some(Ok(programs)) => (Some(programs), None),
+        Some(Err(why)) => (None, Some(why)),
+        None => (None, None),
+    };
+    // SAFETY: these are bytes that `PipelineCache::get_data` gave for this very GPU and driver, whole: `unseal` takes
+    // nothing else. wgpu checks its own header in them, and falls back to an empty cache.
+    let cache = unsafe {
+        device.create_pipeline_cache(&wgpu::PipelineCacheDescriptor {
+            label: None,
+            data: programs,
+            fallback: true,
+        })
+    };
+    (cache, refused)
+}
+
+/// The programs in what [`seal`] made for the same GPU and driver, or why they are not.
+fn unseal<'a>(sealed: &'a [u8], info: &wgpu::AdapterInfo) -> Result<&'a [u8], &'static str> {
+    let Some((given, programs)) = sealed.split_at_checked(HEADER) else {
+        return Err("they end within their header");
+    };
+    let right = header(programs, info);
+    let same = |part: std::ops::Range<usize>| given[part.clone()] == right[part];
+    match () {
+        () if !same(0..16) => Err("they are of another version, or no programs"),
+        () if !same(16..24) => Err("they are of another GPU or driver"),
+        () if !same(24..32) => Err("they are damaged"),
+        () => Ok(programs),
+    }
+}
+
+fn header(programs: &[u8], info: &wgpu::AdapterInfo) -> [u8; HEADER] {
+    let mut maker = DefaultHasher::new();
+    maker.write_u32(info.vendor);
+    maker.write_u32(info.device);
+    for text in [
+        info.backend.to_str(),
+        &info.name,
+        &info.driver,
+        &info.driver_info,
+    ] {
+        maker.write_usize(text.len());
+        maker.write(text.as_bytes());
+    }
+    // Another release of Rust may hash otherwise: then programs are compiled once more.
+    let mut whole = DefaultHasher::new();
+    whole.write_usize(programs.len());
+    whole.write(programs);
+    let mut header = [0; HEADER];
+    header[..16].copy_from_slice(&MAGIC);
+    header[16..24].copy_from_slice(&maker.finish().to_le_bytes());
+    header[24..].copy_from_slice(&whole.finish().to_le_bytes());
+    header
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::testing::software;
+    use super::super::{Device, DeviceOptions};
+    use super::*;
+
+    /// The device with what is kept, where there is one that lets programs be kept.
+    fn device(programs: Option<Vec<u8>>) -> Option<Device> {
+        let options = DeviceOptions {
+            programs,
+            ..software()
+        };
+        let Ok(device) = Device::open(&options) else {
+            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+            return None;
+        };
+        if device.programs().is_none() {
+            println!("skipped: {device:?} keeps its programs itself");
+            return None;
+        }
+        Some(device)
+    }
+
+    /// Runs a program that writes a seven.
+    fn seven(device: &Device) -> Vec<u8> {
+        let source = "
+            @group(0) @binding(0) var<storage, read_write> result: array<u32>;
+            @compute @workgroup_size(1) fn seven() { result[0] = 7u; }";
+        let buffer = device.guarded(|| {
+            let result = device.buffer("result", 16)?;
+            let program = device.program("seven", source.into(), "seven");
+            let step = program.on(device, &[(0, result.as_entire_binding())], [1, 1, 1])?;
+            let mut encoder = device.inner.create_command_encoder(&Default::default());
+            step.run(&mut encoder.begin_compute_pass(&Default::default()));
+            device.queue.submit([encoder.finish()]);
+            Ok(result)
+        });
+        device.read(&buffer.unwrap(), 4).unwrap()
+    }
+
+    #[test]
+    fn programs_are_kept_from_run_to_run() {
+        let Some(first) = device(None) else { return };
+        let before = first.programs().unwrap();
+        assert_eq!(seven(&first), [7, 0, 0, 0]);
+        let programs = first.programs().unwrap();
+        assert!(programs.len() >= before.len());
+        let second = device(Some(programs)).unwrap();
+        assert_eq!(second.programs_refused(), None);
+        assert_eq!(seven(&second), [7, 0, 0, 0]);
+    }
+
+    #[test]
+    fn what_is_not_as_it_was_never_reaches_the_driver() {
+        let Some(first) = device(None) else { return };
+        seven(&first);
+        let programs = first.programs().unwrap();
+        let changed = |at: usize| {
+            let mut changed = programs.clone();
+            changed[at] ^= 1;
+            changed
+        };
+        let longer = [&programs[..], &[0]].concat();
+        let cases = [
+            ("nothing", Vec::new(), "header"),
+            ("three bytes", vec![1, 2, 3], "header"),
+            ("another file", vec![0x55; programs.len()], "version"),
+            (
+                "the driver's bytes bare",
+                programs[HEADER..].to_vec(),
+                "version",
+            ),
+            ("another version", changed(15), "version"),
+            ("another GPU", changed(16), "another GPU"),
+            ("another digest", changed(24), "damaged"),
+            ("the first byte changed", changed(HEADER), "damaged"),
+            (
+                "the last byte changed",
+                changed(programs.len() - 1),
+                "damaged",
+            ),
+            (
+                "cut short",
+                programs[..programs.len() - 1].to_vec(),
+                "damaged",
+            ),
+            ("empty", programs[..HEADER].to_vec(), "damaged"),
+            ("longer", longer, "damaged"),
+        ];
+        for (name, kept, word) in cases {
+            let device = device(Some(kept)).unwrap();
+            let why = device.programs_refused().unwrap_or("taken");
+            assert!(why.contains(word), "{name}: {why}");
+            assert_eq!(seven(&device), [7, 0, 0, 0], "{name}");
+        }
+    }
+
+    #[test]
+    fn each_damaged_byte_is_found() {
+        let Some(device) = device(None) else { return };
+        let info = device.inner.adapter_info();
+        let programs: Vec<u8> = (0..=255).collect();
+        let sealed = seal(&programs, &info);
+        assert_eq!(unseal(&sealed, &info), Ok(&programs[..]));
+        for at in 0..sealed.len() {
+            let mut damaged = sealed.clone();
+            damaged[at] ^= 0x10;
+            assert!(unseal(&damaged, &info).is_err(), "byte {at}");
+            assert!(unseal(&sealed[..at], &info).is_err(), "{at} bytes");
+        }
+        let update = wgpu::AdapterInfo {
+            driver_info: format!("{} and later", info.driver_info),
+            ..info
+        };
+        assert_eq!(
+            unseal(&sealed, &update),
+            Err("they are of another GPU or driver")
+        );
+    }
+}

@@ -1,0 +1,67 @@
+//! What the tests of stages share.
+#![allow(clippy::unwrap_used)]
+
+use super::{Device, DeviceOptions};
+use num_complex::Complex32;
+use std::sync::{Arc, OnceLock};
+
+/// The device of all tests: a GPU, or a driver in software; none where there is neither, which is said.
+pub(crate) fn device() -> Option<Arc<Device>> {
+    static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
+    let opened = DEVICE.get_or_init(|| {
+        let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
+        opened.ok().map(Arc::new)
+    });
+    if opened.is_none() {
+        println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
+    }
+    opened.clone()
+}
+
+pub(crate) fn software() -> DeviceOptions {
+    DeviceOptions {
+        name: Some("llvmpipe".into()),
+        programs: None,
+    }
+}
+
+pub(crate) fn upload(device: &Device, field: &[Complex32]) -> wgpu::Buffer {
+    let buffer = device.buffer("field", size_of_val(field)).unwrap();
+    device
+        .queue
+        .write_buffer(&buffer, 0, bytemuck::cast_slice(field));
+    buffer
+}
+
+pub(crate) fn read(device: &Device, buffer: &wgpu::Buffer, count: usize) -> Vec<Complex32> {
+    bytemuck::pod_collect_to_vec(&device.read(buffer, 8 * count).unwrap())
+}
+
+pub(crate) fn run(device: &Device, work: impl Fn(&mut wgpu::ComputePass<'_>)) {
+    let mut encoder = device.inner.create_command_encoder(&Default::default());
+    work(&mut encoder.begin_compute_pass(&Default::default()));
+    device.queue.submit([encoder.finish()]);
+    device.check().unwrap();
+}
+
+/// Three planes of a smooth field with noise.
+pub(crate) fn field(size: usize) -> Vec<Complex32> {
+    (0..3 * size)
+        .map(|i| {
+            let t = i as f32;
+            Complex32::from_polar(0.6 + 0.4 * (t * 0.37).sin(), t * 0.011 + (t * 1.7).cos())
+        })
+        .collect()
+}
+
+/// The largest difference, of the largest amplitude.
+pub(crate) fn apart(a: &[Complex32], b: &[Complex32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);
+    let worst = |worst: f32, d: f32| if d > worst || d.is_nan() { d } else { worst };
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).norm())
+        .fold(0.0, worst)
+        / most
+}
