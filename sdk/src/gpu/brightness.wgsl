@@ -7,7 +7,7 @@ struct Past { scale: f32, share: f32, unused_a: u32, unused_b: u32 }
 @group(0) @binding(1) var<storage, read> field: array<vec2f>;
 @group(0) @binding(2) var<storage, read_write> counted: array<atomic<u32>, BINS>;
 @group(0) @binding(3) var<storage, read> bins: array<u32, BINS>;
-// The bits of the scale's square, as encode.wgsl reads them.
+// The bits of the scale's square, as double_phase.wgsl reads them.
 @group(0) @binding(4) var<storage, read_write> found: array<u32>;
 
 const THREADS: u32 = 256u;

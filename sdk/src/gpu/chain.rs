@@ -669,7 +669,7 @@ impl NetworkPlan {
         device.guarded(|| {
             device
                 .queue
-                .write_buffer(&self.packer.colour, 0, bytemuck::cast_slice(input));
+                .write_buffer(&self.packer.planes, 0, bytemuck::cast_slice(input));
             let mut encoder = device.inner.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_compute_pass(&Default::default());
             self.packer.run(&mut pass);

@@ -2,7 +2,7 @@
 
 use super::chain::ChainOptions;
 use super::device::{Device, copy_mapped};
-use super::encode::{Encoder, MeanPhase, Target};
+use super::encode::{Encoder, EncoderJob, MeanPhase, Target};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame};
 use super::method::MethodPlan;
@@ -263,18 +263,17 @@ impl Pipeline {
         let targets = (0..FLIGHTS)
             .map(|_| Target::new(device, size))
             .collect::<Result<Vec<_>>>()?;
-        let encoder = Encoder::new(
-            device,
-            method.field(),
+        let encoder = EncoderJob {
+            field: method.field(),
             size,
-            &job.encoding,
-            job.chain,
-            job.brightness,
-            &job.response,
+            encoding: &job.encoding,
+            chain: job.chain,
+            brightness: job.brightness,
+            response: &job.response,
             light,
             turn,
-            &targets,
-        )?;
+        };
+        let encoder = Encoder::new(device, &encoder, &targets)?;
         let slots = (0..FLIGHTS).map(|_| Slot::new(device, size)).collect();
         Ok(Pipeline {
             device: device.clone(),

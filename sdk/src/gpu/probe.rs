@@ -112,7 +112,7 @@ mod tests {
             Brightness::Steady,
             Response::linear(8).unwrap(),
         );
-        let source = include_str!("turn.wgsl");
+        let source = include_str!("encode/mean_phase.wgsl");
         let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
         assert_ne!(forged, source);
         let open = || Device::open(&software()).ok().map(Arc::new);

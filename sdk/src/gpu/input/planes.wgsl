@@ -1,4 +1,4 @@
-// Channels from the network's input planes as they are. Goes behind input.wgsl.
+// Channels from the network's input planes as they are. Goes behind pack.wgsl.
 
 @group(0) @binding(1) var<storage, read> colour: array<f32>;
 

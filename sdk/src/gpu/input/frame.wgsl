@@ -1,5 +1,5 @@
 // Channels from colour and depth, each minus the MIDDLE of what the form holds, and of a second group the place in the
-// frame. Goes behind input.wgsl and input_planar.wgsl or input_camera.wgsl, which know what `colour` holds.
+// frame. Goes behind pack.wgsl and planar.wgsl or camera.wgsl, which know what `colour` holds.
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
 

@@ -1,5 +1,5 @@
 // The input of a chain in 8-bit whole numbers, minus 128, as the first layer and as the last one round it. Goes behind
-// input.wgsl.
+// pack.wgsl.
 
 // The smallest real number that rounds to each u8 value or above, for the first layer and for the last one.
 struct Steps { first: array<f32, 256>, last: array<f32, 256> }

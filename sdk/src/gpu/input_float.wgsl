@@ -1,3 +1,0 @@
-// The input of a chain in floating point. Goes behind input.wgsl.
-
-fn store(at: u32, v: vec4f) { first[at] = Value(v); }
