@@ -1,11 +1,7 @@
 //! Camera frames: what lies where in the memory that comes with them.
 
 use crate::error::PhasefrontError;
-use phasefront::depth::align;
-use phasefront::depth::image;
-use phasefront::depth::image::DepthImage;
-use phasefront::frame;
-use phasefront::frame::{CameraFrame, ColourImage, Plane};
+use phasefront::input::{self, CameraFrame, ColourImage, DepthImage, Plane};
 
 /// How a colour image lies in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
@@ -208,19 +204,19 @@ impl FrameInfo {
         &self,
         memory: FrameMemory<'a>,
     ) -> Result<CameraFrame<'a>, PhasefrontError> {
-        let encoding = frame::YuvEncoding {
+        let encoding = input::YuvEncoding {
             matrix: match self.colour.matrix {
-                YuvMatrix::Bt601 => frame::YuvMatrix::Bt601,
-                YuvMatrix::Bt709 => frame::YuvMatrix::Bt709,
+                YuvMatrix::Bt601 => input::YuvMatrix::Bt601,
+                YuvMatrix::Bt709 => input::YuvMatrix::Bt709,
             },
             video_range: self.colour.video_range,
         };
         let format = match self.colour.format {
-            ColourFormat::Rgba => frame::ColourFormat::Rgba,
-            ColourFormat::Bgra => frame::ColourFormat::Bgra,
-            ColourFormat::Rgb => frame::ColourFormat::Rgb,
-            ColourFormat::Nv12 => frame::ColourFormat::Nv12(encoding),
-            ColourFormat::Yuv420 => frame::ColourFormat::Yuv420(encoding),
+            ColourFormat::Rgba => input::ColourFormat::Rgba,
+            ColourFormat::Bgra => input::ColourFormat::Bgra,
+            ColourFormat::Rgb => input::ColourFormat::Rgb,
+            ColourFormat::Nv12 => input::ColourFormat::Nv12(encoding),
+            ColourFormat::Yuv420 => input::ColourFormat::Yuv420(encoding),
         };
         if self.colour.planes.len() > memory.colour.len() {
             return Err(PhasefrontError::Frame(format!(
@@ -237,22 +233,22 @@ impl FrameInfo {
         let colour = ColourImage::new(format, width, height, &planes)?;
 
         let format = match self.depth.format {
-            DepthFormat::MetresF32 => image::DepthFormat::MetresF32,
-            DepthFormat::MetresF16 => image::DepthFormat::MetresF16,
-            DepthFormat::DisparityF32 => image::DepthFormat::DisparityF32,
-            DepthFormat::DisparityF16 => image::DepthFormat::DisparityF16,
-            DepthFormat::MillimetresU16 => image::DepthFormat::MillimetresU16,
-            DepthFormat::AndroidDepth16 => image::DepthFormat::AndroidDepth16,
-            DepthFormat::NormalizedU8 => image::DepthFormat::NormalizedU8,
-            DepthFormat::NormalizedU16 => image::DepthFormat::NormalizedU16,
+            DepthFormat::MetresF32 => input::DepthFormat::MetresF32,
+            DepthFormat::MetresF16 => input::DepthFormat::MetresF16,
+            DepthFormat::DisparityF32 => input::DepthFormat::DisparityF32,
+            DepthFormat::DisparityF16 => input::DepthFormat::DisparityF16,
+            DepthFormat::MillimetresU16 => input::DepthFormat::MillimetresU16,
+            DepthFormat::AndroidDepth16 => input::DepthFormat::AndroidDepth16,
+            DepthFormat::NormalizedU8 => input::DepthFormat::NormalizedU8,
+            DepthFormat::NormalizedU16 => input::DepthFormat::NormalizedU16,
         };
         let (width, height) = size(self.depth.width, self.depth.height);
         let mut depth =
             DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
         if let Some(info) = &self.confidence {
             let format = match info.format {
-                ConfidenceFormat::LowMediumHigh => image::ConfidenceFormat::LowMediumHigh,
-                ConfidenceFormat::U8 => image::ConfidenceFormat::U8,
+                ConfidenceFormat::LowMediumHigh => input::ConfidenceFormat::LowMediumHigh,
+                ConfidenceFormat::U8 => input::ConfidenceFormat::U8,
             };
             let (width, height) = size(info.width, info.height);
             let plane = info.plane.plane(memory.confidence);
@@ -260,17 +256,17 @@ impl FrameInfo {
         }
 
         let mut frame = CameraFrame::new(self.timestamp_ns, colour, depth);
-        frame.orientation = frame::Orientation {
+        frame.orientation = input::Orientation {
             rotation: match self.orientation.rotation {
-                Rotation::Upright => frame::Rotation::None,
-                Rotation::Clockwise90 => frame::Rotation::Clockwise90,
-                Rotation::Half => frame::Rotation::Half,
-                Rotation::Clockwise270 => frame::Rotation::Clockwise270,
+                Rotation::Upright => input::Rotation::None,
+                Rotation::Clockwise90 => input::Rotation::Clockwise90,
+                Rotation::Half => input::Rotation::Half,
+                Rotation::Clockwise270 => input::Rotation::Clockwise270,
             },
             mirrored: self.orientation.mirrored,
         };
         if let Some(cameras) = &self.cameras {
-            frame.alignment = frame::Alignment::Cameras(cameras.try_into()?);
+            frame.alignment = input::Alignment::Cameras(cameras.try_into()?);
         }
         Ok(frame)
     }
@@ -282,17 +278,17 @@ impl PlaneInfo {
     }
 }
 
-impl From<Intrinsics> for align::Intrinsics {
+impl From<Intrinsics> for input::Intrinsics {
     fn from(Intrinsics { fx, fy, cx, cy }: Intrinsics) -> Self {
-        align::Intrinsics { fx, fy, cx, cy }
+        input::Intrinsics { fx, fy, cx, cy }
     }
 }
 
-impl TryFrom<&Cameras> for align::Cameras {
+impl TryFrom<&Cameras> for input::Cameras {
     type Error = PhasefrontError;
 
     fn try_from(cameras: &Cameras) -> Result<Self, PhasefrontError> {
-        let mut to = align::Cameras::concentric(cameras.colour.into(), cameras.depth.into());
+        let mut to = input::Cameras::concentric(cameras.colour.into(), cameras.depth.into());
         if let Some(Pose {
             rotation,
             translation_m,

@@ -5,7 +5,6 @@ use crate::options::Placement;
 use crate::statistics::FrameTimes;
 use phasefront::output::Output;
 use phasefront::session;
-use phasefront::slm::Response;
 use std::sync::Arc;
 
 /// The hologram of one frame: modulator levels of three colours. For the layers by hand, which keep it alive while its
@@ -13,7 +12,6 @@ use std::sync::Arc;
 #[derive(Debug, uniffi::Object)]
 pub struct RawHologram {
     core: session::Hologram,
-    response: Arc<Response>,
 }
 
 /// What is known of a hologram.
@@ -40,12 +38,8 @@ pub struct HologramInfo {
 }
 
 impl RawHologram {
-    /// A hologram for a modulator that answers with `response`.
-    pub(crate) fn new(core: session::Hologram, response: &Arc<Response>) -> Arc<Self> {
-        Arc::new(RawHologram {
-            core,
-            response: response.clone(),
-        })
+    pub(crate) fn new(core: session::Hologram) -> Arc<Self> {
+        Arc::new(RawHologram { core })
     }
 }
 
@@ -135,8 +129,7 @@ impl RawHologram {
     ) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let placement: phasefront::output::Placement = placement.into();
-            let display = self.core.display();
-            let plan = Output::new(display, self.core.shape(), &self.response, placement)?;
+            let plan = Output::new(self.core.target(), self.core.shape(), placement)?;
             let mut bytes = vec![0; plan.image_bytes()];
             plan.write(self.core.output_levels(), image as usize, &mut bytes)?;
             let (height, width) = plan.shape();

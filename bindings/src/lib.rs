@@ -8,7 +8,6 @@
 //! - Every call gives a result; a panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
-mod calibration;
 mod display;
 mod error;
 mod frame;
@@ -18,8 +17,8 @@ mod network;
 mod options;
 mod session;
 mod statistics;
+mod target;
 
-pub use calibration::CalibratedDisplay;
 pub use display::{Display, display_from_toml};
 pub use error::PhasefrontError;
 pub use frame::{
@@ -30,11 +29,12 @@ pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
-    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Response, Rung,
-    RunningMode, SessionOptions, Thermal,
+    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Rung,
+    RunningMode, SessionOptions, Thermal, session_options,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};
+pub use target::Target;
 
 uniffi::setup_scaffolding!();
 

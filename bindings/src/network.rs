@@ -1,33 +1,7 @@
 //! Networks: from a file, from bytes, or built in.
 
 use crate::error::{PhasefrontError, guard};
-use phasefront::encode::deep;
 use std::sync::Arc;
-
-/// The network that is built in where the feature `built-in-network` is on.
-#[cfg(feature = "built-in-network")]
-const BUILT_IN: Option<&[u8]> = Some(include_bytes!("../../models/rgbd-8-int8.onnx"));
-#[cfg(not(feature = "built-in-network"))]
-const BUILT_IN: Option<&[u8]> = None;
-
-/// The pairs that are built in with it: hologram network and pre-filter, which says what offset it is for.
-#[cfg(feature = "built-in-network")]
-const PAIRS: &[(&[u8], &[u8])] = &[
-    (
-        include_bytes!("../../models/ddpm-8-int8.onnx"),
-        include_bytes!("../../models/ddpm-8-prefilter-int8.onnx"),
-    ),
-    (
-        include_bytes!("../../models/ddpm-8-6mm-int8.onnx"),
-        include_bytes!("../../models/ddpm-8-6mm-prefilter-int8.onnx"),
-    ),
-    (
-        include_bytes!("../../models/ddpm-8-12mm-int8.onnx"),
-        include_bytes!("../../models/ddpm-8-12mm-prefilter-int8.onnx"),
-    ),
-];
-#[cfg(not(feature = "built-in-network"))]
-const PAIRS: &[(&[u8], &[u8])] = &[];
 
 /// A hologram network. Immutable; one serves many sessions.
 #[derive(Debug, uniffi::Object)]
@@ -66,20 +40,48 @@ pub struct DeepPair {
 /// Another offset, or a library that was built without them.
 #[uniffi::export]
 pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
-    let display = phasefront::Display::default().with_offset_m(offset_mm * 1e-3)?;
-    for (hologram, prefilter) in PAIRS {
-        let prefilter = Network::from_bytes(prefilter)?;
-        if deep::check(&prefilter.core, &display).is_ok() {
-            let hologram = Network::from_bytes(hologram)?;
-            return Ok(DeepPair {
-                hologram,
-                prefilter,
-            });
-        }
+    guard(|| {
+        let display = phasefront::Display::default().with_offset_m(offset_mm * 1e-3)?;
+        let pair = built_in::pair(&display).ok_or_else(|| {
+            PhasefrontError::Network(format!(
+                "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
+            ))
+        })?;
+        Ok(pair)
+    })
+}
+
+/// What is compiled in.
+#[cfg(feature = "built-in-network")]
+mod built_in {
+    use super::{DeepPair, Network};
+    use phasefront_models::Precision::Int8;
+    use std::sync::Arc;
+
+    pub(super) fn network() -> Option<Arc<phasefront::Network>> {
+        phasefront_models::network("rgbd-8", Int8)
     }
-    Err(PhasefrontError::Network(format!(
-        "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
-    )))
+
+    pub(super) fn pair(display: &phasefront::Display) -> Option<DeepPair> {
+        let pair = phasefront_models::pair_for(display, Int8)?;
+        let of = |core| Arc::new(Network { core });
+        Some(DeepPair {
+            hologram: of(pair.hologram),
+            prefilter: of(pair.prefilter),
+        })
+    }
+}
+
+/// Nothing.
+#[cfg(not(feature = "built-in-network"))]
+mod built_in {
+    pub(super) fn network() -> Option<std::sync::Arc<phasefront::Network>> {
+        None
+    }
+
+    pub(super) fn pair(_: &phasefront::Display) -> Option<super::DeepPair> {
+        None
+    }
 }
 
 #[uniffi::export]
@@ -117,13 +119,15 @@ impl Network {
     /// A library that was built without it.
     #[uniffi::constructor]
     pub fn built_in() -> Result<Arc<Self>, PhasefrontError> {
-        match BUILT_IN {
-            Some(onnx) => Self::from_bytes(onnx),
+        guard(|| {
+            match built_in::network() {
+            Some(core) => Ok(Arc::new(Network { core })),
             None => Err(PhasefrontError::Network(
                 "network: none is built in; load one from a file, or build with the feature built-in-network"
                     .into(),
             )),
         }
+        })
     }
 
     /// What it is.

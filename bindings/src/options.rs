@@ -1,13 +1,9 @@
 //! What a session makes, and how.
 
-use crate::calibration::CalibratedDisplay;
-use crate::display::Display;
-use crate::error::PhasefrontError;
+use crate::error::{PhasefrontError, guard};
 use crate::network::Network;
-use phasefront::depth::range;
-use phasefront::session;
-use phasefront::sweep::Sweep;
-use phasefront::{encode, output, slm};
+use crate::target::Target;
+use phasefront::{Sweep, input, output, session};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -43,18 +39,6 @@ pub enum Encoding {
     Deep {
         /// The pre-filter.
         prefilter: Arc<Network>,
-    },
-}
-
-/// What the modulator answers to a phase.
-#[derive(Debug, Clone, PartialEq, uniffi::Enum)]
-pub enum Response {
-    /// Levels in equal steps of phase, as many as the display's bits have.
-    Linear,
-    /// Of a calibrated modulator: 256 levels, the one at i shows the phase 2πi/256.
-    Lut {
-        /// The levels.
-        levels: Vec<u8>,
     },
 }
 
@@ -151,11 +135,11 @@ pub enum Backend {
     Gpu,
 }
 
-/// What a session makes, and how.
+/// What a session makes, and how. [`session_options`] has what is usual; change what is not.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
-    /// The display.
-    pub display: Display,
+    /// What holograms are for.
+    pub target: Arc<Target>,
     /// Qualities, the best first; at least one.
     pub ladder: Vec<Rung>,
     /// Whether the session may step on the ladder by itself.
@@ -164,8 +148,6 @@ pub struct SessionOptions {
     pub target_rate_hz: Option<f64>,
     /// How the field becomes phases.
     pub encoding: Encoding,
-    /// What the modulator answers to a phase.
-    pub response: Response,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
     /// Which metres are shown at the ends of the volume.
@@ -174,12 +156,8 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with; none for as many as the device has.
     pub threads: Option<u32>,
-    /// The display's calibration, which brings its own response.
-    #[uniffi(default = None)]
-    pub calibration: Option<Arc<CalibratedDisplay>>,
-    /// Where frames are computed; none for the CPU.
-    #[uniffi(default = None)]
-    pub backend: Option<Backend>,
+    /// Where frames are computed.
+    pub backend: Backend,
 }
 
 /// How the levels of the colours lie in images for a modulator's driver.
@@ -231,6 +209,108 @@ impl From<Placement> for output::Placement {
     }
 }
 
+impl Method {
+    fn core(&self, display: &phasefront::Display) -> phasefront::Method {
+        match self {
+            Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
+            Method::Sweep => phasefront::Method::Sweep(Sweep::for_display(display)),
+            Method::BySharpness { network } => {
+                phasefront::Method::BySharpness(Sweep::for_display(display), network.core.clone())
+            }
+        }
+    }
+}
+
+/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
+/// pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near and
+/// far by percentiles.
+#[uniffi::export]
+pub fn session_options(
+    target: Arc<Target>,
+    method: Option<Method>,
+) -> Result<SessionOptions, PhasefrontError> {
+    guard(|| {
+        let usual = match &method {
+            Some(method) => {
+                let method = method.core(&target.core.display);
+                session::SessionOptions::new(target.core.clone(), method)
+            }
+            None => usual(&target.core),
+        };
+        Ok(SessionOptions::new(target, usual))
+    })
+}
+
+#[cfg(feature = "built-in-network")]
+fn usual(target: &phasefront::Target) -> session::SessionOptions {
+    phasefront_models::session_options(target.clone())
+}
+
+#[cfg(not(feature = "built-in-network"))]
+fn usual(target: &phasefront::Target) -> session::SessionOptions {
+    let sweep = Sweep::for_display(&target.display);
+    session::SessionOptions::new(target.clone(), phasefront::Method::Sweep(sweep))
+}
+
+impl SessionOptions {
+    /// Those of the core, for the same `target`.
+    fn new(target: Arc<Target>, core: session::SessionOptions) -> Self {
+        let network = |core: &Arc<phasefront::Network>| Arc::new(Network { core: core.clone() });
+        let method = |method: &phasefront::Method| match method {
+            phasefront::Method::Network(core) | phasefront::Method::Seeded(core) => {
+                Method::Trained {
+                    network: network(core),
+                }
+            }
+            phasefront::Method::BySharpness(_, core) => Method::BySharpness {
+                network: network(core),
+            },
+            _ => Method::Sweep,
+        };
+        SessionOptions {
+            target,
+            ladder: (core.ladder.iter())
+                .map(|rung| Rung {
+                    method: method(&rung.method),
+                    width: rung.width as u32,
+                    height: rung.height as u32,
+                })
+                .collect(),
+            quality: match core.quality {
+                session::Quality::Adaptive => Quality::Adaptive,
+                session::Quality::Fixed(rung) => Quality::Fixed { rung: rung as u32 },
+            },
+            target_rate_hz: core.target_rate_hz,
+            encoding: match &core.encoder.encoding {
+                phasefront::Encoding::AntiAlias { sigma, width } => Encoding::AntiAlias {
+                    sigma: *sigma,
+                    width: *width as u32,
+                },
+                phasefront::Encoding::BandLimit { k } => Encoding::BandLimit { k: *k },
+                phasefront::Encoding::Deep(core) => Encoding::Deep {
+                    prefilter: network(core),
+                },
+                _ => Encoding::DoublePhase,
+            },
+            brightness: match core.encoder.brightness {
+                phasefront::Brightness::Steady => Brightness::Steady,
+                phasefront::Brightness::Fixed(scale) => Brightness::Fixed { scale },
+                phasefront::Brightness::FrameMax => Brightness::FrameMax,
+            },
+            depth_range: match core.depth.range {
+                input::DepthRange::Percentiles => DepthRange::Percentiles,
+                input::DepthRange::Fixed { near_m, far_m } => DepthRange::Fixed { near_m, far_m },
+            },
+            least_confidence: core.depth.least_confidence,
+            threads: core.threads.map(|threads| threads.get() as u32),
+            backend: match core.backend {
+                session::Backend::Cpu => Backend::Cpu,
+                session::Backend::Gpu => Backend::Gpu,
+            },
+        }
+    }
+}
+
 impl TryFrom<&SessionOptions> for session::SessionOptions {
     type Error = PhasefrontError;
 
@@ -240,16 +320,9 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
                 "the ladder is empty; give at least one rung: a method and a resolution".into(),
             ));
         };
-        let display = phasefront::Display::try_from(&options.display)?;
-        let sweep = Sweep::for_display(&display);
-        let method = |rung: &Rung| match &rung.method {
-            Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
-            Method::Sweep => phasefront::Method::Sweep(sweep),
-            Method::BySharpness { network } => {
-                phasefront::Method::BySharpness(sweep, network.core.clone())
-            }
-        };
-        let mut to = session::SessionOptions::new(display, method(best))?;
+        let target = options.target.core.clone();
+        let method = |rung: &Rung| rung.method.core(&target.display);
+        let mut to = session::SessionOptions::new(target.clone(), method(best));
         to.ladder = (options.ladder.iter())
             .map(|rung| session::Rung {
                 method: method(rung),
@@ -260,53 +333,28 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             .collect();
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
-        to.encoding = match &options.encoding {
-            Encoding::DoublePhase => encode::Encoding::DoublePhase,
-            Encoding::AntiAlias { sigma, width } => encode::Encoding::AntiAlias {
+        to.encoder.encoding = match &options.encoding {
+            Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
+            Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
                 sigma: *sigma,
                 width: *width as usize,
             },
-            Encoding::BandLimit { k } => encode::Encoding::BandLimit { k: *k },
-            Encoding::Deep { prefilter } => encode::Encoding::Deep(prefilter.core.clone()),
+            Encoding::BandLimit { k } => phasefront::Encoding::BandLimit { k: *k },
+            Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
         };
-        if let Some(calibrated) = &options.calibration {
-            let core = &calibrated.core;
-            if Display::from(core.display.clone()) != options.display {
-                return Err(PhasefrontError::Setting(
-                    "the calibration is another display's; give the session the one that the calibration holds".into(),
-                ));
-            }
-            if options.response != Response::Linear {
-                return Err(PhasefrontError::Setting(
-                    "the calibration brings its own response; leave the other linear".into(),
-                ));
-            }
-            to.response = core.response.clone();
-            to.illumination = core.illumination.clone();
-            to.correction = core.correction;
-        }
-        if let Response::Lut { levels } = &options.response {
-            let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {
-                PhasefrontError::Setting(format!(
-                    "the look-up table has {} levels; 256 are right, one for each phase step of 2π/256",
-                    levels.len()
-                ))
-            })?;
-            to.response = slm::Response::lut(levels);
-        }
-        to.brightness = match options.brightness {
-            Brightness::Steady => session::Brightness::Steady,
-            Brightness::Fixed { scale } => session::Brightness::Fixed(scale),
-            Brightness::FrameMax => session::Brightness::FrameMax,
+        to.encoder.brightness = match options.brightness {
+            Brightness::Steady => phasefront::Brightness::Steady,
+            Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
+            Brightness::FrameMax => phasefront::Brightness::FrameMax,
         };
         to.depth.range = match options.depth_range {
-            DepthRange::Percentiles => range::DepthRange::Percentiles,
-            DepthRange::Fixed { near_m, far_m } => range::DepthRange::Fixed { near_m, far_m },
+            DepthRange::Percentiles => input::DepthRange::Percentiles,
+            DepthRange::Fixed { near_m, far_m } => input::DepthRange::Fixed { near_m, far_m },
         };
         to.depth.least_confidence = options.least_confidence;
         to.backend = match options.backend {
-            None | Some(Backend::Cpu) => session::Backend::Cpu,
-            Some(Backend::Gpu) => session::Backend::Gpu,
+            Backend::Cpu => session::Backend::Cpu,
+            Backend::Gpu => session::Backend::Gpu,
         };
         to.threads = match options.threads {
             None => None,

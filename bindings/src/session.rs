@@ -6,7 +6,6 @@ use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
 use crate::statistics::Statistics;
 use phasefront::session::{self, Event, Session, Submission};
-use phasefront::slm::Response;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError, RwLock};
 
@@ -94,7 +93,6 @@ pub trait SessionListener: Send + Sync {
 #[derive(uniffi::Object)]
 pub struct RawSession {
     state: RwLock<State>,
-    response: Arc<Response>,
     listener_failures: Arc<AtomicU64>,
 }
 
@@ -120,14 +118,13 @@ impl RawSession {
         guard(|| {
             let listener_failures = Arc::new(AtomicU64::new(0));
             let options = session::SessionOptions::try_from(&options)?;
-            let response = Arc::new(options.response.clone());
             let running = match (mode, listener) {
                 (RunningMode::Image, None) => session::RunningMode::Image,
                 (RunningMode::Video, None) => session::RunningMode::Video,
                 (RunningMode::LiveStream, Some(listener)) => {
-                    let (failures, response) = (listener_failures.clone(), response.clone());
+                    let failures = listener_failures.clone();
                     session::RunningMode::Live(Box::new(move |event| {
-                        if let Err(error) = tell(&*listener, event, &response) {
+                        if let Err(error) = tell(&*listener, event) {
                             failures.fetch_add(1, Ordering::Relaxed);
                             log::warn!("{error}");
                         }
@@ -154,7 +151,6 @@ impl RawSession {
             );
             Ok(Arc::new(RawSession {
                 state: RwLock::new(State::Open(Arc::new(session))),
-                response,
                 listener_failures,
             }))
         })
@@ -182,7 +178,7 @@ impl RawSession {
                 confidence,
             })?;
             let hologram = self.session()?.process(&frame)?;
-            Ok(RawHologram::new(hologram, &self.response))
+            Ok(RawHologram::new(hologram))
         })
     }
 
@@ -310,13 +306,9 @@ impl RawSession {
 }
 
 /// Tells `listener` of `event`.
-fn tell(
-    listener: &dyn SessionListener,
-    event: Event,
-    response: &Arc<Response>,
-) -> Result<(), PhasefrontError> {
+fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), PhasefrontError> {
     match event {
-        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram, response)),
+        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram)),
         Event::Dropped {
             timestamp_ns,
             reason,

@@ -6,10 +6,10 @@
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
-    Brightness, CalibratedDisplay, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo,
-    DepthFormat, DepthInfo, DepthRange, Encoding, FrameInfo, Method, Network, Orientation,
-    PlaneInfo, Quality, RawHologram, RawSession, Response, Rotation, Rung, RunningMode,
-    SessionOptions, YuvMatrix, display_from_toml,
+    Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
+    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, Quality, RawHologram,
+    RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
+    session_options,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -61,30 +61,27 @@ fn bytes<'a>(frames: &'a [u8], plane: &Value) -> &'a [u8] {
 
 fn options(case: &Value) -> SessionOptions {
     let display = display_from_toml(case["display"].as_str().unwrap().into()).unwrap();
-    let calibration = case["calibration"].as_str().map(|file| {
-        let path = folder().join(file);
-        CalibratedDisplay::from_file(path.to_str().unwrap().into()).unwrap()
-    });
+    let target = match (case["calibration"].as_str(), case["lut"].as_array()) {
+        (Some(file), _) => Target::from_file(folder().join(file).to_str().unwrap().into()).unwrap(),
+        (None, Some(levels)) => {
+            let levels = levels.iter().map(|level| int(level) as u8).collect();
+            Target::with_look_up_table(display, levels).unwrap()
+        }
+        (None, None) => Target::of_display(display).unwrap(),
+    };
+    let method = match case["method"].as_str().unwrap() {
+        "network" => Method::Trained {
+            network: Network::built_in().unwrap(),
+        },
+        "sweep" => Method::Sweep,
+        "by-sharpness" => Method::BySharpness {
+            network: Network::built_in().unwrap(),
+        },
+        file => Method::Trained {
+            network: model(file),
+        },
+    };
     SessionOptions {
-        ladder: vec![Rung {
-            method: match case["method"].as_str().unwrap() {
-                "network" => Method::Trained {
-                    network: Network::built_in().unwrap(),
-                },
-                "sweep" => Method::Sweep,
-                "by-sharpness" => Method::BySharpness {
-                    network: Network::built_in().unwrap(),
-                },
-                file => Method::Trained {
-                    network: model(file),
-                },
-            },
-            width: display.width,
-            height: display.height,
-        }],
-        display,
-        quality: Quality::Adaptive,
-        target_rate_hz: None,
         encoding: match case["encoding"].as_str().unwrap() {
             "double-phase" => Encoding::DoublePhase,
             "anti-alias" => Encoding::AntiAlias {
@@ -94,17 +91,6 @@ fn options(case: &Value) -> SessionOptions {
             "band-limit" => Encoding::BandLimit { k: 1.0 },
             file => Encoding::Deep {
                 prefilter: model(file),
-            },
-        },
-        response: match &case["lut"] {
-            Value::Null => Response::Linear,
-            levels => Response::Lut {
-                levels: levels
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .map(|l| int(l) as u8)
-                    .collect(),
             },
         },
         brightness: match &case["brightness"] {
@@ -120,10 +106,7 @@ fn options(case: &Value) -> SessionOptions {
                 far_m: range[1].as_f64().unwrap() as f32,
             },
         },
-        least_confidence: 0.25,
-        threads: None,
-        calibration,
-        backend: None,
+        ..session_options(target, Some(method)).unwrap()
     }
 }
 
@@ -457,8 +440,8 @@ mod write {
 
     /// A display whose pixels turn the phase otherwise than they are told, lit unevenly, through a lens that is not round.
     fn calibration(display: &str) -> Vec<u8> {
-        use phasefront::slm::per_pixel::{PerPixel, nodes};
-        use phasefront::wave::zernike::Aberration;
+        use phasefront::target::{Aberration, PerPixel};
+        use phasefront::unstable::slm::per_pixel::nodes;
         let (w, h) = DISPLAY;
         let (rows, columns) = nodes(h, w, 12);
         let levels: Vec<f32> = (0..3 * rows * columns)
@@ -472,10 +455,10 @@ mod write {
         let amplitude = ndarray::Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
             1.0 - 0.05 * ((x as f32 - 2.0).powi(2) + (y as f32 - 1.5).powi(2)) - 0.01 * c as f32
         });
-        phasefront::Calibration {
+        phasefront::Target {
             display: phasefront::Display::from_toml(display).unwrap(),
-            response: phasefront::slm::Response::PerPixel(Arc::new(table)),
-            illumination: Some(phasefront::Illumination::new(amplitude.view()).unwrap()),
+            response: phasefront::target::Response::PerPixel(Arc::new(table)),
+            illumination: Some(phasefront::target::Illumination::new(amplitude.view()).unwrap()),
             correction: Some(Aberration::new([[0.0, 1.5, 0.2, 0.0, 0.0]; 3]).unwrap()),
         }
         .to_bytes()

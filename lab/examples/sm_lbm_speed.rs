@@ -8,7 +8,7 @@
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::wave::asm::{self, Padding};
+use phasefront::unstable::wave::asm::{self, Padding};
 use phasefront_lab::Result;
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::scene::dice::Dice;

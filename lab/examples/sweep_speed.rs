@@ -6,8 +6,8 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
-use phasefront::depth::DepthUnit;
-use phasefront::sweep::SweepPlan;
+use phasefront::unstable::depth::DepthUnit;
+use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_lab::Result;
 use phasefront_lab::rgbd::{self, DepthOptions};

@@ -7,11 +7,11 @@ pub mod random;
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::network::{Precision, f32_peak, int8_peak};
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method, Modulator, Network, Pipeline, RgbdFrame};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::network::{Precision, f32_peak, int8_peak};
+use phasefront::{
+    Brightness, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target,
+};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -29,8 +29,6 @@ pub struct Case<'a> {
     pub size: (usize, usize),
     /// Threads of the pool.
     pub threads: usize,
-    /// A per-pixel table, if what it costs shall be measured: each frame is encoded once more, through it.
-    pub table: Option<&'a Arc<PerPixel>>,
     /// The pre-filter of the deep encoding; AA-DPM without.
     pub prefilter: Option<&'a Arc<Network>>,
 }
@@ -103,17 +101,17 @@ impl Machine {
     }
 }
 
-/// Measures one case with `display`: frames until `budget` is spent, five at least, after one that is not
-/// counted.
+/// Measures one case on `target`: frames until `budget` is spent, five at least, after one that is not counted. Where its
+/// modulator has a table for each pixel, each frame is encoded once more, through it.
 ///
 /// # Errors
 /// A case that cannot be planned.
-pub fn measure(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
+pub fn measure(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(case.threads)
         .build()
         .map_err(|e| Error::Input(format!("--threads {}: {e}", case.threads)))?;
-    pool.install(|| measure_here(case, display, budget))
+    pool.install(|| measure_here(case, target, budget))
 }
 
 /// A method's name, which is also that of its stage, and its network.
@@ -125,28 +123,27 @@ fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
     }
 }
 
-fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<Row> {
+fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
     let (width, height) = case.size;
     let (name, network) = named(case.method);
     forget_peak_memory();
-    let pipeline = Pipeline::new(
-        height,
-        width,
-        case.method.clone(),
-        display,
-        match case.prefilter {
-            Some(network) => Encoding::Deep(network.clone()),
-            None => Encoding::ANTI_ALIAS,
-        },
-        Scale::Fixed(1.0),
-        Response::linear(display.bits())?,
-    )?;
-    let by_table = (case.table)
-        .map(|table| {
-            let response = Response::PerPixel(table.clone());
-            let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Fixed(1.0));
-            Modulator::new(height, width, display, encoding, scale, response)
-        })
+    let brightness = Brightness::Fixed(1.0);
+    let encoding = match case.prefilter {
+        Some(network) => Encoding::Deep(network.clone()),
+        None => Encoding::ANTI_ALIAS,
+    };
+    let plain = Target::from(&target.display);
+    let options = EncoderOptions {
+        encoding,
+        brightness,
+    };
+    let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
+    let options = EncoderOptions {
+        encoding: Encoding::ANTI_ALIAS,
+        brightness,
+    };
+    let by_table = (target.response.shape())
+        .map(|_| Modulator::new((height, width), target, &options))
         .transpose()?;
     let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
     let frame = test_frame(height, width)?;
@@ -200,7 +197,7 @@ fn measure_here(case: &Case<'_>, display: &Display, budget: Duration) -> Result<
         width,
         height,
         threads: case.threads,
-        offset_mm: display.offset_m() * 1e3,
+        offset_mm: target.display.offset_m() * 1e3,
         encoder: match case.prefilter {
             Some(_) => "deep",
             None => "anti-alias",

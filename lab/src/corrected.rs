@@ -20,9 +20,11 @@ use crate::sm_lbm::{Planes, cross, plane_z_m};
 use ndarray::{Array3, ArrayView1, Axis};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::wave::asm::{self, Padding, Transfer};
-use phasefront::wave::fft::Fft2;
-use phasefront::wave::zernike::Aberrations;
+use phasefront::unstable::wave::{
+    asm::{self, Padding, Transfer},
+    fft::Fft2,
+    zernike::Aberrations,
+};
 use rayon::prelude::*;
 
 /// The most propagations of one colour: those of 512 planes with a kernel each.

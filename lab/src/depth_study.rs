@@ -8,11 +8,10 @@ use crate::scene::dice::Dice;
 use crate::{scene, sm_lbm};
 use ndarray::{Array2, Array3, ArrayView2};
 use num_complex::Complex32;
-use phasefront::depth::fill_nearest;
-use phasefront::depth::refine::Refiner;
-use phasefront::frame::Crop;
-use phasefront::method::{Method, MethodPlan};
-use phasefront::{Display, RgbdFrame};
+use phasefront::unstable::depth::{fill_nearest, refine::Refiner};
+use phasefront::unstable::frame::Crop;
+use phasefront::unstable::method::MethodPlan;
+use phasefront::{Display, Method, RgbdFrame};
 use serde::Serialize;
 
 /// (H, W) of the depth sensor: ARKit's.

@@ -18,16 +18,18 @@ use crate::scene::dice::Dice;
 use crate::sm_lbm;
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::method::check_display;
-use phasefront::modulator::{Modulator, remove_mean_phase};
-use phasefront::network::InputKind;
-use phasefront::refocus::{Refocus, phase_only_field};
-use phasefront::seeded::SeededPlan;
-use phasefront::slm::Response;
-use phasefront::sweep::hidden::{Hidden, NOTHING};
-use phasefront::sweep::{SweepPlan, hidden_reach};
-use phasefront::{Display, Network, RgbdFrame, Sweep};
+use phasefront::unstable::modulator::{Modulator, remove_mean_phase};
+use phasefront::unstable::network::InputKind;
+use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::seeded::SeededPlan;
+use phasefront::unstable::sweep::{
+    SweepPlan,
+    hidden::{Hidden, NOTHING},
+    hidden_reach,
+};
+use phasefront::{
+    Brightness, Display, EncoderOptions, Encoding, Network, Refocus, RgbdFrame, Sweep, Target,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cmp::Reverse;
@@ -114,7 +116,7 @@ impl<'a> Method<'a> {
     }
 
     fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
-        check_display(network, display)?;
+        network.check_display(display)?;
         let plan = SeededPlan::new(size, size, network, display)?;
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((3, size, size));
@@ -146,7 +148,7 @@ impl<'a> Method<'a> {
             ))
             .into());
         }
-        check_display(network, display)?;
+        network.check_display(display)?;
         let plan = network.plan(size, size)?;
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((3, size, size));
@@ -339,19 +341,16 @@ impl Viewer {
         let refocus = match shown.encoding.clone() {
             None => &self.complex,
             Some(encoding) => {
-                let response = Response::linear(self.display.bits())?;
-                let modulator = Modulator::new(
-                    size,
-                    size,
-                    &self.display,
+                let target = Target::from(&self.display);
+                let options = EncoderOptions {
                     encoding,
-                    Scale::Max,
-                    response.clone(),
-                )?;
+                    brightness: Brightness::FrameMax,
+                };
+                let modulator = Modulator::new((size, size), &target, &options)?;
                 let mut levels = vec![0; values.len()];
                 let modulation =
                     modulator.modulate(&mut values, &mut levels, &mut modulator.scratch());
-                phase_only_field(&levels, &response, modulation.scale, &mut values);
+                phase_only_field(&levels, &target.response, modulation.scale, &mut values);
                 &self.apertured
             }
         };

@@ -9,11 +9,8 @@ use image::{DynamicImage, ImageReader};
 use ndarray::{Array2, Array3, ArrayView3};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use num_complex::Complex32;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::PerPixel;
-use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Modulator};
+use phasefront::target::Response;
+use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Write};
@@ -379,14 +376,10 @@ pub fn is_hologram(path: &Path) -> Result<bool> {
 /// A display file and what it refers to.
 #[derive(Debug, Clone)]
 pub struct DisplayFile {
-    /// The physics.
-    pub display: Display,
+    /// What it says but for aberrations.
+    pub target: Target,
     /// The modulator's table, where it is calibrated as a whole.
     pub lut: Option<[u8; 256]>,
-    /// The modulator's table, where it is calibrated pixel by pixel.
-    pub per_pixel: Option<Arc<PerPixel>>,
-    /// The laser's amplitude over the modulator.
-    pub laser: Option<Illumination>,
     /// What corrects the display's aberrations.
     pub aberration: Option<AberrationFile>,
 }
@@ -394,70 +387,43 @@ pub struct DisplayFile {
 impl From<Display> for DisplayFile {
     fn from(display: Display) -> Self {
         DisplayFile {
-            display,
+            target: display.into(),
             lut: None,
-            per_pixel: None,
-            laser: None,
             aberration: None,
         }
     }
 }
 
 impl DisplayFile {
-    /// The modulator's response.
-    ///
-    /// # Errors
-    /// None that a display that was read meets.
-    pub fn response(&self) -> Result<Response> {
-        Ok(match (&self.per_pixel, self.lut) {
-            (Some(table), _) => Response::PerPixel(table.clone()),
-            (None, Some(lut)) => Response::lut(lut),
-            (None, None) => Response::linear(self.display.bits())?,
-        })
-    }
-
-    /// The correction that is one for all depths and the whole frame, None where there is nothing to correct.
+    /// The target with the correction that is one for all depths and the whole frame, where there is something to
+    /// correct.
     ///
     /// # Errors
     /// Aberrations that change over depth or over the frame, which only SM-LBM corrects.
-    pub fn constant_correction(&self) -> Result<Option<Aberration>> {
-        let constant = match &self.aberration {
-            None => return Ok(None),
-            Some(AberrationFile::Uniform(all)) => all.constant(),
-            Some(AberrationFile::Spatial(_)) => None,
+    pub fn corrected(&self) -> Result<Target> {
+        let correction = match &self.aberration {
+            None => None,
+            Some(AberrationFile::Uniform(all)) if all.constant().is_some() => all.constant(),
+            Some(_) => {
+                return Err(Error::Input(
+                    "the display's aberration changes over depth or over the frame; --method layers corrects it, a network must be trained for it".into(),
+                ));
+            }
         };
-        match constant {
-            Some(correction) => Ok(Some(correction)),
-            None => Err(Error::Input(
-                "the display's aberration changes over depth or over the frame; --method layers corrects it, a network must be trained for it".into(),
-            )),
-        }
-    }
-
-    /// The way of (3, `height`, `width`) midpoint holograms to this display; the correction of aberrations is the caller's, as it
-    /// knows whether the hologram has it already.
-    ///
-    /// # Errors
-    /// As [`Modulator::new`].
-    pub fn modulator(
-        &self,
-        (height, width): (usize, usize),
-        encoding: Encoding,
-        scale: Scale,
-    ) -> Result<Modulator> {
-        let response = self.response()?;
-        let plan = Modulator::new(height, width, &self.display, encoding, scale, response)?;
-        Ok(match &self.laser {
-            Some(laser) => plan.with_illumination(laser.clone()),
-            None => plan,
+        Ok(Target {
+            correction,
+            ..self.target.clone()
         })
     }
 
     /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
-            ("per_pixel", phase_only && self.per_pixel.is_some()),
-            ("laser", phase_only && self.laser.is_some()),
+            (
+                "per_pixel",
+                phase_only && self.target.response.shape().is_some(),
+            ),
+            ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
         ];
         let there = keys.into_iter().filter(|(_, there)| *there);
@@ -518,11 +484,19 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
             Some(Arc::new(table))
         }
     };
+    let linear = Target::from(display);
+    let target = Target {
+        response: match (per_pixel, lut) {
+            (Some(table), _) => Response::PerPixel(table),
+            (None, Some(lut)) => Response::lut(lut),
+            (None, None) => linear.response,
+        },
+        illumination: laser_path.map(|p| table::read_laser(&p)).transpose()?,
+        ..linear
+    };
     Ok(DisplayFile {
-        display,
+        target,
         lut,
-        per_pixel,
-        laser: laser_path.map(|p| table::read_laser(&p)).transpose()?,
         aberration: aberration_path
             .map(|p| table::read_aberrations(&p))
             .transpose()?,

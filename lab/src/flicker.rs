@@ -5,10 +5,9 @@ use crate::depth_study::{Degradation, SENSOR, degrade};
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
 use crate::scene;
-use phasefront::depth::image::{DepthFormat, DepthImage};
-use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
-use phasefront::session::{Brightness, RunningMode, SessionOptions};
-use phasefront::{Display, Method, Session};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::session::RunningMode;
+use phasefront::{Brightness, Display, Method, Session, SessionOptions};
 use serde::Serialize;
 
 /// Noise and missing readings, new in each frame.
@@ -102,8 +101,8 @@ pub fn study(
         .collect();
     (SETTINGS.iter())
         .map(|setting| {
-            let mut options = SessionOptions::new(display.clone(), method.clone())?;
-            options.brightness = match setting.steady {
+            let mut options = SessionOptions::new(display, method.clone());
+            options.encoder.brightness = match setting.steady {
                 true => Brightness::Steady,
                 false => Brightness::FrameMax,
             };

@@ -1,14 +1,14 @@
 //! GPUs for the command: which one, and what was compiled for it, kept from run to run.
 
 use crate::error::Error;
-use phasefront::gpu::{Device, DeviceOptions};
+use phasefront::unstable::gpu::{Device, DeviceOptions};
 use std::io::Write;
 use std::path::PathBuf;
 
-impl From<phasefront::gpu::Error> for Error {
-    fn from(why: phasefront::gpu::Error) -> Self {
+impl From<phasefront::unstable::gpu::Error> for Error {
+    fn from(why: phasefront::unstable::gpu::Error) -> Self {
         match why {
-            phasefront::gpu::Error::Core(why) => Error::Core(why),
+            phasefront::unstable::gpu::Error::Core(why) => Error::Core(why),
             why => Error::Input(format!("{why}; --backend cpu needs no GPU")),
         }
     }

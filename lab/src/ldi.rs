@@ -9,7 +9,7 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageReader};
 use ndarray::{Array2, Array3};
-use phasefront::network::Source;
+use phasefront::unstable::network::Source;
 
 use crate::error::{Error, Result};
 
@@ -40,7 +40,7 @@ impl PartialEq for LdiLayer {
     }
 }
 
-/// The planes of [`phasefront::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn, each minus ½;
+/// The planes of [`phasefront::unstable::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn, each minus ½;
 /// black and farthest where there is no hit, or no such layer.
 impl Source for Ldi {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {

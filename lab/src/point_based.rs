@@ -37,7 +37,7 @@ use crate::sm_lbm;
 use ndarray::{Array2, Array3, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::wave::asm;
+use phasefront::unstable::wave::asm;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;

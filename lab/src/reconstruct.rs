@@ -5,10 +5,10 @@ use crate::error::{Error, Result};
 use crate::files::{DisplayFile, Hologram, HologramInfo};
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::Display;
-use phasefront::refocus::{Refocus, phase_only_field};
-use phasefront::wave::asm::Propagator;
-use phasefront::wave::zernike::Aberration;
+use phasefront::target::Aberration;
+use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::wave::asm::Propagator;
+use phasefront::{Display, Refocus};
 
 /// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
 pub const APERTURE_RADIUS: f64 = 1.0;
@@ -86,7 +86,7 @@ impl Hologram {
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             Hologram::PhaseOnly(levels, _) => {
-                let response = file.response()?.centred(height, width)?;
+                let response = file.target.response.clone().centred(height, width)?;
                 let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
                 let values = field.as_slice_mut().expect("standard layout");
                 phase_only_field(
@@ -95,9 +95,10 @@ impl Hologram {
                     info.scale.unwrap_or(1.0),
                     values,
                 );
-                if let Some(laser) = &file.laser {
-                    let modulator = (file.display.height(), file.display.width());
-                    laser.shine(values, shape, modulator);
+                if let Some(light) = &file.target.illumination {
+                    let display = &file.target.display;
+                    let modulator = (display.height(), display.width());
+                    light.shine(values, shape, modulator);
                 }
                 (field, Some(APERTURE_RADIUS))
             }

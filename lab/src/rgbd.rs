@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::files;
 use ndarray::Array2;
 use phasefront::RgbdFrame;
-use phasefront::depth::{self, DepthUnit};
+use phasefront::unstable::depth::{self, DepthUnit};
 use std::path::Path;
 
 /// How far the aspect ratios of colour and depth may lie apart, relative.

@@ -15,7 +15,7 @@ use crate::scene::dice::Dice;
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, concatenate, s};
 use ndarray_npy::{ReadNpyExt, WriteNpyExt};
 use num_complex::Complex32;
-use phasefront::sweep::SweepPlan;
+use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{RgbdFrame, Sweep};
 use rayon::prelude::*;
 use std::fs::File;

@@ -14,12 +14,13 @@ use crate::scene::dice::Dice;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::{self, PerPixel};
-use phasefront::wave::aperture;
-use phasefront::wave::asm::{self, Padding, Transfer};
-use phasefront::wave::fft::Fft2;
-use phasefront::wave::zernike::Aberration;
+use phasefront::target::{Aberration, PerPixel, Response};
+use phasefront::unstable::slm::per_pixel::{self};
+use phasefront::unstable::wave::{
+    aperture,
+    asm::{self, Padding, Transfer},
+    fft::Fft2,
+};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -421,7 +422,7 @@ fn normal(dice: &mut Dice) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use phasefront::wave::aperture::Aperture;
+    use phasefront::unstable::wave::aperture::Aperture;
 
     fn small() -> SimulatedDisplay {
         let display = Display::from_toml("width = 48\nheight = 40").unwrap();

@@ -18,8 +18,10 @@ use crate::ldi::Ldi;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::wave::asm::{self, Padding, Transfer};
-use phasefront::wave::fft::{Fft2, Scratch};
+use phasefront::unstable::wave::{
+    asm::{self, Padding, Transfer},
+    fft::{Fft2, Scratch},
+};
 use std::ops::Range;
 
 /// One point of a scene, on its plane.

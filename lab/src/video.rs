@@ -3,9 +3,8 @@
 use crate::error::{Error, Result};
 use crate::files;
 use ndarray::Array2;
-use phasefront::depth::DepthUnit;
-use phasefront::depth::image::{DepthFormat, DepthImage};
-use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::unstable::depth::DepthUnit;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -4,10 +4,10 @@
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
-use phasefront::Display;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::slm::Response;
-use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront::target::{Aberration, Response};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::wave::zernike::Aberrations;
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_lab::calibrate::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_lab::calibrate::pattern::Pattern;
 use phasefront_lab::calibrate::photograph::Photograph;
@@ -302,12 +302,16 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
         ..bare.clone()
     };
     // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by a quarter.
-    let scale = Scale::Fixed(1.0);
+    let options = EncoderOptions {
+        encoding: Encoding::ANTI_ALIAS,
+        brightness: Brightness::Fixed(1.0),
+    };
     let encoded = |field: &Array3<Complex32>, correct: bool| {
-        let mut plan = bare.modulator(size, Encoding::ANTI_ALIAS, scale).unwrap();
-        if correct {
-            plan = plan.with_correction(&cylinder()).unwrap();
-        }
+        let target = Target {
+            correction: correct.then(cylinder),
+            ..bare.target.clone()
+        };
+        let plan = Modulator::new(size, &target, &options).unwrap();
         let mut field = field.clone();
         let mut levels = Array3::zeros((3, h, w));
         let mut scratch = plan.scratch();

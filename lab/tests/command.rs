@@ -867,14 +867,14 @@ fn a_calibrated_display_is_packed_for_an_app() {
     let pack = ["calibrate", "pack", "-o", "app.pfc", "--display"];
     folder.succeeds(&[&pack[..], &["display.toml"]].concat());
     let packed =
-        phasefront::Calibration::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
+        phasefront::Target::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
     assert_eq!(
         (packed.display.width(), packed.display.offset_m()),
         (64, 2e-3)
     );
     assert_eq!(
         packed.response,
-        phasefront::slm::Response::lut(lut.try_into().unwrap())
+        phasefront::target::Response::lut(lut.try_into().unwrap())
     );
     assert_eq!(packed.correction.unwrap().coefficients()[1][1], 0.5);
     folder.refuses(&[&pack[..], &["display.toml"]].concat(), 1, &["--force"]);

@@ -7,8 +7,11 @@ mod reference;
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront::target::Aberration;
+use phasefront::unstable::wave::{
+    asm::{Padding, Propagator},
+    zernike::Aberrations,
+};
 use phasefront_lab::corrected::spatial::SpatialAberrations;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::ldi::{Ldi, LdiLayer};

@@ -3,16 +3,18 @@
 
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
-use phasefront::Display;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::modulator::Modulator;
-use phasefront::slm::Response;
-use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront::target::{Aberration, Response};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::wave::{
+    asm::{Padding, Propagator},
+    zernike::Aberrations,
+};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::dataset::{self, Manifest};
 use phasefront_lab::evaluate::{self, Method, Row, Shown, Viewer};
 use phasefront_lab::files::{self, Hologram, HologramInfo};
+use phasefront_lab::models::Precision;
 use phasefront_lab::{metrics, models, scene, sm_lbm};
 use std::fs;
 use std::path::Path;
@@ -238,16 +240,11 @@ fn encoded_fields_are_judged_as_their_files_look() {
     for (row, shown) in rows.iter().zip(&shown) {
         assert_eq!(row.shown, shown.name);
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
-        let response = Response::linear(8).unwrap();
-        let modulator = Modulator::new(
-            SIZE,
-            SIZE,
-            display,
-            shown.encoding.clone().unwrap(),
-            Scale::Max,
-            response,
-        )
-        .unwrap();
+        let options = EncoderOptions {
+            encoding: shown.encoding.clone().unwrap(),
+            brightness: Brightness::FrameMax,
+        };
+        let modulator = Modulator::new((SIZE, SIZE), &display.into(), &options).unwrap();
         let mut field = pair.hologram.clone();
         let mut levels = Array3::zeros((3, SIZE, SIZE));
         let modulation = modulator.modulate(
@@ -303,9 +300,9 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
 #[test]
 fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let data = Data::new();
-    let network = models::network("8", false).unwrap();
+    let network = models::network("8", Precision::Float32).unwrap();
     let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/ldi3-15.onnx");
-    let layers = models::network(layers, false).unwrap();
+    let layers = models::network(layers, Precision::Float32).unwrap();
     let judged = [("8", &network), ("layers", &layers)]
         .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());
     let [flat, layers] = judged;

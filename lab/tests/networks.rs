@@ -2,9 +2,18 @@
 #![allow(clippy::unwrap_used)]
 
 use phasefront::Display;
-use phasefront::network::{InputKind, Precision};
-use phasefront_lab::models::{self, BUILT_IN, PAIRS};
+use phasefront::unstable::network::{self, InputKind};
 use phasefront_lab::scene;
+use phasefront_models::{DeepPair, NETWORKS, PAIRS, Precision, pair_for};
+
+const PRECISIONS: [Precision; 2] = [Precision::Int8, Precision::Float32];
+
+fn numbers(precision: Precision) -> network::Precision {
+    match precision {
+        Precision::Int8 => network::Precision::Int8,
+        Precision::Float32 => network::Precision::F32,
+    }
+}
 
 /// A rendered frame as network input, planes of `kind`; a seed is its colours, turned.
 fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
@@ -26,10 +35,13 @@ fn pairs_are_for_their_offset_and_display() {
         let display = Display::default()
             .with_offset_m(pair.offset_mm * 1e-3)
             .unwrap();
-        for int8 in [false, true] {
-            let (hologram, prefilter) = models::pair_for(&display, int8).unwrap().unwrap();
-            assert_eq!(hologram.precision() == Precision::Int8, int8);
-            assert_eq!(prefilter.precision() == Precision::Int8, int8);
+        for precision in PRECISIONS {
+            let DeepPair {
+                hologram,
+                prefilter,
+            } = pair_for(&display, precision).unwrap();
+            assert_eq!(hologram.precision(), numbers(precision));
+            assert_eq!(prefilter.precision(), numbers(precision));
             assert!((prefilter.display().offset_m - display.offset_m()).abs() < 1e-9);
             let plan = hologram.plan(40, 64).unwrap();
             assert_ne!(plan.engine().name, "tract", "{}", plan.engine().why);
@@ -37,7 +49,7 @@ fn pairs_are_for_their_offset_and_display() {
             assert!(plan.engine().isa.is_some());
         }
     }
-    let none = |display: Display| models::pair_for(&display, true).unwrap().is_none();
+    let none = |display: Display| pair_for(&display, Precision::Int8).is_none();
     assert!(none(Display::default().with_offset_m(3e-3).unwrap()));
     // Where the encoder would refuse its pre-filter.
     assert!(none(Display::default().with_offset_m(6.05e-3).unwrap()));
@@ -46,15 +58,15 @@ fn pairs_are_for_their_offset_and_display() {
 
 #[test]
 fn the_fast_path_agrees_with_tract() {
-    for built in BUILT_IN {
-        let network = models::built_in(built).unwrap();
-        assert_eq!(network.layers(), built.layers);
-        assert_eq!(network.precision() == Precision::Int8, built.int8);
+    let both = |model| PRECISIONS.map(|precision| (model, precision));
+    for (model, precision) in NETWORKS.iter().flat_map(both) {
+        let network = model.network(precision).unwrap();
+        assert_eq!(network.precision(), numbers(precision));
         for (height, width) in [(61, 47), (40, 64)] {
             let input = input(network.input(), height, width);
             let fast = network.plan(height, width).unwrap();
             let engine = fast.engine();
-            assert_ne!(engine.name, "tract", "{}: {}", built.name, engine.why);
+            assert_ne!(engine.name, "tract", "{}: {}", model.name, engine.why);
             let outputs = [fast, network.plan_on_stock_tract(height, width).unwrap()].map(|plan| {
                 let mut output = vec![0.0; 6 * height * width];
                 plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
@@ -68,8 +80,11 @@ fn the_fast_path_agrees_with_tract() {
             let signal = mean_square(&mut tracts.iter().copied());
             let decibels = 10.0 * (signal / error).log10();
             // Engines round int8 differently by one step at times; f32 differs by its last bits.
-            let least = if built.int8 { 30.0 } else { 90.0 };
-            assert!(decibels > least, "{built:?}: {decibels} dB");
+            let least = match precision {
+                Precision::Int8 => 30.0,
+                Precision::Float32 => 90.0,
+            };
+            assert!(decibels > least, "{model:?}: {decibels} dB");
         }
     }
 }

@@ -7,7 +7,7 @@ mod reference;
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::wave::asm::{self, Padding, Propagator};
+use phasefront::unstable::wave::asm::{self, Padding, Propagator};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::{scene, sm_lbm};
 use reference::{relative_error, widen};

@@ -3,7 +3,7 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::sweep::SweepPlan;
+use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{Display, RgbdFrame, Sweep};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::plot::{self, Panel};

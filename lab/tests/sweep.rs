@@ -4,13 +4,12 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::depth::DepthUnit;
-use phasefront::depth::refine::Refiner;
-use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
-use phasefront::refocus::Refocus;
-use phasefront::sweep::{self, SweepPlan};
-use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront::unstable::depth::{DepthUnit, refine::Refiner};
+use phasefront::unstable::frame::{ColourPlan, Crop};
+use phasefront::unstable::sweep::{self, SweepPlan};
+use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront::{Display, Refocus, RgbdFrame, Sweep};
 use phasefront_lab::evaluate::filled;
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::{files, metrics, scene, sm_lbm};
@@ -125,10 +124,14 @@ fn captured(folder: &Path) -> RgbdFrame {
     let millimetres = files::read_depth(&folder.join("depth_0.png"), false).unwrap();
     let shape = millimetres.dim();
     let holes = millimetres.mapv(|mm| f32::from(mm > 0.0));
-    let depth =
-        phasefront::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
-            .unwrap()
-            .depth;
+    let depth = phasefront::unstable::depth::normalize(
+        millimetres.view(),
+        DepthUnit::Millimetres,
+        None,
+        None,
+    )
+    .unwrap()
+    .depth;
     let refiner = Refiner::new(shape, Crop::cover(shape, OUT), OUT).unwrap();
     let mut refined = ndarray::Array2::zeros(OUT);
     refiner

@@ -3,10 +3,12 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use num_complex::Complex32;
-use phasefront::encode::{Encoder, Encoding, Scale};
-use phasefront::slm::Response;
-use phasefront::wave::aperture::Aperture;
-use phasefront::wave::asm::{Padding, Propagator};
+use phasefront::unstable::encode::Encoder;
+use phasefront::unstable::wave::{
+    aperture::Aperture,
+    asm::{Padding, Propagator},
+};
+use phasefront::{Encoding, Target};
 
 const SIZE: (usize, usize) = (540, 960);
 
@@ -45,7 +47,7 @@ fn aperture(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn remove_mean_phase(bencher: Bencher<'_, '_>) {
     let mut field = field(3);
-    let run = || phasefront::modulator::remove_mean_phase(&mut field);
+    let run = || phasefront::unstable::modulator::remove_mean_phase(&mut field);
     bencher.counter(pixels(3)).bench_local(run);
 }
 
@@ -56,11 +58,9 @@ fn encode(bencher: Bencher<'_, '_>, name: &str) {
         "band-limit" => Encoding::BAND_LIMIT,
         _ => Encoding::DoublePhase,
     };
-    let encoder = Encoder::new(SIZE.0, SIZE.1, encoding).unwrap();
-    let response = Response::linear(8).unwrap();
+    let encoder = Encoder::new(SIZE, &Target::default(), &encoding).unwrap();
     let (mut field, mut scratch) = (field(3), encoder.scratch());
     let mut levels = vec![0; field.len()];
-    let scale = Scale::Fixed(1.0);
-    let run = || encoder.encode_levels(&mut field, scale, &response, &mut levels, &mut scratch);
+    let run = || encoder.encode_levels(&mut field, Some(1.0), &mut levels, &mut scratch);
     bencher.counter(pixels(3)).bench_local(run);
 }

@@ -4,9 +4,7 @@
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::slm::Response;
-use phasefront::{Display, Error, Method, Network, Pipeline, RgbdFrame};
+use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Target};
 
 /// Makes `levels`, (3, `height`, `width`), of a frame, by the network of an ONNX file; 0 if that went well.
 ///
@@ -50,16 +48,9 @@ fn make(
     let depth = Array2::from_shape_vec((height, width), depth.to_vec()).map_err(wrong)?;
     let frame = RgbdFrame::new(rgb, depth)?;
     let network = Network::from_onnx(onnx)?;
-    let display = Display::default();
-    let pipeline = Pipeline::new(
-        height,
-        width,
-        Method::trained(network.into()),
-        &display,
-        Encoding::ANTI_ALIAS,
-        Scale::Max,
-        Response::linear(display.bits())?,
-    )?;
+    let method = Method::trained(network.into());
+    let options = EncoderOptions::default();
+    let pipeline = Pipeline::new((height, width), method, &Target::default(), &options)?;
     let mut field = vec![Complex32::ZERO; levels.len()];
     pipeline.process(&frame, &mut field, levels, &mut pipeline.scratch())?;
     Ok(())

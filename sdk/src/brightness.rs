@@ -1,14 +1,14 @@
 //! Which amplitude full light stands for, and how bright a field is without its brightest points. How a scale moves from
 //! frame to frame is a session's.
 
-use crate::encode::Scale;
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 
 /// How the scale of a frame is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Brightness {
-    /// The amplitude that all but one of a thousand stay under, smoothed over a second. What is brighter is clipped.
+    /// The amplitude that all but one of a thousand stay under, in a session smoothed over a second. What is brighter is
+    /// clipped.
     #[default]
     Steady,
     /// This one, always. What is brighter is clipped.
@@ -20,7 +20,7 @@ pub enum Brightness {
 impl Brightness {
     /// # Errors
     /// A fixed scale that is not positive.
-    pub fn check(self) -> Result<()> {
+    pub(crate) fn check(self) -> Result<()> {
         match self {
             Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(
                 format!("a scale of {scale} cannot stand for full light; it must be above 0"),
@@ -28,20 +28,25 @@ impl Brightness {
             _ => Ok(()),
         }
     }
-}
 
-impl From<Scale> for Brightness {
-    fn from(scale: Scale) -> Self {
-        match scale {
-            Scale::Max => Brightness::FrameMax,
-            Scale::Fixed(scale) => Brightness::Fixed(scale),
+    /// The scale of `field`, which a steady one comes to from `past`; None for the field's largest amplitude.
+    pub(crate) fn scale(
+        self,
+        field: &[Complex32],
+        past: Option<Past>,
+        percentile: &mut Percentile,
+    ) -> Option<f32> {
+        match self {
+            Brightness::FrameMax => None,
+            Brightness::Fixed(scale) => Some(scale),
+            Brightness::Steady => Some(percentile.scale(field, past)),
         }
     }
 }
 
 /// Where a steady scale comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(not(feature = "gpu"), allow(unreachable_pub))] // `gpu` passes it on.
+#[cfg_attr(not(feature = "gpu"), allow(unreachable_pub))] // `gpu` hands it on.
 pub struct Past {
     /// The scale of the frame before.
     pub scale: f32,

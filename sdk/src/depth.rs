@@ -4,6 +4,7 @@
 //! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
 
 pub mod align;
+pub mod camera;
 pub mod image;
 pub mod range;
 pub mod refine;

@@ -2,17 +2,19 @@
 //! before it so that the checkerboard does not alias.
 //!
 //! Encoders take the field as given: its phase, its offset, its scale. Phases lie in \[0, 2π).
-//! What level shows a phase is [`crate::slm`]'s knowledge.
+//! What level shows a phase is [`crate::slm`]'s knowledge; an amplitude's scale is what full light stands for.
 
 pub mod anti_alias;
 pub mod band_limit;
 pub mod deep;
 pub mod double_phase;
 
+use crate::brightness::Brightness;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::network::Network;
 use crate::slm::Response;
+use crate::target::Target;
 use crate::wave::fft::ConvolveScratch;
 use anti_alias::{AntiAlias, AntiAliasScratch};
 use band_limit::BandLimit;
@@ -51,15 +53,37 @@ impl Encoding {
     };
     /// BL-DPM as published: k = 1.
     pub const BAND_LIMIT: Self = Encoding::BandLimit { k: 1.0 };
+
+    /// Whether it was trained on the phase that a network's field has.
+    pub(crate) fn keeps_phase(&self) -> bool {
+        matches!(self, Encoding::Deep(_))
+    }
 }
 
-/// Which amplitude becomes full light.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Scale {
-    /// The largest amplitude over all colours of the frame.
-    Max,
-    /// A fixed one; what is brighter is clipped. Video needs it, or it flickers.
-    Fixed(f32),
+/// How a field becomes levels.
+#[derive(Debug, Clone)]
+pub struct EncoderOptions {
+    /// From a complex field to phases.
+    pub encoding: Encoding,
+    /// Which amplitude full light stands for.
+    pub brightness: Brightness,
+}
+
+impl Default for EncoderOptions {
+    /// AA-DPM, steady brightness.
+    fn default() -> Self {
+        Encoding::ANTI_ALIAS.into()
+    }
+}
+
+impl From<Encoding> for EncoderOptions {
+    /// This encoding, the rest as usual.
+    fn from(encoding: Encoding) -> Self {
+        EncoderOptions {
+            encoding,
+            brightness: Brightness::default(),
+        }
+    }
 }
 
 /// A plan for one encoding and shape. Immutable; shared between threads.
@@ -68,7 +92,9 @@ pub struct Encoder {
     width: usize,
     prefilter: Prefilter,
     /// With (H, W) of the modulator, in whose middle the hologram stands.
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
+    response: Response,
 }
 
 enum Prefilter {
@@ -92,41 +118,35 @@ enum PrefilterScratch {
 }
 
 impl Encoder {
-    /// Plans the encoding of stacks of (`height`, `width`) planes.
+    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is divided
+    /// by the light that falls there.
     ///
     /// # Errors
-    /// An empty plane, a parameter out of its range, or a network that is no pre-filter.
-    pub fn new(height: usize, width: usize, encoding: Encoding) -> Result<Self> {
+    /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
+    pub fn new(shape: (usize, usize), target: &Target, encoding: &Encoding) -> Result<Self> {
+        let (height, width) = shape;
         if height == 0 || width == 0 {
             return Err(Error::Plan(format!(
                 "a plane of {width}×{height} is empty; each side must be at least 1"
             )));
         }
+        target.check()?;
         let prefilter = match encoding {
             Encoding::DoublePhase => Prefilter::None,
             Encoding::AntiAlias { sigma, width } => {
-                Prefilter::AntiAlias(AntiAlias::new(sigma, width)?)
+                Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?)
             }
-            Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, k)?),
-            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, &network)?),
+            Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, *k)?),
+            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network)?),
         };
+        let illumination = target.illumination.clone();
         Ok(Encoder {
             height,
             width,
             prefilter,
-            illumination: None,
+            illumination: illumination.map(|light| (light, target.modulator())),
+            response: target.response.clone().centred(height, width)?,
         })
-    }
-
-    /// The same for holograms in the middle of a modulator of (H, W), `modulator`, that is lit as `illumination` says: the
-    /// field is divided by the light after its filter.
-    pub fn with_illumination(
-        mut self,
-        illumination: Illumination,
-        modulator: (usize, usize),
-    ) -> Self {
-        self.illumination = Some((illumination, modulator));
-        self
     }
 
     /// Working memory for one call at a time.
@@ -146,7 +166,7 @@ impl Encoder {
     }
 
     /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it
-    /// used: the amplitude that full light stands for. `field` is worked on: what it holds afterwards means nothing.
+    /// used, the amplitude that full light stands for: `scale`, or the field's largest amplitude. `field` is worked on: what it holds afterwards means nothing.
     /// Allocates nothing.
     ///
     /// # Panics
@@ -154,7 +174,7 @@ impl Encoder {
     pub fn encode(
         &self,
         field: &mut [Complex32],
-        scale: Scale,
+        scale: Option<f32>,
         phase: &mut [f32],
         scratch: &mut EncoderScratch,
     ) -> f32 {
@@ -165,28 +185,32 @@ impl Encoder {
         scale
     }
 
-    /// [`Self::encode`] straight to the levels of a modulator that answers as `response` does.
+    /// [`Self::encode`] straight to the target's levels.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
     pub fn encode_levels(
         &self,
         field: &mut [Complex32],
-        scale: Scale,
-        response: &Response,
+        scale: Option<f32>,
         levels: &mut [u8],
         scratch: &mut EncoderScratch,
     ) -> f32 {
         let scale = self.prepare(field, scale, scratch);
         self.rows(field, levels, scratch, |row, values, levels| {
             let (y, first) = (row % self.height, row * self.width);
-            double_phase::encode_row_levels(values, y, scale, response, first, levels);
+            double_phase::encode_row_levels(values, y, scale, &self.response, first, levels);
         });
         scale
     }
 
     /// The filters that need the whole field at once, the light where no filter by rows comes after it, and the scale.
-    fn prepare(&self, field: &mut [Complex32], scale: Scale, scratch: &mut EncoderScratch) -> f32 {
+    fn prepare(
+        &self,
+        field: &mut [Complex32],
+        scale: Option<f32>,
+        scratch: &mut EncoderScratch,
+    ) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), 3 * plane);
         match (&self.prefilter, &mut scratch.prefilter) {
@@ -206,8 +230,8 @@ impl Encoder {
             illumination.divide(field, (self.height, self.width), *modulator);
         }
         match scale {
-            Scale::Fixed(scale) => scale,
-            Scale::Max => {
+            Some(scale) => scale,
+            None => {
                 let mut most = std::mem::take(&mut scratch.most);
                 self.rows(field, &mut most, scratch, |_, values, most| {
                     most[0] = double_phase::max_norm_sqr(values);

@@ -3,14 +3,12 @@
 //!
 //! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
 
-mod camera;
 mod colour;
 mod convert;
 mod plane;
 pub mod reference;
 mod resample;
 
-pub use camera::{Alignment, CameraFrame};
 pub(crate) use colour::check_size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
 #[cfg(feature = "gpu")]
@@ -21,7 +19,6 @@ pub(crate) use resample::Axis;
 pub use resample::Crop;
 
 use crate::error::{Error, Result};
-use crate::network::Source;
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 
 /// Colour as amplitude in \[0, 1], (3, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest.
@@ -130,30 +127,6 @@ impl RgbdFrame {
     }
 }
 
-/// The planes of [`crate::network::InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
-/// [`crate::network::InputKind::RgbdXy`], the place in the frame.
-impl Source for RgbdFrame {
-    #[inline(always)]
-    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
-        let (height, width) = self.shape();
-        let place = |at: usize, n: usize| (at as f32 + 0.5) / n as f32 - 0.5;
-        let (values, plane) = match plane {
-            4 => {
-                let columns = into.iter_mut().enumerate();
-                return columns.for_each(|(x, to)| *to = place(from + x, width));
-            }
-            5 => return into.fill(place(row, height)),
-            3 => (self.depth.as_slice(), 0),
-            colour => (self.rgb.as_slice(), colour),
-        };
-        let values = values.expect("rows in order, by construction");
-        let at = (plane * height + row) * width + from;
-        for (to, from) in into.iter_mut().zip(&values[at..]) {
-            *to = from - 0.5;
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -173,27 +146,6 @@ mod tests {
         for bad in [f32::NAN, f32::INFINITY, -0.1, 1.1] {
             assert!(message(rgb(), depth() + bad).starts_with("frame: depth"));
             assert!(message(rgb() + bad, depth()).starts_with("frame: colour"));
-        }
-    }
-
-    #[test]
-    fn a_network_reads_rows_of_centred_planes() {
-        let rgb = Array3::from_shape_fn((3, 2, 4), |(c, y, x)| (c * 8 + y * 4 + x) as f32 / 24.0);
-        let depth = Array2::from_shape_fn((2, 4), |(y, x)| (y * 4 + x) as f32 / 8.0);
-        // The same values in another order in memory.
-        let mut turned = Array3::zeros((4, 2, 3)).reversed_axes();
-        turned.assign(&rgb);
-        for rgb in [rgb, turned] {
-            let frame = RgbdFrame::new(rgb, depth.clone()).unwrap();
-            let mut row = [0.0; 2];
-            frame.read(1, 1, 2, &mut row);
-            assert_eq!(row, [14.0 / 24.0 - 0.5, 15.0 / 24.0 - 0.5]);
-            frame.read(3, 1, 0, &mut row);
-            assert_eq!(row, [0.0, 0.125]);
-            frame.read(4, 1, 2, &mut row);
-            assert_eq!(row, [0.125, 0.375]);
-            frame.read(5, 1, 2, &mut row);
-            assert_eq!(row, [0.25, 0.25]);
         }
     }
 }

@@ -4,29 +4,23 @@
 //! Each stage is a .wgsl file beside its Rust, and has its CPU twin as oracle: f32 agrees with it to 1e-4, int8 chains
 //! to the bit. A device is not trusted before a small frame came out of it as out of the CPU.
 //!
+//! A session falls back to the CPU by itself. Whoever wants the levels on the GPU, to show them without a copy, plans
+//! here:
+//!
 //! ```no_run
-//! use phasefront::encode::{Encoding, Scale};
-//! use phasefront::gpu::{DeviceOptions, Error, Frame, Job, Otherwise, Renderer};
-//! use phasefront::slm::Response;
-//! use phasefront::{Display, Method, Network, RgbdFrame};
+//! use phasefront::unstable::gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
+//! use phasefront::{Method, Network, RgbdFrame, Target};
 //! use std::sync::Arc;
 //!
-//! fn levels(network: Arc<Network>, frames: &[RgbdFrame]) -> Result<Vec<Vec<u8>>, Error> {
-//!     let (method, response) = (Method::Network(network), Response::linear(8)?);
-//!     let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Fixed(1.0));
-//!     let job = Job::new(1080, 1920, method, &Display::default(), encoding, scale, response);
-//!     let mut renderer = Renderer::new(DeviceOptions::default(), job, Otherwise::Cpu)?;
-//!     if let Some(why) = renderer.reason() {
-//!         println!("on the CPU: {why}");
-//!     }
-//!     let mut all = Vec::new();
-//!     for frame in frames {
-//!         let handed = renderer.submit(&Frame::of(frame))?;
-//!         let mut levels = vec![0; 3 * 1080 * 1920];
-//!         renderer.collect(handed, &mut levels)?;
-//!         all.push(levels);
-//!     }
-//!     Ok(all)
+//! fn show(network: Arc<Network>, frame: &RgbdFrame) -> Result<(), GpuError> {
+//!     let device = Arc::new(Device::open(&DeviceOptions::default())?);
+//!     let job = Job::new((1080, 1920), Method::Network(network), Target::default());
+//!     probe(&device, &job)?;
+//!     let mut pipeline = GpuPipeline::new(&device, &job)?;
+//!     let ticket = pipeline.submit(&Frame::of(frame), Deliver::Shown)?;
+//!     let _levels = pipeline.texture(&ticket);
+//!     pipeline.finish(ticket)?;
+//!     Ok(())
 //! }
 //! ```
 
@@ -40,26 +34,24 @@ mod input;
 mod method;
 mod peak;
 mod pipeline;
-mod preview;
 mod probe;
 mod renderer;
 mod sweep;
 mod watch;
 
-pub use crate::brightness::{Brightness, Past};
-pub use chain::{ChainOptions, Float, Fusion, NetworkPlan};
+pub use crate::brightness::Past;
+pub use chain::{ChainOptions, ChainPlan, Float, Fusion};
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use peak::Peak;
-pub use pipeline::{Deliver, FLIGHTS, FrameReport, Job, Pipeline, StageTimes, Ticket};
-pub use preview::Preview;
+pub use pipeline::{Deliver, FLIGHTS, GpuPipeline, GpuReport, Job, Ticket};
 pub use probe::probe;
-pub use renderer::{Handed, Otherwise, Renderer};
+pub(crate) use renderer::{InFlight, Renderer};
 
 /// Why the GPU does not serve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
-pub enum Error {
+pub enum GpuError {
     /// No GPU, or none that is wanted.
     #[error("no GPU: {0}")]
     None(String),
@@ -81,4 +73,4 @@ pub enum Error {
 }
 
 /// A result of the GPU.
-pub type Result<T> = std::result::Result<T, Error>;
+pub(crate) type Result<T> = std::result::Result<T, GpuError>;

@@ -1,46 +1,111 @@
-//! RGB-D frames to phase-only 3D holograms, on the device: an implementation of *End-to-end
-//! learning of 3D phase-only holograms for holographic display* (Shi, Li, Matusik, Light:
-//! Science & Applications 11, 247, 2022).
+//! RGB-D frames to phase-only 3D holograms, on the device, in real time: an implementation of *End-to-end learning of 3D
+//! phase-only holograms for holographic display* (Shi, Li, Matusik, Light: Science & Applications 11, 247, 2022).
 //!
-//! Conventions, everywhere: colours in the order red, green, blue; lengths in metres; planes
-//! row-major (H, W), stacks (3, H, W); x right, y down, z toward the viewer; the midpoint hologram
-//! at z = 0. An image's value is the amplitude. Plans are immutable and shared between threads;
-//! their hot calls take scratch memory and allocate nothing.
+//! A camera's frames go to a [`Session`], which answers with a [`Hologram`] each. A frame that is already amplitude and
+//! normalized depth goes through a [`Pipeline`]:
+//!
+//! ```
+//! use ndarray::{Array2, Array3};
+//! use num_complex::Complex32;
+//! use phasefront::{Display, EncoderOptions, Method, Pipeline, RgbdFrame, Sweep, Target};
+//!
+//! let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 3.0")?;
+//! let method = Method::Sweep(Sweep::for_display(&display));
+//! let target = Target::from(display);
+//! let pipeline = Pipeline::new((48, 64), method, &target, &EncoderOptions::default())?;
+//!
+//! // A bright square before a dark wall.
+//! let inside = |y: usize, x: usize| (16..32).contains(&y) && (24..40).contains(&x);
+//! let rgb = Array3::from_shape_fn((3, 48, 64), |(_, y, x)| if inside(y, x) { 0.9 } else { 0.2 });
+//! let depth = Array2::from_shape_fn((48, 64), |(y, x)| if inside(y, x) { 0.1 } else { 0.8 });
+//! let frame = RgbdFrame::new(rgb, depth)?;
+//!
+//! let mut scratch = pipeline.scratch();
+//! let mut field = vec![Complex32::ZERO; 3 * 48 * 64];
+//! let mut levels = vec![0; 3 * 48 * 64];
+//! let report = pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
+//! println!("{:?}, full light stands for {}", report.times, report.scale);
+//! # assert!(levels.iter().any(|&level| level != levels[0]));
+//! # Ok::<(), phasefront::Error>(())
+//! ```
+//!
+//! # Map
+//!
+//! | | |
+//! |---|---|
+//! | [`session`] | many frames: live, video, images; ladder of qualities, statistics, events |
+//! | [`input`] | what cameras give: colour and depth images, their formats, orientation, two cameras |
+//! | [`Method`] | how a hologram is made: a [`Network`], the plane [`Sweep`], or both |
+//! | [`target`] | what it is made for: display, modulator's response, lasers' light, correction of the optics |
+//! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
+//! | [`Pipeline`] | one frame through all stages, by hand |
+//! | [`output`] | levels to the images that a modulator takes |
+//! | [`Refocus`] | what an eye focused at z sees |
+//! | [`unstable`] | what the laboratory and the tests need; it changes without notice |
+//!
+//! The networks that come along are in the crate `phasefront-models`.
+//!
+//! # Features
+//!
+//! - `tract`, on by default: networks that the kernels do not take run on tract. Without it they are refused.
+//! - `gpu`: whole frames on Vulkan, Metal or DirectX 12, by [`SessionOptions::backend`](session::SessionOptions::backend).
+//!
+//! # How to be fast
+//!
+//! - Make a plan once for a shape, keep it and its scratch. Plans are immutable and shared between threads; their hot
+//!   calls allocate nothing.
+//! - Take int8 networks: three to four times as fast as f32, for some hundredths to 0.3 dB.
+//! - Compile with optimisation, also in development: `[profile.dev.package."*"] opt-level = 3`. The kernels choose the
+//!   processor's instructions when they run (AVX2, AVX-512, AMX, NEON); no flags are needed.
+//! - Stages use the current rayon pool. `ThreadPool::install` bounds their threads; a session has a pool of its own.
+//! - A modulator at the midpoint (`offset_mm = 0`) or a sweep, which goes on to the modulator by itself, needs no
+//!   Fourier transforms.
+//!
+//! # Conventions
+//!
+//! Colours in the order red, green, blue; lengths in metres (`_m`); planes row-major (H, W), stacks (3, H, W); x right,
+//! y down, z toward the viewer; the midpoint hologram at z = 0. An image's value is the amplitude.
+
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod brightness;
-pub mod calibration;
-pub mod depth;
-pub mod display;
-pub mod encode;
-pub mod error;
-pub mod frame;
+mod depth;
+mod display;
+mod encode;
+mod error;
+mod frame;
 #[cfg(feature = "gpu")]
-pub mod gpu;
-pub mod illumination;
-pub mod method;
-pub mod modulator;
-pub mod network;
+mod gpu;
+mod illumination;
+mod method;
+mod modulator;
+mod network;
 pub mod output;
-pub mod pipeline;
-pub mod preview;
-pub mod refocus;
-pub mod seeded;
+mod pipeline;
+mod preview;
+mod refocus;
+mod seeded;
 pub mod session;
-pub mod slm;
-pub mod sweep;
-pub mod wave;
+mod slm;
+mod sweep;
+pub mod target;
+mod wave;
 
-pub use calibration::Calibration;
+pub mod input;
+pub mod unstable;
+
+pub use brightness::Brightness;
 pub use display::Display;
+pub use encode::{EncoderOptions, Encoding};
 pub use error::{Error, Result};
 pub use frame::RgbdFrame;
-pub use illumination::Illumination;
 pub use method::Method;
-pub use modulator::Modulator;
-pub use network::{Network, NetworkPlan, NetworkScratch};
-pub use pipeline::Pipeline;
-pub use session::Session;
+pub use network::Network;
+pub use pipeline::{FrameReport, Pipeline, PipelineScratch, StageTimes};
+pub use refocus::Refocus;
+pub use session::{Hologram, Session, SessionOptions};
 pub use sweep::Sweep;
+pub use target::Target;
 
 /// The README's code compiles.
 #[cfg(doctest)]

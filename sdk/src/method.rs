@@ -10,9 +10,6 @@ use crate::sweep::{self, Sweep, SweepPlan, SweepScratch};
 use num_complex::Complex32;
 use std::sync::Arc;
 
-/// How far a display may lie from what a network was trained for, relative.
-const DISPLAY_TOLERANCE: f64 = 0.02;
-
 /// What makes the hologram.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -51,7 +48,7 @@ impl Method {
             }
         };
         check_input(network, input)?;
-        check_display(network, display)
+        network.check_display(display)
     }
 }
 
@@ -90,7 +87,12 @@ enum Scratch {
     Network(NetworkScratch),
     Sweep(SweepScratch),
     Seeded(SeededScratch),
-    BySharpness(SweepScratch, Box<MethodScratch>),
+    BySharpness {
+        sweep: SweepScratch,
+        trained: Box<MethodScratch>,
+        /// Whether the frame before was sharp.
+        was_sharp: Option<bool>,
+    },
 }
 
 impl MethodPlan {
@@ -152,9 +154,11 @@ impl MethodPlan {
             Way::Network(plan) => Scratch::Network(plan.scratch()),
             Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
             Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
-            Way::BySharpness(sweep, trained) => {
-                Scratch::BySharpness(sweep.scratch(), Box::new(trained.scratch()))
-            }
+            Way::BySharpness(sweep, trained) => Scratch::BySharpness {
+                sweep: sweep.scratch(),
+                trained: Box::new(trained.scratch()),
+                was_sharp: None,
+            },
         })
     }
 
@@ -171,13 +175,38 @@ impl MethodPlan {
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
+        self.field_after(false, frame, field, scratch)
+    }
+
+    /// [`Self::field`] of a frame that `follows` the one before, as video does: a method that is chosen frame by frame
+    /// does not go to and fro.
+    pub(crate) fn field_after(
+        &self,
+        follows: bool,
+        frame: &RgbdFrame,
+        field: &mut [Complex32],
+        scratch: &mut MethodScratch,
+    ) -> Result<()> {
         frame.check_shape(self.shape)?;
         match (&self.way, &mut scratch.0) {
             (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
             (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
-            (Way::BySharpness(sweep, trained), Scratch::BySharpness(of_sweep, of_trained)) => {
-                match sharpness::measure(frame).is_sharp() {
+            (
+                Way::BySharpness(sweep, trained),
+                Scratch::BySharpness {
+                    sweep: of_sweep,
+                    trained: of_trained,
+                    was_sharp,
+                },
+            ) => {
+                let measured = sharpness::measure(frame);
+                let is_sharp = match was_sharp.filter(|_| follows) {
+                    Some(was) => measured.stays_sharp(was),
+                    None => measured.is_sharp(),
+                };
+                *was_sharp = Some(is_sharp);
+                match is_sharp {
                     true => sweep.field(frame, field, of_sweep),
                     false => trained.field(frame, field, of_trained),
                 }
@@ -194,39 +223,6 @@ fn check_input(network: &Network, input: InputKind) -> Result<()> {
             "its input is '{}'; this method needs a network for '{input}'",
             network.input()
         )));
-    }
-    Ok(())
-}
-
-/// Checks that `network` was trained for a display like `display`: on another it gives wrong depths.
-///
-/// # Errors
-/// A pitch, wavelength or volume that differs by over 2 %.
-pub fn check_display(network: &Network, display: &Display) -> Result<()> {
-    let trained = network.display();
-    let pairs = [
-        ("pitch", "µm", 1e6, trained.pitch_m, display.pitch_m()),
-        (
-            "volume depth",
-            "mm",
-            1e3,
-            trained.volume_depth_m,
-            display.volume_depth_m(),
-        ),
-    ];
-    let colours = trained
-        .wavelengths_m
-        .into_iter()
-        .zip(display.wavelengths_m())
-        .map(|(trained, given)| ("wavelength", "nm", 1e9, trained, given));
-    for (what, unit, scale, trained, given) in pairs.into_iter().chain(colours) {
-        if (trained - given).abs() > DISPLAY_TOLERANCE * trained {
-            return Err(Error::Network(format!(
-                "it was trained for a {what} of {:.3} {unit}, the display has {:.3}; train one for this display, or use a method without a network",
-                trained * scale,
-                given * scale
-            )));
-        }
     }
     Ok(())
 }

@@ -3,36 +3,33 @@
 //!
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
-use crate::display::Display;
-use crate::encode::{Encoder, EncoderScratch, Encoding, Scale, deep};
-use crate::error::{Error, Result};
-use crate::illumination::Illumination;
-use crate::slm::Response;
-use crate::wave::asm::{Padding, Propagator};
+use crate::brightness::{Brightness, Past, Percentile};
+use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
+use crate::error::Result;
+use crate::target::Target;
+use crate::wave::asm::Propagator;
 use crate::wave::fft::ConvolveScratch;
-use crate::wave::zernike::Aberration;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
-/// A plan for one shape, display and encoding. Immutable; shared between threads.
+/// A plan for one shape, target and encoding. Immutable; shared between threads.
 pub struct Modulator {
     height: usize,
     width: usize,
-    display: Display,
-    /// None where the modulator stands at the midpoint and there is nothing to correct.
+    /// None where the field stands at the modulator and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
     encoder: Encoder,
     keeps_phase: bool,
-    scale: Scale,
-    response: Response,
+    brightness: Brightness,
 }
 
 /// Working memory of a [`Modulator`] for one call at a time.
 pub struct ModulatorScratch {
     propagation: Option<ConvolveScratch>,
     encoder: EncoderScratch,
+    percentile: Percentile,
 }
 
 /// What became of a field on the modulator.
@@ -45,79 +42,39 @@ pub struct Modulation {
 }
 
 impl Modulator {
-    /// Plans the way of (3, `height`, `width`) midpoint holograms to `display`, whose response is
-    /// `response`.
+    /// Plans the way of (3, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
+    /// the offset's transfer function, so that it costs nothing beside it.
     ///
     /// # Errors
-    /// An offset, shape or encoding that cannot be planned, a pre-filter for another display, a fixed scale that is
-    /// not positive, or a response made for a smaller modulator.
-    pub fn new(
-        height: usize,
-        width: usize,
-        display: &Display,
-        encoding: Encoding,
-        scale: Scale,
-        response: Response,
+    /// A shape, offset or correction that cannot be planned, a scale that is not positive, a pre-filter for another
+    /// display or offset, or a table for another modulator.
+    pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
+        Self::from_z(shape, 0.0, target, options)
+    }
+
+    /// The same for fields at `z_m`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn from_z(
+        shape: (usize, usize),
+        z_m: f64,
+        target: &Target,
+        options: &EncoderOptions,
     ) -> Result<Self> {
-        if let Scale::Fixed(scale) = scale
-            && !(scale > 0.0 && scale.is_finite())
-        {
-            return Err(Error::Plan(format!(
-                "a scale of {scale} cannot stand for full light; it must be above 0"
-            )));
+        options.brightness.check()?;
+        if let Encoding::Deep(network) = &options.encoding {
+            network.check_prefilter(&target.display)?;
         }
-        if let Encoding::Deep(network) = &encoding {
-            deep::check(network, display)?;
-        }
-        let response = response.centred(height, width)?;
-        let offset = match display.offset_m() {
-            0.0 => None,
-            offset_m => Some(Propagator::for_colours(
-                height,
-                width,
-                display.pitch_m(),
-                display.wavelengths_m(),
-                offset_m,
-                Padding::Reach,
-            )?),
-        };
+        let distance_m = target.display.offset_m() - z_m;
         Ok(Modulator {
-            height,
-            width,
-            display: display.clone(),
-            offset,
-            keeps_phase: matches!(encoding, Encoding::Deep(_)),
-            encoder: Encoder::new(height, width, encoding)?,
-            scale,
-            response,
+            height: shape.0,
+            width: shape.1,
+            offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
+            encoder: Encoder::new(shape, target, &options.encoding)?,
+            keeps_phase: options.encoding.keeps_phase(),
+            brightness: options.brightness,
         })
-    }
-
-    /// The same for a display whose lasers light it as `illumination` says: what a pixel shall send is divided by what
-    /// it gets, where the light falls and nothing filters it any more. A hologram smaller than the modulator stands in its
-    /// middle.
-    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
-        let modulator = (self.display.height(), self.display.width());
-        self.encoder = self.encoder.with_illumination(illumination, modulator);
-        self
-    }
-
-    /// The same for a display with an aberration that is one for all depths: its correction Φ is part of the offset's
-    /// transfer function, so that it costs nothing beside it.
-    ///
-    /// # Errors
-    /// A correction that moves light farther than can be padded.
-    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
-        self.offset = Some(Propagator::for_colours_corrected(
-            self.height,
-            self.width,
-            self.display.pitch_m(),
-            self.display.wavelengths_m(),
-            self.display.offset_m(),
-            correction,
-            self.display.pitch_m(),
-        )?);
-        Ok(self)
     }
 
     /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
@@ -136,15 +93,14 @@ impl Modulator {
         ModulatorScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
+            percentile: Percentile::new(),
         }
     }
 
-    /// Takes a midpoint hologram, (3, H, W), to the modulator: ASM(H, offset)·exp(−i2π·offset/λ), Eq. 6,
-    /// whose second factor takes back the carrier that propagation here leaves out from the start; with the
-    /// correction of an aberration, where there is one. Allocates nothing.
+    /// Takes `field`, (3, H, W), to the modulator, in place. Allocates nothing.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `scratch` is another plan's, or `field` has not 3·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans
@@ -156,8 +112,8 @@ impl Modulator {
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, (3, H, W). `field` is worked on:
-    /// what it holds afterwards means nothing. Allocates nothing.
+    /// Encodes a field at the modulator, (3, H, W), into `levels`. `field` is worked on: what it holds afterwards means
+    /// nothing. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
@@ -167,42 +123,38 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
-        self.modulate_at(field, self.scale, levels, scratch)
+        self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] at another scale than the planned one.
-    ///
-    /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
-    pub fn modulate_at(
+    /// [`Self::modulate`] for steady brightness, whose scale comes from `past`.
+    pub(crate) fn modulate_after(
         &self,
+        past: Option<Past>,
         field: &mut [Complex32],
-        scale: Scale,
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
-        let scale =
-            self.encoder
-                .encode_levels(field, scale, &self.response, levels, &mut scratch.encoder);
+        let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+        let scale = self
+            .encoder
+            .encode_levels(field, scale, levels, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),
         }
     }
 
-    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
-    ///
-    /// # Panics
-    /// If `field` or `phases` has not 3·H·W values.
-    pub fn phases_at(
+    /// [`Self::modulate_after`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
+    pub(crate) fn phases_after(
         &self,
+        past: Option<Past>,
         field: &mut [Complex32],
-        scale: Scale,
         phases: &mut [f32],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
         let start = Instant::now();
+        let scale = self.brightness.scale(field, past, &mut scratch.percentile);
         let scale = self
             .encoder
             .encode(field, scale, phases, &mut scratch.encoder);

@@ -15,6 +15,7 @@ mod onnx;
 #[cfg(feature = "tract")]
 mod operator;
 pub mod reference;
+mod rgbd;
 #[cfg(feature = "tract")]
 mod stock;
 mod tensor;
@@ -25,6 +26,7 @@ pub use head::Head;
 use metadata::Description;
 pub use metadata::{InputKind, TrainedDisplay};
 
+use crate::display::Display;
 use crate::{Error, Result};
 use chain::Chain;
 #[cfg(feature = "gpu")]
@@ -163,6 +165,22 @@ impl Network {
     /// The display it was trained for; another needs another network.
     pub fn display(&self) -> &TrainedDisplay {
         &self.display
+    }
+
+    /// Checks that it was trained for a display like `display`: on another it gives wrong depths.
+    ///
+    /// # Errors
+    /// A pitch, wavelength or volume that differs by over 2 %.
+    pub fn check_display(&self, display: &Display) -> Result<()> {
+        self.display.check(display)
+    }
+
+    /// Checks that this pre-filter was trained for a display like `display`, its offset included.
+    ///
+    /// # Errors
+    /// As [`Self::check_display`], or an offset that differs by over 20 µm.
+    pub fn check_prefilter(&self, display: &Display) -> Result<()> {
+        self.display.check_offset(display)
     }
 
     /// Planes of the sweep whose field a seeded network was trained to correct, where its file says so.

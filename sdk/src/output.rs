@@ -7,10 +7,10 @@
 //! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
 //! and a shifted hologram does not stand where the table takes it to be.
 
-use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::slm::Response;
 use crate::slm::per_pixel::PerPixel;
+use crate::target::Target;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
@@ -143,17 +143,17 @@ enum Dark {
 const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
 
 impl Output {
-    /// Plans images of `display`'s resolution for (`height`, `width`) holograms whose levels `response` made.
+    /// Plans images of the modulator's resolution for (H, W) holograms for `target`.
     ///
     /// # Errors
     /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
     pub fn new(
-        display: &Display,
+        target: &Target,
         (height, width): (usize, usize),
-        response: &Response,
         placement: Placement,
     ) -> Result<Self> {
-        let modulator = (display.height(), display.width());
+        target.check()?;
+        let (modulator, bits) = (target.modulator(), target.display.bits());
         if height > modulator.0 || width > modulator.1 {
             return Err(Error::Plan(format!(
                 "a hologram of {width}×{height} does not fit the modulator of {}×{}",
@@ -171,11 +171,11 @@ impl Output {
                 from(modulator.0, height, placement.shift_y),
                 from(modulator.1, width, placement.shift_x),
             ),
-            bits: match response {
-                Response::Linear { bits } => (*bits, display.bits()),
-                Response::Lut { .. } | Response::PerPixel(_) => (8, display.bits()),
+            bits: match &target.response {
+                Response::Linear { bits: bytes } => (*bytes, bits),
+                Response::Lut { .. } | Response::PerPixel(_) => (8, bits),
             },
-            dark: match response.clone().centred(modulator.0, modulator.1)? {
+            dark: match target.response.clone() {
                 Response::PerPixel(table) => Dark::PerPixel(table),
                 same => Dark::Everywhere(DARK.map(|phase| same.level(phase, 0))),
             },
@@ -276,9 +276,11 @@ impl Output {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::display::Display;
 
-    fn display(width: usize, height: usize) -> Display {
-        Display::from_toml(&format!("width = {width}\nheight = {height}")).unwrap()
+    fn target(width: usize, height: usize, bits: u32) -> Target {
+        let toml = format!("width = {width}\nheight = {height}\nbits = {bits}");
+        Display::from_toml(&toml).unwrap().into()
     }
 
     /// Levels that say colour, row and column.
@@ -301,7 +303,6 @@ mod tests {
 
     #[test]
     fn each_layout_holds_each_colour_in_its_place() {
-        let response = Response::linear(8).unwrap();
         let levels = levels(2, 3);
         for (layout, expected) in [
             (Layout::Rgb, vec![100, 150, 200, 101, 151, 201]),
@@ -310,12 +311,7 @@ mod tests {
             (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
             (Layout::Grey16, vec![0, 100, 0, 101, 0, 102]),
         ] {
-            let output = Output::new(
-                &display(3, 2),
-                (2, 3),
-                &response,
-                Placement::centred(layout),
-            );
+            let output = Output::new(&target(3, 2, 8), (2, 3), Placement::centred(layout));
             let output = output.unwrap();
             assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
             assert!(
@@ -335,7 +331,6 @@ mod tests {
 
     #[test]
     fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
-        let response = Response::linear(8).unwrap();
         let levels = levels(2, 3);
         // In a 7×4 modulator two columns and one row are left of and above it.
         let place = |x: usize, y: usize, p: &Placement| {
@@ -361,28 +356,19 @@ mod tests {
                 shift_y,
                 ..Placement::centred(Layout::Grey)
             };
-            let output = Output::new(&display(7, 4), (2, 3), &response, placement).unwrap();
+            let output = Output::new(&target(7, 4, 8), (2, 3), placement).unwrap();
             for (i, byte) in image(&output, &levels, 0).into_iter().enumerate() {
                 assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
             }
         }
-        assert!(
-            Output::new(
-                &display(2, 4),
-                (2, 3),
-                &response,
-                Placement::centred(Layout::Rgb)
-            )
-            .is_err()
-        );
+        assert!(Output::new(&target(2, 4, 8), (2, 3), Placement::centred(Layout::Rgb)).is_err());
     }
 
     #[test]
     fn few_bits_stand_in_the_upper_ones() {
         for bits in 1..=8 {
-            let response = Response::linear(bits).unwrap();
             let placement = Placement::centred(Layout::Grey);
-            let output = Output::new(&display(1, 1), (1, 1), &response, placement).unwrap();
+            let output = Output::new(&target(1, 1, bits), (1, 1), placement).unwrap();
             let top = ((1u32 << bits) - 1) as u8;
             assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
         }
@@ -390,8 +376,7 @@ mod tests {
 
     #[test]
     fn ten_bits_stand_in_words() {
-        let display = Display::from_toml("width = 2\nheight = 1\nbits = 10").unwrap();
-        let response = Response::linear(8).unwrap();
+        let target = target(2, 1, 10);
         let words = [1023, 5, 512, 6, 256, 7];
         for (layout, expected) in [
             (
@@ -403,19 +388,12 @@ mod tests {
             (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
             (Layout::Rgb, vec![255, 128, 64]),
         ] {
-            let output =
-                Output::new(&display, (1, 2), &response, Placement::centred(layout)).unwrap();
+            let output = Output::new(&target, (1, 2), Placement::centred(layout)).unwrap();
             let mut bytes = vec![0; output.image_bytes()];
             output.write(Levels::Words(&words), 0, &mut bytes).unwrap();
             assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
         }
-        let around = Output::new(
-            &display,
-            (1, 1),
-            &response,
-            Placement::centred(Layout::Grey16),
-        )
-        .unwrap();
+        let around = Output::new(&target, (1, 1), Placement::centred(Layout::Grey16)).unwrap();
         let mut bytes = vec![0; around.image_bytes()];
         around
             .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes)

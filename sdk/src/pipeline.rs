@@ -1,19 +1,17 @@
 //! One RGB-D frame through all stages: midpoint hologram, offset, phase encoding, levels, with the time
 //! of each. Many frames are a session's work.
 
-use crate::display::Display;
-use crate::encode::{Encoding, Scale};
+use crate::brightness::Past;
+use crate::encode::EncoderOptions;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
-use crate::illumination::Illumination;
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
-use crate::slm::Response;
-use crate::wave::zernike::Aberration;
+use crate::target::Target;
 use num_complex::Complex32;
 use std::time::{Duration, Instant};
 
-/// A plan for one method, frame shape and display. Immutable; shared between threads.
+/// A plan for one frame shape, method and target. Immutable; shared between threads.
 pub struct Pipeline {
     method: MethodPlan,
     modulator: Modulator,
@@ -26,8 +24,10 @@ pub struct PipelineScratch {
 }
 
 /// How long each stage of a frame took.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct StageTimes {
+    /// From the camera's format to the method's input, on a GPU.
+    pub input: Duration,
     /// From the frame to the hologram where the method ends.
     pub method: Duration,
     /// From there to the modulator.
@@ -39,7 +39,7 @@ pub struct StageTimes {
 impl StageTimes {
     /// All stages together.
     pub fn total(&self) -> Duration {
-        self.method + self.propagate + self.encode
+        self.input + self.method + self.propagate + self.encode
     }
 }
 
@@ -53,42 +53,21 @@ pub struct FrameReport {
 }
 
 impl Pipeline {
-    /// Plans (`height`, `width`) frames by `method` to `display`, whose response is `response`.
+    /// Plans (H, W) = `shape` frames by `method` to `target`.
     ///
     /// # Errors
-    /// What [`MethodPlan::new`] or [`Modulator::new`] refuses.
+    /// What [`Method`] or the way to the target refuses: a network for another display, an offset or correction that
+    /// moves light farther than can be padded, a parameter out of its range.
     pub fn new(
-        height: usize,
-        width: usize,
+        shape: (usize, usize),
         method: Method,
-        display: &Display,
-        encoding: Encoding,
-        scale: Scale,
-        response: Response,
+        target: &Target,
+        options: &EncoderOptions,
     ) -> Result<Self> {
-        let method = MethodPlan::new(height, width, method, display)?;
+        let method = MethodPlan::new(shape.0, shape.1, method, &target.display)?;
         // The modulator does the rest of the way.
-        let left_m = display.offset_m() - method.z_m();
-        let display = display.clone().with_offset_m(left_m)?;
-        Ok(Pipeline {
-            method,
-            modulator: Modulator::new(height, width, &display, encoding, scale, response)?,
-        })
-    }
-
-    /// [`Modulator::with_illumination`].
-    pub fn with_illumination(mut self, illumination: Illumination) -> Self {
-        self.modulator = self.modulator.with_illumination(illumination);
-        self
-    }
-
-    /// [`Modulator::with_correction`].
-    ///
-    /// # Errors
-    /// As that.
-    pub fn with_correction(mut self, correction: &Aberration) -> Result<Self> {
-        self.modulator = self.modulator.with_correction(correction)?;
-        Ok(self)
+        let modulator = Modulator::from_z(shape, method.z_m(), target, options)?;
+        Ok(Pipeline { method, modulator })
     }
 
     /// (H, W).
@@ -120,8 +99,20 @@ impl Pipeline {
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
+        self.field_after(false, frame, field, scratch)
+    }
+
+    /// [`Self::field`] of a frame that `follows` the one before.
+    pub(crate) fn field_after(
+        &self,
+        follows: bool,
+        frame: &RgbdFrame,
+        field: &mut [Complex32],
+        scratch: &mut PipelineScratch,
+    ) -> Result<(Duration, Duration)> {
         let start = Instant::now();
-        self.method.field(frame, field, &mut scratch.method)?;
+        let of_method = &mut scratch.method;
+        self.method.field_after(follows, frame, field, of_method)?;
         if !self.modulator.keeps_phase() {
             remove_mean_phase(field);
         }
@@ -140,38 +131,31 @@ impl Pipeline {
         levels: &mut [u8],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        self.modulator
-            .modulate(field, levels, &mut scratch.modulator)
+        self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] at another scale than the planned one: a session chooses it for each frame.
-    ///
-    /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
-    pub fn modulate_at(
+    /// [`Modulator::modulate_after`].
+    pub(crate) fn modulate_after(
         &self,
+        past: Option<Past>,
         field: &mut [Complex32],
-        scale: Scale,
         levels: &mut [u8],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
         self.modulator
-            .modulate_at(field, scale, levels, &mut scratch.modulator)
+            .modulate_after(past, field, levels, &mut scratch.modulator)
     }
 
-    /// [`Self::modulate_at`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
-    ///
-    /// # Panics
-    /// If `field` or `phases` has not 3·H·W values.
-    pub fn phases_at(
+    /// [`Modulator::phases_after`].
+    pub(crate) fn phases_after(
         &self,
+        past: Option<Past>,
         field: &mut [Complex32],
-        scale: Scale,
         phases: &mut [f32],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
         self.modulator
-            .phases_at(field, scale, phases, &mut scratch.modulator)
+            .phases_after(past, field, phases, &mut scratch.modulator)
     }
 
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked
@@ -194,6 +178,7 @@ impl Pipeline {
         Ok(FrameReport {
             scale: modulation.scale,
             times: StageTimes {
+                input: Duration::ZERO,
                 method,
                 propagate,
                 encode: modulation.encode,

@@ -5,12 +5,12 @@
 //! as the aperture does and takes the checkerboard of double phase away; the small field is then propagated.
 //! Frequencies over 1/(2·`factor`) cycles a pixel are lost, so fine detail far from focus is blurred less than it would be.
 
-use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::Axis;
 use crate::illumination::Illumination;
 use crate::slm::Response;
-use crate::wave::asm::{Padding, Propagator};
+use crate::target::Target;
+use crate::wave::asm::Propagator;
 use crate::wave::fft::ConvolveScratch;
 use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
@@ -25,6 +25,7 @@ pub struct Preview {
     propagators: Option<[Propagator; 3]>,
     /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
+    response: Response,
     screen: (usize, usize),
     x: Axis,
     y: Axis,
@@ -38,13 +39,13 @@ pub struct PreviewScratch {
 }
 
 impl Preview {
-    /// Plans views at `z_m` of (`height`, `width`) holograms for `display`, as images of `screen` (H, W).
+    /// Plans views at `z_m` of (H, W) holograms for `target`, through what it corrects, as images of `screen` (H, W).
     ///
     /// # Errors
-    /// A hologram under 2 pixels a side, an empty screen, or a z that [`Propagator::new`] refuses.
+    /// A hologram under 2 pixels a side, an empty screen, a z too far away, or a table for another modulator.
     pub fn new(
         (height, width): (usize, usize),
-        display: &Display,
+        target: &Target,
         z_m: f64,
         screen: (usize, usize),
     ) -> Result<Self> {
@@ -59,56 +60,21 @@ impl Preview {
         let factor = ((ratio / 2.0) as usize * 2).clamp(2, 8);
         let factor = factor.min(height.min(width) / 2 * 2);
         let small = (height / factor, width / factor);
-        let distance_m = z_m - display.offset_m();
-        let propagators = match distance_m {
-            0.0 => None,
-            _ => Some(Propagator::for_colours(
-                small.0,
-                small.1,
-                display.pitch_m() * factor as f64,
-                display.wavelengths_m(),
-                distance_m,
-                Padding::Reach,
-            )?),
-        };
+        target.check()?;
+        let distance_m = z_m - target.display.offset_m();
+        let aberration = target.correction.as_ref().map(Aberration::reversed);
+        let illumination = target.illumination.clone();
         Ok(Preview {
             hologram: (height, width),
             small,
             factor,
-            propagators,
-            illumination: None,
+            propagators: target.propagators(small, factor, distance_m, aberration.as_ref())?,
+            illumination: illumination.map(|light| (light, target.modulator())),
+            response: target.response.clone().centred(height, width)?,
             screen,
             x: Axis::new(small.1, 0.0, small.1 as f64, screen.1),
             y: Axis::new(small.0, 0.0, small.0 as f64, screen.0),
         })
-    }
-
-    /// The same of a display whose lasers light it as `illumination` says.
-    pub fn with_illumination(mut self, illumination: Illumination, display: &Display) -> Self {
-        self.illumination = Some((illumination, (display.height(), display.width())));
-        self
-    }
-
-    /// The same through the aberration that `correction` corrects; `display` and `z_m` are those of [`Self::new`].
-    ///
-    /// # Errors
-    /// A z too far away.
-    pub fn with_correction(
-        mut self,
-        correction: &Aberration,
-        display: &Display,
-        z_m: f64,
-    ) -> Result<Self> {
-        self.propagators = Some(Propagator::for_colours_corrected(
-            self.small.0,
-            self.small.1,
-            display.pitch_m() * self.factor as f64,
-            display.wavelengths_m(),
-            z_m - display.offset_m(),
-            &correction.reversed(),
-            display.pitch_m(),
-        )?);
-        Ok(self)
     }
 
     /// Modulator pixels, along each side, whose light is averaged.
@@ -131,19 +97,11 @@ impl Preview {
         }
     }
 
-    /// The view of `levels`, (3, H, W), of a modulator that answers as `response` does, with full light standing for
-    /// amplitude `scale`, into `rgba`: rows of red, green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
+    /// The view of `levels`, (3, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red, green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
     ///
     /// # Panics
-    /// If `levels` or `rgba` has another length than planned, or `response` is made for another shape.
-    pub fn look(
-        &self,
-        levels: &[u8],
-        response: &Response,
-        scale: f32,
-        rgba: &mut [u8],
-        scratch: &mut PreviewScratch,
-    ) {
+    /// If `levels` or `rgba` has another length than planned.
+    pub fn look(&self, levels: &[u8], scale: f32, rgba: &mut [u8], scratch: &mut PreviewScratch) {
         let (height, width) = self.hologram;
         let (small_height, small_width) = self.small;
         let (screen_height, screen_width) = self.screen;
@@ -151,15 +109,15 @@ impl Preview {
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
         let factor = self.factor;
         let light = scale / (factor * factor) as f32;
-        let table = match response {
+        let table = match &self.response {
             Response::PerPixel(table) => Some(table),
             _ => None,
         };
         // Where all pixels answer alike each level is one phase.
         let shown: [Complex32; 256] = match table {
-            None => {
-                std::array::from_fn(|l| Complex32::from_polar(light, response.phase(l as u8, 0)))
-            }
+            None => std::array::from_fn(|l| {
+                Complex32::from_polar(light, self.response.phase(l as u8, 0))
+            }),
             Some(_) => [Complex32::ZERO; 256],
         };
         let planes = levels.chunks_exact(height * width);
@@ -233,7 +191,9 @@ impl Preview {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::encode::{Encoding, Scale};
+    use crate::brightness::Brightness;
+    use crate::display::Display;
+    use crate::encode::{EncoderOptions, Encoding};
     use crate::modulator::Modulator;
     use crate::refocus::{Refocus, phase_only_field};
 
@@ -255,19 +215,15 @@ mod tests {
             .clone()
             .with_offset_m(display.offset_m() - 1e-3)
             .unwrap();
-        let plan = |display: &Display| {
-            let encoding = Encoding::DoublePhase;
-            Modulator::new(
-                height,
-                width,
-                display,
-                encoding,
-                Scale::Max,
-                response.clone(),
-            )
-            .unwrap()
+        let target = Target {
+            response: response.clone(),
+            ..home.into()
         };
-        let home = plan(&home);
+        let options = EncoderOptions {
+            encoding: Encoding::DoublePhase,
+            brightness: Brightness::FrameMax,
+        };
+        let home = Modulator::new(SHAPE, &target, &options).unwrap();
         let mut scratch = home.scratch();
         home.propagate(&mut field, &mut scratch);
         let mut levels = vec![0; 3 * height * width];
@@ -282,16 +238,17 @@ mod tests {
         for offset_m in [0.0, 3e-3] {
             let display = Display::default().with_offset_m(offset_m).unwrap();
             let (levels, scale) = hologram(&display, &response);
+            let target = Target::from(&display);
             let mut shown = vec![Complex32::ZERO; levels.len()];
             phase_only_field(&levels, &response, scale, &mut shown);
             for z_m in [1e-3, -2e-3, offset_m] {
                 let full = Refocus::new(height, width, &display, &[z_m], Some(1.0)).unwrap();
                 let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
                 for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
-                    let plan = Preview::new(SHAPE, &display, z_m, screen).unwrap();
+                    let plan = Preview::new(SHAPE, &target, z_m, screen).unwrap();
                     assert_eq!(plan.factor(), factor);
                     let mut rgba = vec![0; 4 * screen.0 * screen.1];
-                    plan.look(&levels, &response, scale, &mut rgba, &mut plan.scratch());
+                    plan.look(&levels, scale, &mut rgba, &mut plan.scratch());
                     let mut squares = 0.0;
                     for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
                         assert_eq!(pixel[3], 255);
@@ -315,13 +272,13 @@ mod tests {
 
     #[test]
     fn impossible_views_are_refused() {
-        let display = Display::default();
-        assert!(Preview::new((1, 50), &display, 0.0, (10, 10)).is_err());
-        assert!(Preview::new(SHAPE, &display, 0.0, (0, 10)).is_err());
-        assert!(Preview::new(SHAPE, &display, f64::NAN, (10, 10)).is_err());
+        let target = Target::default();
+        assert!(Preview::new((1, 50), &target, 0.0, (10, 10)).is_err());
+        assert!(Preview::new(SHAPE, &target, 0.0, (0, 10)).is_err());
+        assert!(Preview::new(SHAPE, &target, f64::NAN, (10, 10)).is_err());
         // A screen larger than the hologram has a view too.
         assert_eq!(
-            Preview::new((5, 7), &display, 1e-3, (300, 200))
+            Preview::new((5, 7), &target, 1e-3, (300, 200))
                 .unwrap()
                 .factor(),
             2

@@ -22,8 +22,7 @@ mod queue;
 mod stages;
 mod statistics;
 
-pub use crate::brightness::Brightness;
-pub use crate::depth::stream::DepthOptions;
+use crate::depth::stream::DepthOptions;
 pub use event::{DropReason, Event};
 pub use hologram::Hologram;
 #[cfg(feature = "gpu")]
@@ -31,14 +30,11 @@ pub use on_gpu::GpuOptions;
 pub use quality::{Backend, Quality, QualityChange, QualityReason, Rung, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
-use crate::display::Display;
-use crate::encode::Encoding;
+use crate::depth::camera::CameraFrame;
+use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
-use crate::frame::CameraFrame;
-use crate::illumination::Illumination;
 use crate::method::Method;
-use crate::slm::Response;
-use crate::wave::zernike::Aberration;
+use crate::target::Target;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
 use queue::{Gate, Queue};
@@ -52,8 +48,8 @@ use std::time::Instant;
 #[derive(Clone)]
 #[non_exhaustive]
 pub struct SessionOptions {
-    /// The display.
-    pub display: Display,
+    /// What holograms are for.
+    pub target: Target,
     /// Qualities, the best first.
     pub ladder: Vec<Rung>,
     /// Whether the session may step on the ladder by itself.
@@ -61,16 +57,8 @@ pub struct SessionOptions {
     /// Frames a second that are aimed at: a live session drops frames that come sooner, and an adaptive one steps down
     /// where it cannot hold it. None takes frames as they come and never steps.
     pub target_rate_hz: Option<f64>,
-    /// How the field becomes phases.
-    pub encoding: Encoding,
-    /// What the modulator answers to a phase. A display of over 8 bits answers linearly.
-    pub response: Response,
-    /// The laser's light over the modulator, where it is calibrated.
-    pub illumination: Option<Illumination>,
-    /// What corrects the display's aberration, where it is calibrated and one for all depths.
-    pub correction: Option<Aberration>,
-    /// Which amplitude full light stands for.
-    pub brightness: Brightness,
+    /// How fields become levels.
+    pub encoder: EncoderOptions,
     /// What becomes of depth.
     pub depth: DepthOptions,
     /// Where frames are computed, unless their rung says it.
@@ -83,43 +71,32 @@ pub struct SessionOptions {
 }
 
 impl SessionOptions {
-    /// Holograms of `display`'s resolution by `method`: AA-DPM, a linear response of the display's bits, steady
-    /// brightness, near and far by percentiles, no target rate.
-    ///
-    /// # Errors
-    /// None for a display that could be made.
-    pub fn new(display: Display, method: Method) -> Result<Self> {
-        let rung = Rung {
-            method,
-            height: display.height(),
-            width: display.width(),
-            backend: None,
-        };
-        Ok(SessionOptions {
-            ladder: vec![rung],
+    /// Holograms of the modulator's resolution by `method`: AA-DPM, steady brightness, near and far by percentiles, no
+    /// target rate.
+    pub fn new(target: impl Into<Target>, method: Method) -> Self {
+        let target = target.into();
+        let (height, width) = target.modulator();
+        SessionOptions {
+            ladder: vec![Rung {
+                method,
+                height,
+                width,
+                backend: None,
+            }],
             quality: Quality::Adaptive,
             target_rate_hz: None,
-            encoding: Encoding::ANTI_ALIAS,
-            // Of levels with more bits the upper ones are what is looked at.
-            response: Response::linear(display.bits().min(8))?,
-            illumination: None,
-            correction: None,
-            brightness: Brightness::default(),
+            encoder: EncoderOptions::default(),
             depth: DepthOptions::default(),
             backend: Backend::Cpu,
             #[cfg(feature = "gpu")]
             gpu: GpuOptions::default(),
             threads: None,
-            display,
-        })
+            target,
+        }
     }
 
     fn check(&self) -> Result<()> {
-        quality::check(
-            &self.ladder,
-            self.quality,
-            (self.display.height(), self.display.width()),
-        )?;
+        quality::check(&self.ladder, self.quality, self.target.modulator())?;
         if let Some(rate) = self.target_rate_hz
             && !(rate.is_finite() && (0.01..=1000.0).contains(&rate))
         {
@@ -127,13 +104,8 @@ impl SessionOptions {
                 "a target rate of {rate} frames a second cannot be aimed at; it must lie in 0.01..=1000"
             )));
         }
-        if self.display.bits() > 8 && self.response != Response::linear(8)? {
-            return Err(Error::Plan(format!(
-                "a display of {} bits answers linearly; a table is for one of 8 bits",
-                self.display.bits()
-            )));
-        }
-        self.brightness.check()?;
+        self.target.check()?;
+        self.encoder.brightness.check()?;
         self.depth.check()
     }
 }
@@ -184,16 +156,15 @@ enum Mode {
 /// Frames in, holograms out. Every method may be called from any thread, at any moment.
 ///
 /// ```no_run
-/// use phasefront::frame::{CameraFrame, ColourFormat, ColourImage, Plane};
-/// use phasefront::depth::image::{DepthFormat, DepthImage};
-/// use phasefront::session::{Event, RunningMode, SessionOptions};
-/// use phasefront::{Display, Method, Network, Session};
+/// use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+/// use phasefront::session::{Event, RunningMode};
+/// use phasefront::{Display, Method, Network, Session, SessionOptions};
 /// use std::sync::Arc;
 ///
 /// # fn camera() -> (u64, Vec<u8>, Vec<u8>) { unimplemented!() }
 /// let network = Network::from_onnx(&std::fs::read("rgbd-8-int8.onnx").expect("a network"))?;
 /// let method = Method::Network(Arc::new(network));
-/// let options = SessionOptions::new(Display::default(), method)?;
+/// let options = SessionOptions::new(Display::default(), method);
 /// let session = Session::new(options, RunningMode::Live(Box::new(|event| match event {
 ///     Event::Hologram(hologram) => println!("{} bytes", hologram.levels().len()),
 ///     other => println!("{other:?}"),
@@ -239,7 +210,7 @@ impl Shared {
         let mut recent = lock(&self.recent);
         recent.push(Instant::now(), made.hologram.times());
         recent.rung = stages.rung();
-        if let Some(backend) = stages.news() {
+        if let Some(backend) = stages.new_report() {
             recent.backend = backend;
         }
         Ok(made)
@@ -260,7 +231,7 @@ impl Session {
         };
         let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
         let mut stages = Stages::new(options)?;
-        let recent = Recent::new(stages.news().unwrap_or_default(), stages.rung());
+        let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.rung());
         let shared = Arc::new(Shared {
             stages: Mutex::new(stages),
             control: Mutex::new(control),

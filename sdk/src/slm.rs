@@ -54,7 +54,7 @@ impl Response {
                 (sum + step, n + 1)
             });
             if n > 0 {
-                used[shown as usize] = Some(crate::encode::double_phase::wrap(sum.arg()));
+                used[shown as usize] = Some(wrap(sum.arg()));
             }
         }
         let phase = std::array::from_fn(|l| {
@@ -144,6 +144,13 @@ impl Response {
 
 /// The linear response of a modulator of `bits`, 1 to 16, whose levels do not fit bytes. Allocates nothing.
 ///
+/// `phase` brought to \[0, 2π).
+pub fn wrap(phase: f32) -> f32 {
+    let wrapped = phase.rem_euclid(TAU);
+    // rem_euclid of a tiny negative number rounds up to 2π itself.
+    if wrapped < TAU { wrapped } else { 0.0 }
+}
+
 /// # Panics
 /// If the lengths differ.
 pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {

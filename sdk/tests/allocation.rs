@@ -6,17 +6,19 @@ mod network_models;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
-use phasefront::depth::refine::Refiner;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::frame::{ColourFormat, ColourImage, ColourPlan, Crop, Orientation, Plane};
-use phasefront::method::MethodPlan;
-use phasefront::preview::Preview;
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::{self, PerPixel};
-use phasefront::wave::aperture::Aperture;
-use phasefront::wave::asm::{Padding, Propagator};
-use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Method, Modulator, Network, RgbdFrame, Sweep};
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront::target::{Aberration, Illumination, PerPixel, Response};
+use phasefront::unstable::depth::refine::Refiner;
+use phasefront::unstable::frame::{ColourPlan, Crop};
+use phasefront::unstable::method::MethodPlan;
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::preview::Preview;
+use phasefront::unstable::slm::per_pixel;
+use phasefront::unstable::wave::{
+    aperture::Aperture,
+    asm::{Padding, Propagator},
+};
+use phasefront::{Display, Encoding, Method, Network, RgbdFrame, Sweep, Target};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -84,12 +86,11 @@ fn camera_frames_and_previews() {
             .unwrap()
     };
     assert_eq!(count(refine), 0);
-    let plan = Preview::new((h, w), &Display::default(), 2e-3, (20, 20)).unwrap();
+    let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
     let mut scratch = plan.scratch();
-    let response = Response::linear(8).unwrap();
     let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
     assert_eq!(
-        count(|| plan.look(&levels, &response, 1.0, &mut rgba, &mut scratch)),
+        count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)),
         0
     );
 }
@@ -135,9 +136,8 @@ fn hot_calls_allocate_nothing() {
                 Encoding::BAND_LIMIT,
                 Encoding::Deep(prefilter.clone()),
             ] {
-                let response = Response::linear(8).unwrap();
                 let plan =
-                    Modulator::new(h, w, &display, encoding.clone(), Scale::Max, response).unwrap();
+                    Modulator::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
@@ -152,13 +152,13 @@ fn hot_calls_allocate_nothing() {
             let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
             let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
             let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
-            let response = Response::PerPixel(table.into());
-            let encoding = Encoding::DoublePhase;
-            let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
-                .unwrap()
-                .with_illumination(laser)
-                .with_correction(&correction)
-                .unwrap();
+            let target = Target {
+                display: display.clone().with_size(h, w).unwrap(),
+                response: Response::PerPixel(table.into()),
+                illumination: Some(laser),
+                correction: Some(correction),
+            };
+            let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
             let mut scratch = plan.scratch();
             let frame = || {
                 plan.propagate(&mut field, &mut scratch);

@@ -4,7 +4,8 @@
 mod camera;
 
 use camera::{Noise, colour_formats};
-use phasefront::frame::{ColourPlan, Orientation, Rotation, reference};
+use phasefront::input::{Orientation, Rotation};
+use phasefront::unstable::frame::{ColourPlan, reference};
 use rand::{RngExt, SeedableRng};
 
 fn orientations() -> impl Iterator<Item = Orientation> {

@@ -7,18 +7,16 @@ mod network_models;
 use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
 use num_complex::Complex32;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::frame::{
+use phasefront::input::{
     ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
 };
-use phasefront::gpu::{
+use phasefront::target::{Aberration, Illumination, Response};
+use phasefront::unstable::gpu::{
     self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions,
     Float, Frame, Fusion, Job, NetworkPlan,
 };
-use phasefront::network::{Isa, reference};
-use phasefront::slm::Response;
-use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Method, Network, RgbdFrame, Sweep};
+use phasefront::unstable::network::{Isa, reference};
+use phasefront::{Display, Encoding, Method, Network, RgbdFrame, Sweep};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.

@@ -6,15 +6,11 @@
 mod camera;
 
 use camera::{Scene, colour_formats, depth, frame, options};
-use phasefront::depth::image::DepthFormat;
-use phasefront::frame::{CameraFrame, Orientation, Rotation};
-use phasefront::gpu::{ChainOptions, DeviceOptions, Float};
-use phasefront::session::{
-    Backend, Brightness, DropReason, Event, Quality, RunningMode, SessionOptions,
-};
-use phasefront::slm::Response;
-use phasefront::sweep::Sweep;
-use phasefront::{Display, Error, Method, Network, Session};
+use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
+use phasefront::session::{Backend, DropReason, Event, Quality, RunningMode};
+use phasefront::target::Response;
+use phasefront::unstable::gpu::{ChainOptions, DeviceOptions, Float};
+use phasefront::{Brightness, Display, Error, Method, Network, Session, SessionOptions, Sweep};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
@@ -29,7 +25,7 @@ fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
             name,
             programs: None,
         };
-        if phasefront::gpu::Device::open(&device).is_ok() {
+        if phasefront::unstable::gpu::Device::open(&device).is_ok() {
             let mut options = options;
             options.backend = Backend::Gpu;
             options.gpu.device = device;
@@ -329,7 +325,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
             let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
             half.ladder[0].method = Method::Network(Arc::new(network));
             half.gpu.chain.float = Float::F16;
-            let device = phasefront::gpu::Device::open(&half.gpu.device).unwrap();
+            let device = phasefront::unstable::gpu::Device::open(&half.gpu.device).unwrap();
             if !device.has_half() {
                 cases.push((half, "shader-f16"));
             }

@@ -5,7 +5,8 @@ mod network_models;
 
 use network_models::{Model, frame, int, ints};
 use num_complex::Complex32;
-use phasefront::network::{Head, InputKind, Isa, Network, Precision, Source, reference};
+use phasefront::Network;
+use phasefront::unstable::network::{Head, InputKind, Isa, Precision, Source, reference};
 use prost::Message;
 use tract_onnx::pb::{ModelProto, NodeProto};
 

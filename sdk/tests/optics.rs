@@ -7,15 +7,20 @@ mod reference;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;
-use phasefront::encode::anti_alias::AntiAlias;
-use phasefront::encode::{Encoder, Encoding, Scale, double_phase};
-use phasefront::refocus::{Refocus, phase_only_field};
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::{self, PerPixel};
-use phasefront::wave::aperture::Aperture;
-use phasefront::wave::asm::{self, Padding, Propagator};
-use phasefront::wave::zernike::Aberration;
-use phasefront::{Display, Illumination, Method, Modulator, Network, Pipeline, RgbdFrame, wave};
+use phasefront::target::{Aberration, Illumination, PerPixel, Response};
+use phasefront::unstable::encode::{Encoder, anti_alias::AntiAlias, double_phase};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::slm::per_pixel;
+use phasefront::unstable::wave;
+use phasefront::unstable::wave::{
+    aperture::Aperture,
+    asm::{self, Padding, Propagator},
+};
+use phasefront::{
+    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, Refocus, RgbdFrame,
+    Target,
+};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -35,6 +40,18 @@ fn propagated(
     let mut out = plane.to_vec();
     plan.propagate(&mut out, &mut plan.scratch());
     out
+}
+
+/// Each frame by its largest amplitude.
+fn largest(encoding: Encoding) -> EncoderOptions {
+    EncoderOptions {
+        encoding,
+        brightness: Brightness::FrameMax,
+    }
+}
+
+fn double_phase_encoder(shape: (usize, usize)) -> Encoder {
+    Encoder::new(shape, &Target::default(), &Encoding::DoublePhase).unwrap()
 }
 
 fn energy(plane: &[Complex32]) -> f64 {
@@ -198,8 +215,8 @@ fn double_phase_agrees_with_equation_7() {
         )
         .unwrap();
         let brightest = wide.iter().map(|v| v.norm()).fold(0.0, f64::max);
-        for (scale, number) in [(Scale::Max, brightest), (Scale::Fixed(0.8), 0.8)] {
-            let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+        for (scale, number) in [(None, brightest), (Some(0.8), 0.8)] {
+            let encoder = double_phase_encoder((h, w));
             let mut phase = vec![0.0; 3 * h * w];
             let used = encoder.encode(&mut field, scale, &mut phase, &mut encoder.scratch());
             assert!((f64::from(used) - number).abs() < 1e-6);
@@ -239,10 +256,10 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         Encoding::ANTI_ALIAS,
         Encoding::BAND_LIMIT,
     ] {
-        let encoder = Encoder::new(h, w, encoding.clone()).unwrap();
+        let encoder = Encoder::new((h, w), &Target::default(), &encoding).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
-        let scale = encoder.encode(&mut given, Scale::Max, &mut phase, &mut encoder.scratch());
+        let scale = encoder.encode(&mut given, None, &mut phase, &mut encoder.scratch());
         assert!(
             phase
                 .iter()
@@ -317,10 +334,9 @@ fn deep_encoding(input: &'static str) {
     let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
     let display = Display::default().with_offset_m(6e-3).unwrap();
     let (h, w) = (40, 33);
-    let response = || Response::linear(8).unwrap();
     let plan = |display: &Display, network: &Arc<Network>| {
-        let encoding = Encoding::Deep(network.clone());
-        Modulator::new(h, w, display, encoding, Scale::Max, response())
+        let options = largest(Encoding::Deep(network.clone()));
+        Modulator::new((h, w), &display.into(), &options)
     };
     let modulator = plan(&display, &network).unwrap();
     assert!(modulator.keeps_phase());
@@ -334,15 +350,10 @@ fn deep_encoding(input: &'static str) {
     }
     let filter = network.filter_plan(h, w).unwrap();
     filter.filter(&mut filtered, &mut filter.scratch());
-    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let encoder = double_phase_encoder((h, w));
     let mut expected = vec![0; 3 * h * w];
-    let scale = encoder.encode_levels(
-        &mut filtered,
-        Scale::Max,
-        &response(),
-        &mut expected,
-        &mut encoder.scratch(),
-    );
+    let mut scratch = encoder.scratch();
+    let scale = encoder.encode_levels(&mut filtered, None, &mut expected, &mut scratch);
     let mut levels = vec![0; 3 * h * w];
     let modulation = modulator.modulate(&mut field, &mut levels, &mut modulator.scratch());
     assert_eq!((modulation.scale, levels), (scale, expected));
@@ -366,12 +377,11 @@ fn a_correction_is_part_of_the_offset() {
     for (offset_m, shape) in [(0.0, (61, 47)), (4e-3, (40, 72))] {
         let display = Display::default().with_offset_m(offset_m).unwrap();
         let (h, w) = shape;
-        let response = Response::linear(8).unwrap();
-        let encoding = Encoding::DoublePhase;
-        let plan = Modulator::new(h, w, &display, encoding, Scale::Max, response)
-            .unwrap()
-            .with_correction(&a)
-            .unwrap();
+        let target = Target {
+            correction: Some(a),
+            ..Target::from(&display)
+        };
+        let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
         let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
         let given = field.clone();
         plan.propagate(&mut field, &mut plan.scratch());
@@ -426,11 +436,15 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
     });
     let laser = Illumination::new(beam.view()).unwrap();
-    let response = || Response::linear(8).unwrap();
-    let scale = Scale::Fixed(2.5);
-    let plan = Modulator::new(h, w, &display, Encoding::ANTI_ALIAS, scale, response())
-        .unwrap()
-        .with_illumination(laser.clone());
+    let target = Target {
+        illumination: Some(laser.clone()),
+        ..display.into()
+    };
+    let options = EncoderOptions {
+        encoding: Encoding::ANTI_ALIAS,
+        brightness: Brightness::Fixed(2.5),
+    };
+    let plan = Modulator::new((h, w), &target, &options).unwrap();
     let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
     let mut filtered = field.clone();
     let mut levels = vec![0; 3 * h * w];
@@ -440,12 +454,11 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         filter.filter(plane, w);
     }
     laser.divide(&mut filtered, (h, w), (50, 60));
-    let encoder = Encoder::new(h, w, Encoding::DoublePhase).unwrap();
+    let encoder = double_phase_encoder((h, w));
     let mut expected = vec![0; 3 * h * w];
     encoder.encode_levels(
         &mut filtered,
-        scale,
-        &response(),
+        Some(2.5),
         &mut expected,
         &mut encoder.scratch(),
     );
@@ -456,20 +469,11 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
 fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
     let network = Arc::new(Network::from_onnx(&Model::int8(8, 24).bytes()).unwrap());
     let prefilter = Arc::new(Network::from_onnx(&Model::prefilter("6").bytes()).unwrap());
-    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let target = Target::from(Display::default().with_offset_m(6e-3).unwrap());
     let pipeline = |height, width| {
         let method = Method::trained(network.clone());
-        let encoding = Encoding::Deep(prefilter.clone());
-        let response = Response::linear(8).unwrap();
-        Pipeline::new(
-            height,
-            width,
-            method,
-            &display,
-            encoding,
-            Scale::Max,
-            response,
-        )
+        let options = largest(Encoding::Deep(prefilter.clone()));
+        Pipeline::new((height, width), method, &target, &options)
     };
     for (h, w) in [(1, 1), (7, 5000), (5000, 7)] {
         let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
@@ -519,11 +523,12 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
             1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
         });
         let laser = Illumination::new(beam.view()).unwrap();
-        let (rows, columns) = per_pixel::nodes(h, w, 16);
+        let (rows, columns) = per_pixel::nodes(modulator.0, modulator.1, 16);
         let knots =
             (0..3 * rows * columns * 9).map(|i| (i % 9) as f32 * (20.0 + (i / 9 % 11) as f32));
         let turns = vec![6.0; 3 * rows * columns];
-        let table = PerPixel::new(h, w, 16, 8, &knots.collect::<Vec<_>>(), &turns).unwrap();
+        let knots = knots.collect::<Vec<_>>();
+        let table = PerPixel::new(modulator.0, modulator.1, 16, 8, &knots, &turns).unwrap();
         let given: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 70 + c)).collect();
         for (encoding, blur) in [
             (Encoding::DoublePhase, None),
@@ -537,18 +542,17 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
             ),
         ] {
             for (light, scale, response) in [
-                (None, Scale::Max, Response::linear(8).unwrap()),
-                (
-                    Some(&laser),
-                    Scale::Max,
-                    Response::PerPixel(table.clone().into()),
-                ),
-                (
-                    Some(&laser),
-                    Scale::Fixed(1.5),
-                    Response::linear(5).unwrap(),
-                ),
+                (None, None, Response::linear(8).unwrap()),
+                (Some(&laser), None, Response::PerPixel(table.clone().into())),
+                (Some(&laser), Some(1.5), Response::linear(5).unwrap()),
             ] {
+                let display = Display::default().with_size(modulator.0, modulator.1);
+                let target = Target {
+                    response: response.clone(),
+                    illumination: light.cloned(),
+                    ..display.unwrap().into()
+                };
+                let response = response.centred(h, w).unwrap();
                 let mut field = given.clone();
                 if let Some((sigma, taps)) = blur {
                     let filter = AntiAlias::new(sigma, taps).unwrap();
@@ -564,8 +568,8 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                 }
                 let largest = field.iter().map(Complex32::norm_sqr).fold(0.0, f32::max);
                 let used = match scale {
-                    Scale::Max => largest.sqrt(),
-                    Scale::Fixed(scale) => scale,
+                    None => largest.sqrt(),
+                    Some(scale) => scale,
                 };
                 let mut phases = vec![0.0; field.len()];
                 for (row, out) in phases.chunks_exact_mut(w).enumerate() {
@@ -579,19 +583,11 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                 for threads in [1, 3] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                     pool.build().unwrap().install(|| {
-                        let mut encoder = Encoder::new(h, w, encoding.clone()).unwrap();
-                        if let Some(light) = light {
-                            encoder = encoder.with_illumination(light.clone(), modulator);
-                        }
+                        let encoder = Encoder::new((h, w), &target, &encoding).unwrap();
                         let mut scratch = encoder.scratch();
                         let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
-                        let scaled = encoder.encode_levels(
-                            &mut field,
-                            scale,
-                            &response,
-                            &mut got,
-                            &mut scratch,
-                        );
+                        let scaled =
+                            encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);
                         assert!(
                             (scaled, &got) == (used, &levels),
                             "{w}×{h} {encoding:?} {scale:?}"

@@ -4,17 +4,14 @@
 mod camera;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
-use phasefront::depth::align::{Cameras, Intrinsics};
-use phasefront::depth::image::DepthFormat;
-use phasefront::frame::{
-    Alignment, CameraFrame, ColourFormat, ColourImage, Orientation, Plane, Rotation,
+use phasefront::input::{
+    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics,
+    Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{
-    Brightness, DropReason, Event, Quality, RunningMode, SessionOptions, Submission, Thermal,
-};
-use phasefront::slm::Response;
-use phasefront::{Display, Error, Session};
+use phasefront::session::{DropReason, Event, Quality, RunningMode, Submission, Thermal};
+use phasefront::target::Response;
+use phasefront::{Brightness, Display, Error, Session, SessionOptions, Target};
 use std::sync::mpsc;
 
 const W: usize = 64;
@@ -138,8 +135,9 @@ fn a_display_of_ten_bits_gets_words() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let eight = image_session().process(&frame(1, &scene, &metres)).unwrap();
     let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 2\nbits = 10").unwrap();
-    let options = SessionOptions::new(display.clone(), options(W, H).ladder[0].method.clone());
-    let mut options = options.unwrap();
+    let target = Target::from(display);
+    let method = options(W, H).ladder[0].method.clone();
+    let mut options = SessionOptions::new(target.clone(), method);
     let session = Session::new(options.clone(), RunningMode::Image).unwrap();
     let ten = session.process(&frame(1, &scene, &metres)).unwrap();
     assert!(eight.words().is_none());
@@ -150,20 +148,14 @@ fn a_display_of_ten_bits_gets_words() {
         let apart = (i32::from(*word) - 4 * i32::from(*level)).rem_euclid(1024);
         assert!(apart <= 3 || apart >= 1021, "{word} {level}");
     }
-    let response = Response::linear(8).unwrap();
-    let output = Output::new(
-        &display,
-        (H, W),
-        &response,
-        Placement::centred(Layout::Grey16),
-    );
+    let output = Output::new(&target, (H, W), Placement::centred(Layout::Grey16));
     let mut bytes = vec![0; 2 * W * H];
     output
         .unwrap()
         .write(ten.output_levels(), 1, &mut bytes)
         .unwrap();
     assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
-    options.response = Response::lut([0; 256]);
+    options.target.response = Response::lut([0; 256]);
     assert!(Session::new(options, RunningMode::Image).is_err());
 }
 
@@ -456,7 +448,7 @@ fn a_listener_may_panic_and_may_close() {
 
 #[test]
 fn options_that_cannot_be_meant_are_named() {
-    let refuse = |change: &dyn Fn(&mut phasefront::session::SessionOptions), word: &str| {
+    let refuse = |change: &dyn Fn(&mut SessionOptions), word: &str| {
         let mut options = options(W, H);
         change(&mut options);
         let refused = Session::new(options, RunningMode::Image).map(|_| ());
@@ -467,7 +459,10 @@ fn options_that_cannot_be_meant_are_named() {
     refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
     refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
-    refuse(&|o| o.brightness = Brightness::Fixed(0.0), "full light");
+    refuse(
+        &|o| o.encoder.brightness = Brightness::Fixed(0.0),
+        "full light",
+    );
     refuse(&|o| o.depth.least_confidence = 2.0, "confidence");
     let session = image_session();
     assert!(session.set_quality(Quality::Fixed(7)).is_err());

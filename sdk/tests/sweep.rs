@@ -6,9 +6,9 @@ mod network_models;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
-use phasefront::method::MethodPlan;
-use phasefront::network::{self, Isa};
-use phasefront::sweep::{SweepPlan, hidden, reference};
+use phasefront::unstable::method::MethodPlan;
+use phasefront::unstable::network::{self, Isa};
+use phasefront::unstable::sweep::{SweepPlan, hidden, reference};
 use phasefront::{Display, Method, Network, RgbdFrame, Sweep};
 use std::sync::Arc;
 

@@ -3,15 +3,12 @@
 
 use super::{median, named};
 use crate::error::Result;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::frame::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
-use phasefront::gpu::{
-    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, Job,
-    Pipeline, StageTimes, probe,
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
+use phasefront::unstable::gpu::{
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame,
+    GpuPipeline, Job, probe,
 };
-use phasefront::slm::Response;
-use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method};
+use phasefront::{Brightness, Method, StageTimes, Target};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -56,7 +53,7 @@ pub struct GpuRow {
 }
 
 /// Measures `method` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not
-/// counted; with `table` each frame once more through it.
+/// counted; where the modulator has a table for each pixel, each frame once more through it.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
@@ -64,21 +61,13 @@ pub fn measure(
     method: &Method,
     (width, height): (usize, usize),
     device: &Arc<Device>,
-    display: &Display,
+    target: &Target,
     chain: ChainOptions,
-    table: Option<&Arc<PerPixel>>,
     budget: Duration,
 ) -> Result<GpuRow> {
     let (name, network) = named(method);
-    let mut job = Job::new(
-        height,
-        width,
-        method.clone(),
-        display,
-        Encoding::ANTI_ALIAS,
-        Scale::Fixed(1.0),
-        Response::linear(display.bits())?,
-    );
+    let mut job = Job::new((height, width), method.clone(), &target.display);
+    job.encoder.brightness = Brightness::Fixed(1.0);
     job.chain = chain;
     probe(device, &job)?;
     // As phones give frames: luma, chroma at half the resolution, depth of 16 bits.
@@ -90,11 +79,11 @@ pub fn measure(
         orientation: Orientation::default(),
     };
     job.depth = Depth::U16;
-    let mut pipeline = Pipeline::new(device, &job)?;
-    let mut by_table = (table)
-        .map(|table| {
-            job.response = Response::PerPixel(table.clone());
-            Pipeline::new(device, &job)
+    let mut pipeline = GpuPipeline::new(device, &job)?;
+    let mut by_table = (target.response.shape())
+        .map(|_| {
+            job.target = target.clone();
+            GpuPipeline::new(device, &job)
         })
         .transpose()?;
     let byte = |i: usize| (i * 7 % 256) as u8;

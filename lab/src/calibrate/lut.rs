@@ -14,7 +14,7 @@ use super::photograph::{Photograph, SATURATED_SHARE};
 use super::surface;
 use crate::error::{Error, Result};
 use ndarray::Array2;
-use phasefront::slm::per_pixel::PerPixel;
+use phasefront::target::PerPixel;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::fs::File;

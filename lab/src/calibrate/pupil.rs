@@ -7,8 +7,10 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
-use phasefront::wave::fft::{Fft2, Scratch};
-use phasefront::wave::zernike::{self, Coefficients};
+use phasefront::unstable::wave::{
+    fft::{Fft2, Scratch},
+    zernike::{self, Coefficients},
+};
 use rayon::prelude::*;
 
 /// Samples across the pupil.
@@ -218,7 +220,7 @@ mod tests {
                     false => num_complex::Complex64::ZERO,
                 }
             });
-            let light = phasefront::wave::reference::dft(&plane, -1.0);
+            let light = phasefront::unstable::wave::reference::dft(&plane, -1.0);
             light.iter().map(|v| v.norm_sqr().powi(2)).sum::<f64>()
         };
         let most = direct(&[0.0; TERMS]);

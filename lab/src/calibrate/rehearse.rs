@@ -12,15 +12,15 @@ use super::spot::{self, MIDDLE, Search, TRIALS};
 use super::table::{self, Entry};
 use super::{COLOURS, laser};
 use crate::error::{Error, Result};
-use crate::files::{self, DisplayFile};
+use crate::files;
 use crate::scene::dice::Dice;
 use crate::simulated_display::SimulatedDisplay;
 use ndarray::{Array2, Array3, Axis, s, stack};
 use num_complex::Complex32;
-use phasefront::Display;
-use phasefront::encode::{Encoding, Scale};
-use phasefront::slm::Response;
-use phasefront::wave::zernike::{Aberration, Coefficients};
+use phasefront::target::{Aberration, Response};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::wave::zernike::Coefficients;
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -149,6 +149,10 @@ pub fn run(
     let wavelengths = display.wavelengths_m();
     let truth = wavelengths.map(|lambda| green.map(|a| a * wavelengths[1] / lambda));
     let aberrated = simulated.clone().with_aberration(Aberration::new(truth)?);
+    let target = Target {
+        response: calibrated.clone(),
+        ..Target::from(display)
+    };
     let mut found = [[0.0; 5]; 3];
     let mut tried = Vec::new();
     let mut spots = Vec::new();
@@ -158,7 +162,7 @@ pub fn run(
         let before_lens = aberrated.clone().with_camera(camera);
         let shoot = |a: &Coefficients, shot: usize| -> Result<Photograph> {
             let z_m = rehearsal.spot_z_m;
-            let levels = spot::levels(display, &calibrated, colour, z_m, MIDDLE, a)?;
+            let levels = spot::levels(&target, colour, z_m, MIDDLE, a)?;
             before_lens.photograph(levels.view(), colour, z_m, (1 << 21) + shot as u64)
         };
         let mut search = Search::from([0.0; 5]);
@@ -212,7 +216,7 @@ pub fn run(
     write_pair(&folder.join("spot.png"), &cropped)?;
     draw_laser(folder, &simulated, &laser_map)?;
     let file = files::read_display(&folder.join("display.toml"))?;
-    let bare = DisplayFile::from(display.clone());
+    let bare = Target::from(display);
     let both = |f: &dyn Fn(&Response, usize) -> Result<f64>| -> Result<BeforeAfter> {
         let mut all = BeforeAfter::default();
         for colour in 0..3 {
@@ -226,7 +230,7 @@ pub fn run(
     let mut unevenness = BeforeAfter::default();
     for colour in 0..3 {
         unevenness.before[colour] = flat_grey(&simulated, &bare, colour)?;
-        unevenness.after[colour] = flat_grey(&simulated, &file, colour)?;
+        unevenness.after[colour] = flat_grey(&simulated, &file.target, colour)?;
     }
     black_pictures(&simulated, &factory, &calibrated, folder)?;
     for k in [0usize, 128] {
@@ -362,10 +366,14 @@ fn black_pictures(
 }
 
 /// How much the light of a flat half grey differs over the frame, away from the rim: its standard deviation over its mean.
-fn flat_grey(simulated: &SimulatedDisplay, file: &DisplayFile, colour: usize) -> Result<f64> {
+fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Result<f64> {
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
     // Where the laser is weakest the modulator must be able to make up for it.
-    let plan = file.modulator(shape, Encoding::DoublePhase, Scale::Fixed(1.0))?;
+    let options = EncoderOptions {
+        encoding: Encoding::DoublePhase,
+        brightness: Brightness::Fixed(1.0),
+    };
+    let plan = Modulator::new(shape, target, &options)?;
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((3, h, w));
     plan.modulate(

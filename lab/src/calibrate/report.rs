@@ -6,7 +6,7 @@ use super::curve::{self, Basis, LEVELS};
 use super::lut::{self, Curves, Errors};
 use crate::error::Result;
 use ndarray::Array2;
-use phasefront::slm::per_pixel::PerPixel;
+use phasefront::target::PerPixel;
 use serde::Serialize;
 use std::f32::consts::TAU;
 use std::path::Path;

@@ -12,10 +12,9 @@ use crate::error::{Error, Result};
 use crate::scene::dice::Dice;
 use ndarray::Array2;
 use num_complex::Complex32;
-use phasefront::Display;
-use phasefront::encode::double_phase;
-use phasefront::slm::Response;
-use phasefront::wave::zernike::{self, Coefficients, TERMS};
+use phasefront::unstable::encode::double_phase;
+use phasefront::unstable::wave::zernike::{self, Coefficients, TERMS};
+use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
 
 /// Photographs of a round.
@@ -115,28 +114,20 @@ fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
 /// The middle of the frame, as a place of a spot.
 pub const MIDDLE: [f64; 2] = [0.5, 0.5];
 
-/// The levels, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by the correction `a`, through
-/// `response`: the sub-hologram around there, double phase for the dark around it.
+/// The levels of `target`, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by the
+/// correction `a`: the sub-hologram around there, double phase for the dark around it.
 ///
 /// # Errors
-/// A z at the modulator, or so far from it that the sub-hologram does not fit; a response for another size.
+/// A z at the modulator, or so far from it that the sub-hologram does not fit.
 pub fn levels(
-    display: &Display,
-    response: &Response,
+    target: &Target,
     colour: usize,
     z_m: f64,
     place: [f64; 2],
     a: &Coefficients,
 ) -> Result<Array2<u8>> {
+    let display = &target.display;
     let (height, width) = (display.height(), display.width());
-    if response
-        .shape()
-        .is_some_and(|shape| shape != (height, width))
-    {
-        return Err(Error::Input(format!(
-            "the per-pixel table is not for the display's {width}×{height} pixels"
-        )));
-    }
     let (pitch_m, wavelength_m) = (display.pitch_m(), display.wavelengths_m()[colour]);
     let distance_m = z_m - display.offset_m();
     let radius_m = zernike::sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
@@ -159,7 +150,7 @@ pub fn levels(
             false => Complex32::ZERO,
         };
         let phase = double_phase::encode_value(value, x, y, 1.0);
-        *level = response.level(phase, first + y * width + x);
+        *level = target.response.level(phase, first + y * width + x);
     }
     Ok(levels)
 }
@@ -265,7 +256,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::simulated_display::SimulatedDisplay;
-    use phasefront::wave::zernike::Aberration;
+    use phasefront::target::Aberration;
 
     #[test]
     fn a_flat_pupil_has_a_strehl_ratio_of_one_and_small_terms_follow_marechal() {
@@ -313,13 +304,15 @@ mod tests {
             let mut camera = simulated.camera().clone();
             camera.exposure = exposure(&display, colour, z_m);
             let simulated = simulated.with_camera(camera);
-            let response = simulated.response().unwrap();
+            let target = Target {
+                response: simulated.response().unwrap(),
+                ..Target::from(&display)
+            };
             let mut search = Search::from([0.0; 5]);
             while !search.is_done() {
                 let sharp: Vec<f64> = (search.trials().iter().enumerate())
                     .map(|(i, trial)| {
-                        let levels =
-                            levels(&display, &response, colour, z_m, MIDDLE, trial).unwrap();
+                        let levels = levels(&target, colour, z_m, MIDDLE, trial).unwrap();
                         let shot = (search.round * TRIALS + i) as u64;
                         let photo = simulated
                             .photograph(levels.view(), colour, z_m, shot)

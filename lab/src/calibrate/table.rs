@@ -1,7 +1,7 @@
 //! The files of a calibration, to which a display file refers: the per-pixel table, the laser map, the
 //! aberrations.
 //!
-//! * The table is [`phasefront::slm::per_pixel`]'s bytes.
+//! * The table is [`phasefront::unstable::slm::per_pixel`]'s bytes.
 //! * The laser map is an RGB PNG of 8 or 16 bits: the laser's amplitude at nodes spread evenly from the first to the last
 //!   pixel of each axis, each colour of any scale.
 //! * Aberrations are TOML, one `[[at]]` a calibrated distance, z ascending, with the coefficients a₃ to a₇ of the
@@ -20,9 +20,8 @@ use crate::error::{Error, Result};
 use crate::files::write_atomically;
 use image::{DynamicImage, ImageReader};
 use ndarray::{Array3, ArrayView3};
-use phasefront::Illumination;
-use phasefront::slm::per_pixel::PerPixel;
-use phasefront::wave::zernike::{Aberration, Aberrations, Coefficients};
+use phasefront::target::{Aberration, Illumination, PerPixel};
+use phasefront::unstable::wave::zernike::{Aberrations, Coefficients};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;

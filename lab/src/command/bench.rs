@@ -3,13 +3,12 @@
 use super::flags::{BackendFlags, DisplayFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
-use phasefront::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
-use phasefront::network::Precision;
-use phasefront::slm::per_pixel::PerPixel;
-use phasefront::{Display, Method, Sweep};
+use phasefront::unstable::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
+use phasefront::unstable::network;
+use phasefront::{Method, Network, Sweep, Target};
 use phasefront_lab::bench::gpu::GpuRow;
 use phasefront_lab::bench::{self, Case, Machine, Row};
-use phasefront_lab::models::{self, BUILT_IN, Built};
+use phasefront_lab::models::{self, Precision};
 use phasefront_lab::plot::{self, Bar};
 use phasefront_lab::{Error, Result, files, gpu};
 use serde_json::json;
@@ -72,25 +71,21 @@ impl Bench {
             return Err(Error::file(path, "the name must end in .svg"));
         }
         let file = self.display.read()?;
-        let (display, table) = (file.display, file.per_pixel);
+        let target = file.target;
         let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, false)?),
+            Some(file) => Some(models::network(file, Precision::Float32)?),
             None => None,
         };
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
-        let wanted = |built: &&Built| {
-            self.layers.is_none_or(|layers| layers == built.layers)
-                && self.precision.is_none_or(|p| p.is_int8() == built.int8)
-        };
         let mut methods: Vec<_> = match &self.network {
-            Some(file) => vec![Method::trained(models::network(file, false)?)],
-            None => (BUILT_IN.iter().filter(wanted))
-                .map(|built| Ok(Method::trained(models::built_in(built)?)))
-                .collect::<Result<_>>()?,
+            Some(file) => vec![Method::trained(models::network(file, Precision::Float32)?)],
+            None => (self.come_along().into_iter())
+                .map(Method::trained)
+                .collect(),
         };
         if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
-            methods.push(Method::Sweep(Sweep::for_display(&display)));
+            methods.push(Method::Sweep(Sweep::for_display(&target.display)));
         }
         let device = self.backend.device()?;
         // What a GPU is judged by, unless it comes along.
@@ -100,8 +95,10 @@ impl Bench {
         };
         if let Some(layers) = made
             && self.network.is_none()
-            && self.precision.is_none_or(|p| !p.is_int8())
-            && !BUILT_IN.iter().any(|built| built.layers == layers)
+            && self
+                .precision
+                .is_none_or(|p| p.precision() == Precision::Float32)
+            && methods.is_empty()
         {
             methods.push(Method::Network(bench::random::network(layers)?));
         }
@@ -121,7 +118,7 @@ impl Bench {
                     "--plot and --prefilter go with --backend cpu".into(),
                 ));
             }
-            return self.on_gpu(&methods, &sizes, &display, table.as_ref(), &options, json);
+            return self.on_gpu(&methods, &sizes, &target, &options, json);
         }
         let machine = Machine::this();
         let threads = threads.map_or_else(
@@ -138,7 +135,6 @@ impl Bench {
                     method,
                     size,
                     threads,
-                    table: table.as_ref(),
                     prefilter: prefilter.as_ref(),
                 }));
             }
@@ -146,7 +142,7 @@ impl Bench {
         let bar = progress_bar(cases.len() as u64, "combinations");
         let mut rows = Vec::new();
         for case in &cases {
-            rows.push(bench::measure(case, &display, budget)?);
+            rows.push(bench::measure(case, &target, budget)?);
             bar.inc(1);
         }
         bar.finish_and_clear();
@@ -163,13 +159,26 @@ impl Bench {
 }
 
 impl Bench {
+    /// The networks that come along, of the layers and numbers that are asked for.
+    fn come_along(&self) -> Vec<Arc<Network>> {
+        let precisions = [Precision::Float32, Precision::Int8];
+        let wanted = |precision: &Precision| {
+            (self.precision).is_none_or(|asked| asked.precision() == *precision)
+        };
+        let networks = phasefront_models::NETWORKS.iter().flat_map(|model| {
+            let precisions = precisions.iter().filter(|p| wanted(p));
+            precisions.filter_map(|precision| model.network(*precision))
+        });
+        let deep = |network: &Arc<Network>| self.layers.is_none_or(|n| n == network.layers());
+        networks.filter(deep).collect()
+    }
+
     /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
     fn on_gpu(
         &self,
         methods: &[Method],
         sizes: &[(usize, usize)],
-        display: &Display,
-        table: Option<&Arc<PerPixel>>,
+        target: &Target,
         options: &DeviceOptions,
         json: bool,
     ) -> Result<()> {
@@ -186,7 +195,7 @@ impl Bench {
                 _ => None,
             };
             let floats = match network.map(|network| network.precision()) {
-                Some(Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
+                Some(network::Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
                 _ => vec![Float::F32],
             };
             // A sweep by itself has no layers.
@@ -200,7 +209,7 @@ impl Bench {
                         let chain = ChainOptions { float, fusion };
                         let budget = Duration::from_secs_f64(self.seconds);
                         rows.push(bench::gpu::measure(
-                            method, size, &device, display, chain, table, budget,
+                            method, size, &device, target, chain, budget,
                         )?);
                     }
                 }

@@ -3,7 +3,7 @@
 use super::flags::{DisplayFlags, parse_size, progress_bar};
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
-use phasefront::{Calibration, Display};
+use phasefront::Display;
 use phasefront_lab::calibrate::lut::{self, Refusal};
 use phasefront_lab::calibrate::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_lab::calibrate::photograph::Photograph;
@@ -382,7 +382,7 @@ impl Aberration {
                         "is of another z, colour or place; a search needs a folder of its own",
                     ));
                 }
-                let sharpness = self.sharpness(&now, &file.display)?;
+                let sharpness = self.sharpness(&now, &file.target.display)?;
                 SearchFile {
                     search: now.search.learn(&sharpness),
                     ..now
@@ -395,9 +395,9 @@ impl Aberration {
         let round = self.round(&now);
         make(&round)?;
         let (place, z_m) = (self.at.unwrap_or(spot::MIDDLE), self.z_mm / 1e3);
-        let response = file.response()?;
+        let target = &file.target;
         for (i, trial) in now.search.trials().iter().enumerate() {
-            let levels = spot::levels(&file.display, &response, self.index(), z_m, place, trial)?;
+            let levels = spot::levels(target, self.index(), z_m, place, trial)?;
             grey(levels, &round.join(format!("trial_{i:02}.png")))?;
         }
         write_state(&state, &now)?;
@@ -519,13 +519,7 @@ impl Pack {
     fn run(self, json: bool) -> Result<()> {
         keep(&self.output, self.force)?;
         let file = self.display.read()?;
-        let bytes = Calibration {
-            response: file.response()?,
-            correction: file.constant_correction()?,
-            illumination: file.laser,
-            display: file.display,
-        }
-        .to_bytes()?;
+        let bytes = file.corrected()?.to_bytes()?;
         files::write_atomically(&self.output, |file| file.write_all(&bytes))?;
         super::print(
             json,

@@ -51,7 +51,7 @@ fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
 impl Dataset {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let file = self.display.read()?;
-        let display = file.display;
+        let display = file.target.display;
         if display.offset_m() != 0.0 {
             return Err(Error::Input(
                 "a data set holds midpoint holograms; the display's offset must be 0".into(),

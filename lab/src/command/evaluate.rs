@@ -4,7 +4,7 @@ use super::flags::EncoderName;
 use super::flags::progress_bar;
 use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
-use phasefront::sweep::MAX_HIDDEN_LAYERS;
+use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
 use phasefront::{Display, Sweep};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Method, Row, Shown};
@@ -187,7 +187,7 @@ impl Evaluate {
             })
             .collect::<Result<_>>()?;
         for name in &self.network {
-            let network = models::network(name, self.precision.is_int8())?;
+            let network = models::network(name, self.precision.precision())?;
             let label = format!("network {}", file_stem(name));
             let method = Method::network(label, &network, manifest.size, &manifest.display);
             methods.push(method.map_err(|e| Error::file(name, e))?);

@@ -2,11 +2,11 @@
 
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
-use phasefront::depth::DepthUnit;
-use phasefront::encode::Encoding;
-use phasefront::gpu::DeviceOptions;
-use phasefront::{Display, Network, RgbdFrame};
+use phasefront::unstable::depth::DepthUnit;
+use phasefront::unstable::gpu::DeviceOptions;
+use phasefront::{Display, Encoding, Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
+use phasefront_lab::models::Precision;
 use phasefront_lab::rgbd::{self, DepthOptions};
 use phasefront_lab::{Error, Result, gpu, models};
 use std::path::PathBuf;
@@ -30,7 +30,7 @@ impl DisplayFlags {
             None => phasefront::Display::default().into(),
         };
         if let Some(mm) = self.offset_mm {
-            file.display = file.display.with_offset_m(mm / 1e3)?;
+            file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
         }
         Ok(file)
     }
@@ -58,7 +58,7 @@ impl EncoderFlags {
     /// For fields that no network of a pair makes.
     pub(crate) fn read(&self) -> Result<Encoder> {
         let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, false)?),
+            Some(file) => Some(models::network(file, Precision::Float32)?),
             None => None,
         };
         let name = self.encoder.unwrap_or(EncoderName::AntiAlias);
@@ -73,19 +73,21 @@ impl EncoderFlags {
     pub(crate) fn with_network(
         &self,
         network: Option<&str>,
-        int8: bool,
+        precision: Precision,
         display: &Display,
     ) -> Result<(Arc<Network>, Encoder)> {
         let by_name = network == Some(models::DEEP);
         let deep = matches!(self.encoder, None | Some(EncoderName::Deep));
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
-            if let Some((hologram, prefilter)) = models::pair_for(display, int8)? {
+            if let Some(pair) = phasefront_models::pair_for(display, precision) {
                 let name = EncoderName::Deep.name();
-                let encoding = Encoding::Deep(prefilter);
-                return Ok((hologram, Encoder { encoding, name }));
+                let encoding = Encoding::Deep(pair.prefilter);
+                return Ok((pair.hologram, Encoder { encoding, name }));
             }
             if by_name || self.encoder.is_some() {
-                let offsets = models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+                let offsets = phasefront_models::PAIRS
+                    .iter()
+                    .map(|pair| pair.offset_mm.to_string());
                 return Err(Error::Input(format!(
                     "networks for the deep encoder come along for offsets of {} mm and the usual display; train a pair for this one, or take --network 8 --encoder anti-alias",
                     offsets.collect::<Vec<_>>().join(", ")
@@ -97,7 +99,10 @@ impl EncoderFlags {
                 models::DEEP
             )));
         }
-        Ok((models::network(network.unwrap_or("8"), int8)?, self.read()?))
+        Ok((
+            models::network(network.unwrap_or("8"), precision)?,
+            self.read()?,
+        ))
     }
 }
 

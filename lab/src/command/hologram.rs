@@ -4,16 +4,16 @@ use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, FrameFlags
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::depth::sharpness;
-use phasefront::encode::Scale;
-use phasefront::gpu::{Device, DeviceOptions, Frame, Job};
-use phasefront::method::check_display;
-use phasefront::network::{Engine, InputKind};
-use phasefront::{Pipeline, RgbdFrame, Sweep};
+use phasefront::unstable::depth::sharpness;
+use phasefront::unstable::gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::network::{Engine, InputKind};
+use phasefront::{Brightness, EncoderOptions, Encoding, Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
+use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use serde_json::json;
@@ -110,8 +110,11 @@ pub(crate) enum PrecisionName {
 }
 
 impl PrecisionName {
-    pub(crate) fn is_int8(self) -> bool {
-        self == PrecisionName::Int8
+    pub(crate) fn precision(self) -> Precision {
+        match self {
+            PrecisionName::Int8 => Precision::Int8,
+            PrecisionName::F32 => Precision::Float32,
+        }
     }
 }
 
@@ -181,22 +184,22 @@ impl Hologram {
         };
         let made = match (method, &self.ldi) {
             (Method::Network, None) => {
-                let int8 = self.precision.is_int8();
+                let precision = self.precision.precision();
                 let name = self.network.as_deref();
                 let (network, encoder) =
-                    (self.encoder).with_network(name, int8, &display.display)?;
+                    (self.encoder).with_network(name, precision, &display.target.display)?;
                 let method = phasefront::Method::trained(network);
                 self.by_core("network", method, &display, encoder, device.as_ref())?
             }
             (Method::Seeded, None) => {
                 let name = self.network.as_deref().unwrap_or(models::SEEDED);
-                let network = models::network(name, self.precision.is_int8())?;
+                let network = models::network(name, self.precision.precision())?;
                 let method = phasefront::Method::Seeded(network);
                 let encoder = self.encoder.read()?;
                 self.by_core("seeded", method, &display, encoder, device.as_ref())?
             }
             (Method::Sweep, None) => {
-                let sweep = sweep_for(&display.display, self.planes, self.taps);
+                let sweep = sweep_for(&display.target.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
                 let encoder = self.encoder.read()?;
                 self.by_core("sweep", method, &display, encoder, device.as_ref())?
@@ -217,7 +220,7 @@ impl Hologram {
         };
         let info = HologramInfo {
             calibrated: display.calibrated(true),
-            display: display.display.clone(),
+            display: display.target.display.clone(),
             encoder: Some(made.encoder.into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
@@ -261,21 +264,9 @@ impl Hologram {
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let mut pipeline = Pipeline::new(
-            height,
-            width,
-            method,
-            &display.display,
-            encoder.encoding,
-            self.scale(),
-            display.response()?,
-        )?;
-        if let Some(laser) = &display.laser {
-            pipeline = pipeline.with_illumination(laser.clone());
-        }
-        if let Some(correction) = display.constant_correction()? {
-            pipeline = pipeline.with_correction(&correction)?;
-        }
+        let target = display.corrected()?;
+        let options = self.encoder_options(encoder.encoding);
+        let pipeline = Pipeline::new((height, width), method, &target, &options)?;
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
@@ -310,21 +301,11 @@ impl Hologram {
     ) -> Result<Made> {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
-        let (scale, response) = (self.scale(), display.response()?);
-        let mut job = Job::new(
-            height,
-            width,
-            method,
-            &display.display,
-            encoder.encoding,
-            scale,
-            response,
-        );
-        job.illumination = display.laser.clone();
-        job.correction = display.constant_correction()?;
+        let mut job = Job::new((height, width), method, display.corrected()?);
+        job.encoder = self.encoder_options(encoder.encoding);
         let device = Arc::new(Device::open(options)?);
-        phasefront::gpu::probe(&device, &job)?;
-        let mut pipeline = phasefront::gpu::Pipeline::new(&device, &job)?;
+        probe(&device, &job)?;
+        let mut pipeline = GpuPipeline::new(&device, &job)?;
         let mut levels = Array3::zeros((3, height, width));
         let bytes = levels.as_slice_mut().expect("standard layout");
         let report = pipeline.process(&Frame::of(frame), bytes)?;
@@ -354,17 +335,15 @@ impl Hologram {
         encoder: Encoder,
     ) -> Result<Made> {
         let (height, width) = ldi.shape();
-        let display = &file.display;
-        let mut modulator = file.modulator((height, width), encoder.encoding, self.scale())?;
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
-        let (constant, varying) = match (method, file.constant_correction()) {
-            (_, Ok(constant)) => (constant, None),
-            (Method::Layers, Err(_)) => (None, file.aberration.as_ref()),
+        let (target, varying) = match (method, file.corrected()) {
+            (_, Ok(target)) => (target, None),
+            (Method::Layers, Err(_)) => (file.target.clone(), file.aberration.as_ref()),
             (_, Err(e)) => return Err(e),
         };
-        if let Some(correction) = constant {
-            modulator = modulator.with_correction(&correction)?;
-        }
+        let display = &target.display;
+        let options = self.encoder_options(encoder.encoding);
+        let modulator = Modulator::new((height, width), &target, &options)?;
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
         let start = Instant::now();
@@ -437,19 +416,22 @@ impl Hologram {
                 "--method network with --ldi needs a --network for layered depth images".into(),
             )
         })?;
-        let network = models::network(name, self.precision.is_int8())?;
+        let network = models::network(name, self.precision.precision())?;
         if !matches!(network.input(), InputKind::Ldi { .. }) {
             return Err(Error::Input(format!(
                 "--network {name} takes '{}'; for a layered depth image one for 'ldi2' to 'ldi9' is needed",
                 network.input()
             )));
         }
-        check_display(&network, display)?;
+        network.check_display(display)?;
         Ok(network)
     }
 
-    fn scale(&self) -> Scale {
-        self.scale.map_or(Scale::Max, Scale::Fixed)
+    fn encoder_options(&self, encoding: Encoding) -> EncoderOptions {
+        EncoderOptions {
+            encoding,
+            brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
+        }
     }
 
     fn report(&self, json: bool, made: &Made) {

@@ -3,9 +3,9 @@
 
 use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
-use phasefront::Method;
-use phasefront::sweep::Sweep;
+use phasefront::{Method, Sweep};
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
+use phasefront_lab::models::Precision;
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
 use phasefront_lab::sweep_study::{self, DisplayRow};
@@ -117,7 +117,7 @@ impl Study {
             scenes: self.scenes.into(),
             size: self.size.into(),
             seed: self.seed,
-            display: self.display.read()?.display,
+            display: self.display.read()?.target.display,
         })
     }
 
@@ -251,13 +251,13 @@ impl Study {
     }
 
     fn depth(&self, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        let display = self.display.read()?.target.display;
         let planes = self.planes.unwrap_or(256) as usize;
         let sweep = Method::Sweep(Sweep::for_display(&display));
         let mut methods = vec![("sweep".to_owned(), sweep)];
-        for built in models::BUILT_IN.iter().filter(|built| built.int8) {
-            let method = Method::trained(models::built_in(built)?);
-            methods.push((format!("network {}", built.name), method));
+        for model in phasefront_models::NETWORKS {
+            let network = models::network(model.name, Precision::Int8)?;
+            methods.push((format!("network {}", model.name), Method::trained(network)));
         }
         let scenes = usize::from(self.scenes);
         let bar = progress_bar(depth_study::work(scenes, methods.len()) as u64, "holograms");
@@ -290,8 +290,13 @@ impl Study {
         /// Of each scene.
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
-        let display = self.display.read()?.display.with_size(height, width)?;
-        let method = Method::Network(models::network("8", true)?);
+        let display = self
+            .display
+            .read()?
+            .target
+            .display
+            .with_size(height, width)?;
+        let method = Method::Network(models::network("8", Precision::Int8)?);
         let scenes = usize::from(self.scenes);
         let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
         let mut rows: Vec<flicker::Row> = Vec::new();

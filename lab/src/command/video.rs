@@ -6,13 +6,10 @@ use super::flags::{
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use ndarray::ArrayView3;
-use phasefront::depth::DepthUnit;
-use phasefront::depth::range::DepthRange;
-use phasefront::session::{
-    Backend, Brightness, Event, Hologram, Quality, RunningMode, SessionOptions, Statistics,
-};
-use phasefront::sweep::Sweep;
-use phasefront::{Display, Method, Session};
+use phasefront::input::DepthRange;
+use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
+use phasefront::unstable::depth::DepthUnit;
+use phasefront::{Brightness, Hologram, Method, Session, SessionOptions, Sweep, Target};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::video::{self, RawVideo, VideoFrame};
 use phasefront_lab::{Error, Result, gpu, models};
@@ -289,42 +286,43 @@ impl Video {
     ) -> Result<(SessionOptions, HologramInfo)> {
         let file = self.display.read()?;
         let (width, height) = self.size.unwrap_or((width, height));
-        if let Some(laser) = &file.laser
-            && (height, width) != (file.display.height(), file.display.width())
+        let modulator = &file.target.display;
+        if let Some(light) = &file.target.illumination
+            && (height, width) != (modulator.height(), modulator.width())
         {
-            let (rows, columns) = laser.nodes();
+            let (rows, columns) = light.nodes();
             return Err(Error::Input(format!(
                 "the display's laser map ({columns}×{rows} nodes) is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
-                file.display.width(),
-                file.display.height()
+                modulator.width(),
+                modulator.height()
             )));
         }
-        let display: Display = file.display.clone().with_size(height, width)?;
-        let (name, int8) = (self.network.as_deref(), self.precision.is_int8());
+        let target = file.corrected()?;
+        let target = Target {
+            display: target.display.with_size(height, width)?,
+            response: target.response.centred(height, width)?,
+            ..target
+        };
+        let display = target.display.clone();
         let sweep = Sweep::for_display(&display);
         let (method, encoder) = match self.method {
             MethodName::Network => {
-                let (network, encoder) = self.encoder.with_network(name, int8, &display)?;
+                let (network, encoder) = self.encoder.with_network(name, precision, &display)?;
                 (Method::trained(network), encoder)
             }
             MethodName::Seeded => {
-                let network = models::network(name.unwrap_or(models::SEEDED), int8)?;
+                let network = models::network(name.unwrap_or(models::SEEDED), precision)?;
                 (Method::Seeded(network), self.encoder.read()?)
             }
             MethodName::Sweep => (Method::Sweep(sweep), self.encoder.read()?),
             MethodName::Auto => {
-                let network = models::network(name.unwrap_or("8"), int8)?;
+                let network = models::network(name.unwrap_or("8"), precision)?;
                 (Method::BySharpness(sweep, network), self.encoder.read()?)
             }
         };
-        let mut options = SessionOptions::new(display.clone(), method)?;
-        if display.bits() <= 8 {
-            options.response = file.response()?;
-        }
-        options.illumination = file.laser.clone();
-        options.correction = file.constant_correction()?;
-        options.encoding = encoder.encoding;
-        options.brightness = match self.brightness {
+        let mut options = SessionOptions::new(target, method);
+        options.encoder.encoding = encoder.encoding;
+        options.encoder.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
             BrightnessName::Max => Brightness::FrameMax,
         };

@@ -18,9 +18,12 @@ use crate::sm_lbm::{Planes, cross, plane_z_m};
 use ndarray::{Array2, Array3, ArrayView1, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::wave::asm::Transfer;
-use phasefront::wave::fft::{ConvolveScratch, Fft2, Scratch, fast_size};
-use phasefront::wave::zernike::{Aberration, Aberrations};
+use phasefront::target::Aberration;
+use phasefront::unstable::wave::{
+    asm::Transfer,
+    fft::{ConvolveScratch, Fft2, Scratch, fast_size},
+    zernike::Aberrations,
+};
 use rayon::prelude::*;
 
 /// Pixels from node to node.
@@ -277,7 +280,7 @@ pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2
             let v = place.kernel(&aberration, side, kx, ky);
             Complex64::new(v.re.into(), v.im.into())
         });
-        phasefront::wave::reference::dft(&kernel, 1.0) / (side * side) as f64
+        phasefront::unstable::wave::reference::dft(&kernel, 1.0) / (side * side) as f64
     };
     let mut out = Array2::from_elem((height, width), Complex64::ZERO);
     for i in 0..(height - 1) / NODE + 2 {

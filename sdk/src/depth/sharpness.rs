@@ -19,6 +19,8 @@ const ONE_STEP: f32 = 0.75;
 pub const SHARP_EDGES: f32 = 0.6;
 /// The most noise of sharp depth, of the volume.
 pub const SMOOTH: f32 = 1.5e-3;
+/// How far over a bound, relative, a frame of a video must be to be taken for other than the one before.
+pub const HYSTERESIS: f32 = 0.15;
 
 /// What [`measure`] finds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,6 +37,16 @@ impl Sharpness {
     /// [`SMOOTH`].
     pub fn is_sharp(&self) -> bool {
         self.edges >= SHARP_EDGES && self.noise <= SMOOTH
+    }
+
+    /// [`Self::is_sharp`] of a frame that follows one which `was` sharp or not: what lies within [`HYSTERESIS`] of the
+    /// bounds stays what it was, so that video does not go to and fro between two methods.
+    pub fn stays_sharp(&self, was: bool) -> bool {
+        let slack = match was {
+            true => 1.0 + HYSTERESIS,
+            false => 1.0 / (1.0 + HYSTERESIS),
+        };
+        self.edges * slack >= SHARP_EDGES && self.noise <= SMOOTH * slack
     }
 }
 
@@ -187,6 +199,18 @@ mod tests {
             let flat = measure(&RgbdFrame::new(rgb, depth).unwrap());
             assert_eq!((flat.edges, flat.noise), (1.0, 0.0));
             assert!(flat.is_sharp());
+        }
+    }
+
+    #[test]
+    fn what_lies_near_the_bounds_stays_what_it_was() {
+        let of = |edges, noise| Sharpness { edges, noise };
+        let near = of(SHARP_EDGES * 1.05, SMOOTH * 1.1);
+        assert!(near.stays_sharp(true) && !near.stays_sharp(false));
+        for was in [true, false] {
+            assert!(of(SHARP_EDGES * 1.2, SMOOTH * 0.8).stays_sharp(was));
+            assert!(!of(SHARP_EDGES * 0.8, SMOOTH * 0.8).stays_sharp(was));
+            assert!(!of(1.0, SMOOTH * 1.2).stays_sharp(was));
         }
     }
 }

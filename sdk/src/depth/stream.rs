@@ -2,12 +2,13 @@
 //! refinement, in this order.
 
 use super::align::Cameras;
+use super::camera::{Alignment, CameraFrame};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::refine::{RefineScratch, Refiner};
 use super::steady::Steadier;
 use crate::error::{Error, Result};
-use crate::frame::{Alignment, CameraFrame, Crop, Orientation};
+use crate::frame::{Crop, Orientation};
 use std::time::Duration;
 
 /// What a session makes of depth.

@@ -5,15 +5,9 @@
 //! asks for that, AA-DPM's blur has gone over the field first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
-use crate::display::Display;
-use crate::error::{Error, Result};
-use crate::method::check_display;
+use crate::error::Result;
 use crate::network::{FilterPlan, FilterScratch, Network};
 use num_complex::Complex32;
-
-/// How far the modulator may stand from where a pre-filter was trained for: what light spreads over it stays below a
-/// tenth of a pixel of 8 µm.
-const OFFSET_TOLERANCE_M: f64 = 20e-6;
 
 /// The blur that pre-filters for blurred fields are trained behind.
 ///
@@ -72,21 +66,4 @@ impl Deep {
         }
         self.network.filter(field, &mut scratch.network);
     }
-}
-
-/// Checks that the pre-filter `network` was trained for a display like `display`, its offset included.
-///
-/// # Errors
-/// What [`check_display`] refuses, or an offset that differs by over 20 µm.
-pub fn check(network: &Network, display: &Display) -> Result<()> {
-    check_display(network, display)?;
-    let (trained, given) = (network.display().offset_m, display.offset_m());
-    if (trained - given).abs() > OFFSET_TOLERANCE_M {
-        return Err(Error::Network(format!(
-            "the pre-filter was trained for an offset of {:.3} mm, the display has {:.3} mm; take one for this offset, or another encoder",
-            trained * 1e3,
-            given * 1e3
-        )));
-    }
-    Ok(())
 }

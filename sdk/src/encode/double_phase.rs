@@ -1,7 +1,7 @@
 //! The double phase method, Eq. 7: one complex value A·exp(iφ) as two phases φ ± acos A, on the
 //! two colours of a checkerboard, whose light sums to it.
 
-use crate::slm::Response;
+use crate::slm::{Response, wrap};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -22,13 +22,6 @@ pub fn encode_value(value: Complex32, x: usize, y: usize, scale: f32) -> f32 {
             -half
         };
     wrap(phase)
-}
-
-/// `phase` brought to \[0, 2π).
-pub fn wrap(phase: f32) -> f32 {
-    let wrapped = phase.rem_euclid(TAU);
-    // rem_euclid of a tiny negative number rounds up to 2π itself.
-    if wrapped < TAU { wrapped } else { 0.0 }
 }
 
 /// The largest |u|² of a row, 0 for an empty one.

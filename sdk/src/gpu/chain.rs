@@ -3,7 +3,7 @@
 
 use super::device::{Constants, Device, Dispatch};
 use super::input::{ChainInput, Form, Packer, Source};
-use super::{Error, Result};
+use super::{GpuError, Result};
 use crate::network::chain::{Chain, Layer, Precision, Weights};
 use crate::network::{Head, InputKind, Network};
 use std::sync::Arc;
@@ -49,7 +49,7 @@ impl Numbers {
             (_, Float::F32) => Numbers::F32,
             (_, Float::Fastest) if !device.features().half => Numbers::F32,
             (_, Float::F16) if !device.features().half => {
-                return Err(Error::Refused(format!(
+                return Err(GpuError::Refused(format!(
                     "{} has no 16-bit floating point (shader-f16); f32 is right",
                     device.name()
                 )));
@@ -533,7 +533,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
             let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum();
             let plain = i64::from(layer.bias[o]) - i64::from(layer.zero_point) * total;
             if plain.abs() + reach > LARGEST_SUM {
-                return Err(Error::Refused(format!(
+                return Err(GpuError::Refused(format!(
                     "sums of layer {i} exceed 24 bits, which f32 holds; the CPU is right"
                 )));
             }
@@ -590,8 +590,8 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
     Ok(all)
 }
 
-/// A network on the GPU for one frame size: the twin of [`crate::NetworkPlan`].
-pub struct NetworkPlan {
+/// A network on the GPU for one frame size: the twin of [`crate::ChainPlan`].
+pub struct ChainPlan {
     device: Arc<Device>,
     size: (usize, usize),
     inputs: usize,
@@ -600,11 +600,11 @@ pub struct NetworkPlan {
     chain: ChainPlan,
 }
 
-impl NetworkPlan {
+impl ChainPlan {
     /// Prepares `network` for frames of `height` × `width` pixels.
     ///
     /// # Errors
-    /// [`Error::Refused`] for numbers or a size that `device` does not have, [`Error::OutOfMemory`].
+    /// [`GpuError::Refused`] for numbers or a size that `device` does not have, [`GpuError::OutOfMemory`].
     pub fn new(
         device: &Arc<Device>,
         network: &Network,
@@ -626,7 +626,7 @@ impl NetworkPlan {
             )?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
-            Ok(NetworkPlan {
+            Ok(ChainPlan {
                 device: device.clone(),
                 size,
                 inputs: chain.inputs,
@@ -647,11 +647,11 @@ impl NetworkPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::NetworkPlan::run`] takes it, `output`
+    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::ChainPlan::run`] takes it, `output`
     /// (6, H, W).
     ///
     /// # Errors
-    /// A wrong length; [`Error::Lost`].
+    /// A wrong length; [`GpuError::Lost`].
     pub fn run(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
         let area = self.size.0 * self.size.1;
         if input.len() != self.inputs * area || output.len() != 6 * area {

@@ -11,7 +11,7 @@ pub(super) mod testing;
 pub(crate) use memory::{Constants, copy_mapped};
 pub(crate) use program::{Dispatch, Program};
 
-use super::{Error, Result};
+use super::{GpuError, Result};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -87,8 +87,8 @@ impl Device {
     /// Opens a GPU.
     ///
     /// # Errors
-    /// [`Error::None`] where there is none, or none of that name, with those that there are;
-    /// [`Error::Refused`] where the driver does not open it.
+    /// [`GpuError::None`] where there is none, or none of that name, with those that there are;
+    /// [`GpuError::Refused`] where the driver does not open it.
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         Self::open_with(options, &Allowed::default())
     }
@@ -104,7 +104,7 @@ impl Device {
         };
         let (device, queue) =
             pollster::block_on(adapter.request_device(&descriptor)).map_err(|why| {
-                Error::Refused(format!("{} cannot be opened: {}", info.name, one_line(why)))
+                GpuError::Refused(format!("{} cannot be opened: {}", info.name, one_line(why)))
             })?;
         Ok(Self::of(device, queue, options.programs.as_deref()))
     }
@@ -200,7 +200,7 @@ impl Device {
     /// Why the device is of no use any more, if so.
     pub(crate) fn check(&self) -> Result<()> {
         match lock(&self.lost).as_ref() {
-            Some(why) => Err(Error::Lost(why.clone())),
+            Some(why) => Err(GpuError::Lost(why.clone())),
             None => Ok(()),
         }
     }
@@ -252,8 +252,8 @@ impl Device {
             self.ask()?;
         }
         match error {
-            Some(wgpu::Error::OutOfMemory { source }) => Err(Error::OutOfMemory(one_line(source))),
-            Some(why) => Err(Error::Refused(format!(
+            Some(wgpu::Error::OutOfMemory { source }) => Err(GpuError::OutOfMemory(one_line(source))),
+            Some(why) => Err(GpuError::Refused(format!(
                 "{}: {}",
                 self.name(),
                 one_line(why)
@@ -295,7 +295,7 @@ fn adapter(name: Option<&str>, memory_percent: Option<u8>) -> Result<wgpu::Adapt
         None => rank(adapter) < 4,
     };
     all.into_iter().find(wanted).ok_or_else(|| {
-        Error::None(match (name, names.is_empty()) {
+        GpuError::None(match (name, names.is_empty()) {
             (_, true) => "no driver of Vulkan, Metal or DirectX 12 answers".into(),
             (Some(name), _) => format!("none is called '{name}'; there is {names}"),
             (None, _) => {
@@ -330,7 +330,7 @@ mod tests {
             programs: None,
         };
         let refused = Device::open(&options).unwrap_err();
-        assert!(matches!(&refused, Error::None(_)));
+        assert!(matches!(&refused, GpuError::None(_)));
         assert!(!refused.to_string().contains('\n'), "{refused}");
     }
 
@@ -356,11 +356,11 @@ mod tests {
             device.program("nonsense", "fn main( {".into(), "main");
             Ok(())
         });
-        assert!(matches!(wrong, Err(Error::Refused(_))), "{wrong:?}");
+        assert!(matches!(wrong, Err(GpuError::Refused(_))), "{wrong:?}");
         // A lost device says so, and why, to all that comes.
         device.give_up("pulled out");
-        assert_eq!(device.check(), Err(Error::Lost("pulled out".into())));
-        assert!(matches!(device.guarded(|| Ok(())), Err(Error::Lost(_))));
+        assert_eq!(device.check(), Err(GpuError::Lost("pulled out".into())));
+        assert!(matches!(device.guarded(|| Ok(())), Err(GpuError::Lost(_))));
     }
 
     #[test]
@@ -385,7 +385,7 @@ mod tests {
             println!("skipped: {device:?} does not heed how much memory there is");
             return;
         }
-        assert!(matches!(taken, Err(Error::OutOfMemory(_))), "{taken:?}");
+        assert!(matches!(taken, Err(GpuError::OutOfMemory(_))), "{taken:?}");
         // What does fit still works.
         let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
         assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
@@ -415,7 +415,7 @@ mod tests {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         step.run(&mut encoder.begin_compute_pass(&Default::default()));
         let waited = device.wait(&device.queue.submit([encoder.finish()]));
-        assert_eq!(waited, Err(Error::Lost("no answer for 1ms".into())));
+        assert_eq!(waited, Err(GpuError::Lost("no answer for 1ms".into())));
         assert!(device.check().is_err());
     }
 
@@ -437,6 +437,6 @@ mod tests {
         assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
         // The app takes it away.
         inner.destroy();
-        assert!(matches!(device.guarded(|| Ok(())), Err(Error::Lost(_))));
+        assert!(matches!(device.guarded(|| Ok(())), Err(GpuError::Lost(_))));
     }
 }

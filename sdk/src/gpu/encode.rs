@@ -11,11 +11,11 @@ pub(super) use mean_phase::MeanPhase;
 use super::brightness::Steadier;
 use super::chain::ChainOptions;
 use super::device::Device;
-use super::{Error, Result};
+use super::{GpuError, Result};
 use crate::brightness::{Brightness, Past};
-use crate::encode::Encoding;
-use crate::illumination::Illumination;
+use crate::encode::EncoderOptions;
 use crate::slm::Response;
+use crate::target::Target;
 use double_phase::DoublePhase;
 use filter::Filter;
 
@@ -23,23 +23,23 @@ use filter::Filter;
 const COLUMNS: usize = 64;
 
 /// Where a frame's levels go.
-pub(super) struct Target {
+pub(super) struct LevelsBuffers {
     /// (H, W) words: red, green, blue, 255 from the lowest byte on.
     pub(super) levels: wgpu::Buffer,
     /// The same as a picture.
     pub(super) texture: wgpu::Texture,
 }
 
-impl Target {
+impl LevelsBuffers {
     pub(super) fn new(device: &Device, (height, width): (usize, usize)) -> Result<Self> {
         let most = device.limits().max_texture_dimension_2d as usize;
         if height.max(width) > most {
-            return Err(Error::Refused(format!(
+            return Err(GpuError::Refused(format!(
                 "a picture of {width}×{height} is too large for {}, which takes {most} a side",
                 device.name()
             )));
         }
-        Ok(Target {
+        Ok(LevelsBuffers {
             levels: device.buffer("levels", 4 * height * width)?,
             texture: device.inner.create_texture(&wgpu::TextureDescriptor {
                 label: Some("levels"),
@@ -67,18 +67,17 @@ pub(super) struct EncoderJob<'a> {
     pub(super) field: &'a wgpu::Buffer,
     /// (H, W).
     pub(super) size: (usize, usize),
-    pub(super) encoding: &'a Encoding,
+    pub(super) options: &'a EncoderOptions,
     /// How a pre-filter computes.
     pub(super) chain: ChainOptions,
-    pub(super) brightness: Brightness,
+    pub(super) target: &'a Target,
+    /// That of the target, for this size.
     pub(super) response: &'a Response,
-    /// That of a modulator of (H, W), in whose middle the frame stands.
-    pub(super) light: Option<(&'a Illumination, (usize, usize))>,
     /// What the field's colours are multiplied by on the way in, if anything.
     pub(super) turn: Option<&'a wgpu::Buffer>,
 }
 
-/// The encoding of one field buffer into several targets.
+/// The encoding of one field buffer into several buffers.
 pub(super) struct Encoder {
     /// Of steady brightness.
     steadier: Option<Steadier>,
@@ -90,13 +89,13 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) fn new(device: &Device, job: &EncoderJob<'_>, targets: &[Target]) -> Result<Self> {
+    pub(super) fn new(device: &Device, job: &EncoderJob<'_>, buffers: &[LevelsBuffers]) -> Result<Self> {
         let (height, width) = job.size;
         let frame = [width, height, width * height, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
         let (filter, filtered) = Filter::new(device, job, &frame)?;
         let largest = device.buffer("the largest amplitude", 4)?;
-        let steadier = match job.brightness {
+        let steadier = match job.options.brightness {
             Brightness::Steady => {
                 let len = 3 * height * width;
                 Some(Steadier::new(device, job.field, len, &largest)?)
@@ -106,9 +105,9 @@ impl Encoder {
         Ok(Encoder {
             steadier,
             filter,
-            double_phase: DoublePhase::new(device, job, &frame, &filtered, &largest, targets)?,
+            double_phase: DoublePhase::new(device, job, &frame, &filtered, &largest, buffers)?,
             largest,
-            brightness: job.brightness,
+            brightness: job.options.brightness,
         })
     }
 
@@ -129,14 +128,14 @@ impl Encoder {
         }
     }
 
-    /// Encodes into the target of that index.
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, target: usize) {
+    /// Encodes into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         // Of the field as it comes, as on the CPU.
         if let Some(steadier) = &self.steadier {
             steadier.run(pass);
         }
         self.filter.run(pass);
-        self.double_phase.run(pass, target);
+        self.double_phase.run(pass, buffers);
     }
 
     /// The scale that a frame had whose `largest` was read back.
@@ -153,7 +152,9 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::testing::{device, field, run, upload};
     use super::*;
-    use crate::encode::Scale;
+    use crate::brightness::Brightness::{Fixed, FrameMax};
+    use crate::display::Display;
+    use crate::encode::Encoding;
     use crate::slm::per_pixel::{self, PerPixel};
     use num_complex::Complex32;
     use std::sync::Arc;
@@ -185,72 +186,77 @@ mod tests {
             (
                 (61, 47),
                 Encoding::ANTI_ALIAS,
-                Scale::Fixed(1.0),
+                Fixed(1.0),
                 pixels.clone(),
             ),
-            ((61, 47), Encoding::DoublePhase, Scale::Max, pixels),
-            ((61, 47), Encoding::DoublePhase, Scale::Max, eight.clone()),
-            ((61, 47), Encoding::ANTI_ALIAS, Scale::Max, lut.clone()),
+            ((61, 47), Encoding::DoublePhase, FrameMax, pixels),
+            ((61, 47), Encoding::DoublePhase, FrameMax, eight.clone()),
+            ((61, 47), Encoding::ANTI_ALIAS, FrameMax, lut.clone()),
             (
                 (61, 47),
                 Encoding::ANTI_ALIAS,
-                Scale::Fixed(0.7),
+                Fixed(0.7),
                 Response::Linear { bits: 5 },
             ),
-            ((61, 47), five, Scale::Max, eight.clone()),
-            ((61, 47), wide(), Scale::Fixed(1.1), eight.clone()),
-            ((61, 47), Encoding::BAND_LIMIT, Scale::Max, lut),
-            ((1, 1), wide(), Scale::Max, eight.clone()),
-            ((384, 384), Encoding::ANTI_ALIAS, Scale::Max, eight.clone()),
-            ((540, 960), Encoding::ANTI_ALIAS, Scale::Fixed(1.0), eight),
+            ((61, 47), five, FrameMax, eight.clone()),
+            ((61, 47), wide(), Fixed(1.1), eight.clone()),
+            ((61, 47), Encoding::BAND_LIMIT, FrameMax, lut),
+            ((1, 1), wide(), FrameMax, eight.clone()),
+            ((384, 384), Encoding::ANTI_ALIAS, FrameMax, eight.clone()),
+            ((540, 960), Encoding::ANTI_ALIAS, Fixed(1.0), eight),
         ];
-        for (size, encoding, scale, response) in cases {
+        for (size, encoding, brightness, response) in cases {
+            let options = EncoderOptions {
+                encoding: encoding.clone(),
+                brightness,
+            };
+            let display = Display::default().with_size(size.0, size.1).unwrap();
+            let target = Target {
+                response: response.clone(),
+                ..display.into()
+            };
             let area = size.0 * size.1;
             let turns =
                 [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
             let turn = upload(&device, &turns);
             let mut expected = field(area);
             let buffer = upload(&device, &expected);
-            let (encoder, targets) = device
+            let (encoder, buffers) = device
                 .guarded(|| {
-                    let targets = [Target::new(&device, size)?, Target::new(&device, size)?];
+                    let buffers = [
+                        LevelsBuffers::new(&device, size)?,
+                        LevelsBuffers::new(&device, size)?,
+                    ];
                     let job = EncoderJob {
                         field: &buffer,
                         size,
-                        encoding: &encoding,
+                        options: &options,
                         chain: ChainOptions::default(),
-                        brightness: scale.into(),
+                        target: &target,
                         response: &response,
-                        light: None,
                         turn: Some(&turn),
                     };
-                    let encoder = Encoder::new(&device, &job, &targets)?;
-                    Ok((encoder, targets))
+                    let encoder = Encoder::new(&device, &job, &buffers)?;
+                    Ok((encoder, buffers))
                 })
                 .unwrap();
             run(&device, |pass| encoder.run(pass, 1));
             let words: Vec<u32> =
-                bytemuck::pod_collect_to_vec(&device.read(&targets[1].levels, 4 * area).unwrap());
+                bytemuck::pod_collect_to_vec(&device.read(&buffers[1].levels, 4 * area).unwrap());
             for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
                 plane.iter_mut().for_each(|value| *value *= turn);
             }
             let mut given = expected.clone();
-            let twin = crate::encode::Encoder::new(size.0, size.1, encoding.clone()).unwrap();
+            let twin = crate::encode::Encoder::new(size, &target, &encoding).unwrap();
             let mut levels = vec![0; 3 * area];
-            let used = twin.encode_levels(
-                &mut expected,
-                scale,
-                &response,
-                &mut levels,
-                &mut twin.scratch(),
-            );
+            let scale = match brightness {
+                Fixed(scale) => Some(scale),
+                _ => None,
+            };
+            let mut scratch = twin.scratch();
+            let used = twin.encode_levels(&mut expected, scale, &mut levels, &mut scratch);
             let mut phase = vec![0.0; 3 * area];
-            twin.encode(
-                &mut given,
-                Scale::Fixed(used),
-                &mut phase,
-                &mut twin.scratch(),
-            );
+            twin.encode(&mut given, Some(used), &mut phase, &mut scratch);
             let largest: Vec<u32> =
                 bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
             let found = encoder.scale(largest[0]);
@@ -276,7 +282,7 @@ mod tests {
                     beside += usize::from(neighbour);
                     assert!(
                         level == expected || near < 0.1 || neighbour,
-                        "{size:?} {encoding:?} {scale:?}: {level} for {expected} at {i} of {c}, step {step}"
+                        "{size:?} {encoding:?} {brightness:?}: {level} for {expected} at {i} of {c}, step {step}"
                     );
                 }
             }

@@ -4,7 +4,7 @@
 //! A line is transformed in workgroup memory, so its length is bounded by that: 4096 where there are 32 KiB.
 
 use super::device::{Device, Dispatch};
-use super::{Error, Result};
+use super::{GpuError, Result};
 use num_complex::Complex32;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -189,7 +189,7 @@ impl Stage {
         let wanted: &[usize] = if self.in_place { &[4, 2, 1] } else { &[1] };
         let fits = |lines: &&usize| **lines * self.length * 8 <= most;
         wanted.iter().find(fits).copied().ok_or_else(|| {
-            Error::Refused(format!(
+            GpuError::Refused(format!(
                 "lines of {} values do not fit the {most} bytes of workgroup memory of {}; smaller frames or distances are right",
                 self.length,
                 device.name()

@@ -4,7 +4,7 @@ use super::chain::{ChainOptions, ChainPlan, End, Numbers};
 use super::device::Device;
 use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::sweep::Sweeper;
-use super::{Error, Result};
+use super::{GpuError, Result};
 use crate::display::Display;
 use crate::method::{Method, sweep_plan};
 use crate::network::Network;
@@ -96,7 +96,7 @@ impl MethodPlan {
                 (packer, Way::Seeded(sweep, Box::new(seeded), trained))
             }
             Method::BySharpness(..) => {
-                return Err(Error::Refused(
+                return Err(GpuError::Refused(
                     "the sharpness of depth, which chooses between sweep and network, is measured on the CPU only; one of them alone is right"
                         .into(),
                 ));

@@ -2,20 +2,17 @@
 
 use super::chain::ChainOptions;
 use super::device::{Device, copy_mapped};
-use super::encode::{Encoder, EncoderJob, MeanPhase, Target};
+use super::encode::{Encoder, EncoderJob, LevelsBuffers, MeanPhase};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame};
 use super::method::MethodPlan;
 use super::peak::Peak;
-use super::{Error, Result};
-use crate::brightness::{Brightness, Past};
-use crate::display::Display;
-use crate::encode::{Encoding, Scale, deep};
-use crate::illumination::Illumination;
+use super::{GpuError, Result};
+use crate::brightness::Past;
+use crate::encode::{EncoderOptions, Encoding};
 use crate::method::Method;
-use crate::slm::Response;
-use crate::wave::asm::{Padding, Propagator};
-use crate::wave::zernike::Aberration;
+use crate::pipeline::StageTimes;
+use crate::target::Target;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,24 +28,14 @@ const STAMPS: u32 = 8;
 /// What is to be computed.
 #[derive(Clone)]
 pub struct Job {
-    /// Pixels.
-    pub height: usize,
-    /// Pixels.
-    pub width: usize,
+    /// (H, W).
+    pub shape: (usize, usize),
     /// What makes the midpoint hologram.
     pub method: Method,
-    /// The display.
-    pub display: Display,
-    /// From a field to phases.
-    pub encoding: Encoding,
-    /// What full light stands for.
-    pub brightness: Brightness,
-    /// From phases to levels.
-    pub response: Response,
-    /// The lasers' light over the modulator, where it is calibrated.
-    pub illumination: Option<Illumination>,
-    /// What corrects the display's aberration, where it is calibrated and one for all depths.
-    pub correction: Option<Aberration>,
+    /// What it is for.
+    pub target: Target,
+    /// How fields become levels.
+    pub encoder: EncoderOptions,
     /// How colour comes.
     pub colour: Colour,
     /// How depth comes.
@@ -58,58 +45,25 @@ pub struct Job {
 }
 
 impl Job {
-    /// Frames as [`crate::RgbdFrame`] by `method` to `display` as [`crate::Pipeline`] makes them.
-    pub fn new(
-        height: usize,
-        width: usize,
-        method: Method,
-        display: &Display,
-        encoding: Encoding,
-        scale: impl Into<Brightness>,
-        response: Response,
-    ) -> Self {
+    /// Frames as [`crate::RgbdFrame`] by `method` to `target` as [`crate::Pipeline`] makes them.
+    pub fn new(shape: (usize, usize), method: Method, target: impl Into<Target>) -> Self {
         Job {
-            height,
-            width,
+            shape,
             method,
-            display: display.clone(),
-            encoding,
-            brightness: scale.into(),
-            response,
-            illumination: None,
-            correction: None,
+            target: target.into(),
+            encoder: EncoderOptions::default(),
             colour: Colour::Planar,
             depth: Depth::F32,
             chain: ChainOptions::default(),
         }
     }
 
-    /// The same on the CPU, with each frame's largest amplitude where brightness is steady: a plan on the CPU is told a
-    /// steady scale by its caller, in [`crate::Pipeline::modulate_at`].
+    /// The same on the CPU.
     ///
     /// # Errors
-    /// What [`crate::Pipeline::new`] and the correction refuse.
+    /// What [`crate::Pipeline::new`] refuses.
     pub fn on_cpu(&self) -> crate::Result<crate::Pipeline> {
-        let scale = match self.brightness {
-            Brightness::Fixed(scale) => Scale::Fixed(scale),
-            _ => Scale::Max,
-        };
-        let mut pipeline = crate::Pipeline::new(
-            self.height,
-            self.width,
-            self.method.clone(),
-            &self.display,
-            self.encoding.clone(),
-            scale,
-            self.response.clone(),
-        )?;
-        if let Some(illumination) = &self.illumination {
-            pipeline = pipeline.with_illumination(illumination.clone());
-        }
-        if let Some(correction) = &self.correction {
-            pipeline = pipeline.with_correction(correction)?;
-        }
-        Ok(pipeline)
+        crate::Pipeline::new(self.shape, self.method.clone(), &self.target, &self.encoder)
     }
 }
 
@@ -118,40 +72,20 @@ impl Job {
 pub enum Deliver {
     /// The CPU: they are copied to where it reads them.
     Levels,
-    /// The GPU, as [`Pipeline::texture`] or [`Pipeline::levels`]: nothing is copied.
+    /// The GPU, as [`GpuPipeline::texture`] or [`GpuPipeline::levels`]: nothing is copied.
     Shown,
 }
 
-/// A frame in flight. Given back by [`Pipeline::collect`] or [`Pipeline::finish`].
+/// A frame in flight. Given back by [`GpuPipeline::collect`] or [`GpuPipeline::finish`].
 #[derive(Debug, PartialEq, Eq)]
 pub struct Ticket {
     slot: usize,
     serial: u64,
 }
 
-/// How long each stage of a frame took on the GPU.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct StageTimes {
-    /// From the camera's format to the method's input.
-    pub input: Duration,
-    /// From the input to the hologram where the method ends.
-    pub method: Duration,
-    /// From there to the modulator.
-    pub propagate: Duration,
-    /// From the field to levels.
-    pub encode: Duration,
-}
-
-impl StageTimes {
-    /// All stages together.
-    pub fn total(&self) -> Duration {
-        self.input + self.method + self.propagate + self.encode
-    }
-}
-
-/// What became of a frame.
+/// What became of a frame on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrameReport {
+pub struct GpuReport {
     /// The amplitude that full light stands for.
     pub scale: f32,
     /// How long it took, where the device has time stamps.
@@ -159,7 +93,7 @@ pub struct FrameReport {
 }
 
 /// A plan for one [`Job`] on one device: all buffers and programs are made with it.
-pub struct Pipeline {
+pub struct GpuPipeline {
     device: Arc<Device>,
     size: (usize, usize),
     method: MethodPlan,
@@ -168,7 +102,7 @@ pub struct Pipeline {
     /// None where the modulator stands at the midpoint.
     offset: Option<Convolution>,
     encoder: Encoder,
-    targets: Vec<Target>,
+    buffers: Vec<LevelsBuffers>,
     slots: Vec<Slot>,
     serial: u64,
 }
@@ -187,64 +121,39 @@ struct Flight {
     deliver: Deliver,
 }
 
-impl Pipeline {
+impl GpuPipeline {
     /// Plans `job` on `device`. Whether the device is to be trusted is [`super::probe`]'s question.
     ///
     /// # Errors
-    /// What [`crate::Pipeline::new`] refuses, and [`Error::Refused`] or [`Error::OutOfMemory`] for what this device
+    /// What [`crate::Pipeline::new`] refuses, and [`GpuError::Refused`] or [`GpuError::OutOfMemory`] for what this device
     /// cannot do.
     pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
-        job.method.check(&job.display)?;
-        let size = (job.height, job.width);
+        let display = &job.target.display;
+        job.method.check(display)?;
+        let size = job.shape;
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
-        job.brightness.check()?;
-        if let Encoding::Deep(network) = &job.encoding {
-            deep::check(network, &job.display)?;
-        }
-        if let Some(shape) = job.response.shape()
-            && shape != size
-        {
-            return Err(crate::Error::Plan(format!(
-                "the per-pixel table is for {}×{} pixels, the hologram is {}×{}; both must be of one size",
-                shape.1, shape.0, size.1, size.0
-            ))
-            .into());
+        job.encoder.brightness.check()?;
+        job.target.check()?;
+        if let Encoding::Deep(network) = &job.encoder.encoding {
+            network.check_prefilter(display)?;
         }
         device.guarded(|| Self::build(device, job, size))
     }
 
     fn build(device: &Arc<Device>, job: &Job, size: (usize, usize)) -> Result<Self> {
-        let (display, formats) = (&job.display, (job.colour, job.depth));
+        let (target, formats) = (&job.target, (job.colour, job.depth));
+        let (display, encoder) = (&target.display, &job.encoder);
         let method = MethodPlan::new(device, &job.method, size, display, formats, job.chain)?;
         let (sums, parts) = method.sums();
-        let mean = match job.encoding {
-            Encoding::Deep(_) => None,
-            _ => Some(MeanPhase::new(device, sums, parts)?),
+        let mean = match encoder.encoding.keeps_phase() {
+            true => None,
+            false => Some(MeanPhase::new(device, sums, parts)?),
         };
         // The first to read the field turns it.
         let mut turn = mean.as_ref().map(|mean| &mean.turn);
-        let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
         // The rest of the way.
-        let plans = match (display.offset_m() - method.z_m(), &job.correction) {
-            (offset_m, Some(correction)) => Some(Propagator::for_colours_corrected(
-                size.0,
-                size.1,
-                pitch_m,
-                wavelengths_m,
-                offset_m,
-                correction,
-                pitch_m,
-            )?),
-            (0.0, None) => None,
-            (offset_m, None) => Some(Propagator::for_colours(
-                size.0,
-                size.1,
-                pitch_m,
-                wavelengths_m,
-                offset_m,
-                Padding::Reach,
-            )?),
-        };
+        let distance_m = display.offset_m() - method.z_m();
+        let plans = target.propagators(size, 1, distance_m, target.correction.as_ref())?;
         let offset = match &plans {
             None => None,
             Some(plans) => Some(Convolution::new(
@@ -258,31 +167,29 @@ impl Pipeline {
                 },
             )?),
         };
-        let modulator = (display.height(), display.width());
-        let light = (job.illumination.as_ref()).map(|light| (light, modulator));
-        let targets = (0..FLIGHTS)
-            .map(|_| Target::new(device, size))
+        let buffers = (0..FLIGHTS)
+            .map(|_| LevelsBuffers::new(device, size))
             .collect::<Result<Vec<_>>>()?;
+        let response = target.response.clone().centred(size.0, size.1)?;
         let encoder = EncoderJob {
             field: method.field(),
             size,
-            encoding: &job.encoding,
+            options: encoder,
             chain: job.chain,
-            brightness: job.brightness,
-            response: &job.response,
-            light,
+            target,
+            response: &response,
             turn,
         };
-        let encoder = Encoder::new(device, &encoder, &targets)?;
+        let encoder = Encoder::new(device, &encoder, &buffers)?;
         let slots = (0..FLIGHTS).map(|_| Slot::new(device, size)).collect();
-        Ok(Pipeline {
+        Ok(GpuPipeline {
             device: device.clone(),
             size,
             method,
             mean,
             offset,
             encoder,
-            targets,
+            buffers,
             slots,
             serial: 0,
         })
@@ -312,7 +219,7 @@ impl Pipeline {
     /// What the device does at its best, measured now, in these numbers.
     ///
     /// # Errors
-    /// What the device refuses; [`Error::Lost`].
+    /// What the device refuses; [`GpuError::Lost`].
     pub fn peak(&self) -> Result<Peak> {
         super::peak::measure(&self.device, self.method.numbers())
     }
@@ -338,10 +245,10 @@ impl Pipeline {
         self.submit_after(None, frame, deliver)
     }
 
-    /// [`Pipeline::submit`] for steady brightness, whose scale comes from `past`.
+    /// [`GpuPipeline::submit`] for steady brightness, whose scale comes from `past`.
     ///
     /// # Errors
-    /// As [`Pipeline::submit`].
+    /// As [`GpuPipeline::submit`].
     pub fn submit_after(
         &mut self,
         past: Option<Past>,
@@ -409,7 +316,7 @@ impl Pipeline {
         }
         if deliver == Deliver::Levels {
             let bytes = (4 * self.size.0 * self.size.1) as u64;
-            let levels = &self.targets[at].levels;
+            let levels = &self.buffers[at].levels;
             encoder.copy_buffer_to_buffer(levels, 0, &slot.readable, LEVELS_AT as u64, bytes);
         }
         encoder.finish()
@@ -418,22 +325,22 @@ impl Pipeline {
     /// Where a frame's picture is, or will be: RGBA of 8 bits, levels of red, green and blue. It stays until the frame
     /// is collected or finished.
     pub fn texture(&self, ticket: &Ticket) -> &wgpu::Texture {
-        &self.targets[ticket.slot].texture
+        &self.buffers[ticket.slot].texture
     }
 
     /// The same as a buffer: (H, W) words, red in the lowest byte, then green, blue and 255.
     pub fn levels(&self, ticket: &Ticket) -> &wgpu::Buffer {
-        &self.targets[ticket.slot].levels
+        &self.buffers[ticket.slot].levels
     }
 
     /// Waits for a frame and copies its levels, (3, H, W).
     ///
     /// # Errors
-    /// A frame that was not asked for with [`Deliver::Levels`]; [`Error::Lost`].
+    /// A frame that was not asked for with [`Deliver::Levels`]; [`GpuError::Lost`].
     ///
     /// # Panics
     /// If `levels` has not 3·H·W values.
-    pub fn collect(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<FrameReport> {
+    pub fn collect(&mut self, ticket: Ticket, levels: &mut [u8]) -> Result<GpuReport> {
         let area = self.size.0 * self.size.1;
         assert_eq!(levels.len(), 3 * area);
         self.take(ticket, Deliver::Levels, |bytes| {
@@ -454,8 +361,8 @@ impl Pipeline {
     /// Waits for a frame that stays on the GPU, and gives its place to another.
     ///
     /// # Errors
-    /// [`Error::Lost`].
-    pub fn finish(&mut self, ticket: Ticket) -> Result<FrameReport> {
+    /// [`GpuError::Lost`].
+    pub fn finish(&mut self, ticket: Ticket) -> Result<GpuReport> {
         self.take(ticket, Deliver::Shown, |_| {})
     }
 
@@ -464,7 +371,7 @@ impl Pipeline {
         ticket: Ticket,
         wanted: Deliver,
         read: impl FnOnce(&[u8]),
-    ) -> Result<FrameReport> {
+    ) -> Result<GpuReport> {
         let slot = &mut self.slots[ticket.slot];
         let flight = slot.flight.take_if(|flight| flight.serial == ticket.serial);
         let Some(flight) = flight else {
@@ -483,7 +390,7 @@ impl Pipeline {
             let view = slot
                 .readable
                 .get_mapped_range(..)
-                .map_err(|why| Error::Lost(super::device::one_line(why)))?;
+                .map_err(|why| GpuError::Lost(super::device::one_line(why)))?;
             read(&view);
         }
         slot.readable.unmap();
@@ -497,7 +404,7 @@ impl Pipeline {
             let ticks = stamp(2 * i + 1).saturating_sub(stamp(2 * i));
             Duration::from_secs_f64(ticks as f64 * period)
         };
-        Ok(FrameReport {
+        Ok(GpuReport {
             scale: self.encoder.scale(word(0)),
             times: slot.stamps.is_some().then(|| StageTimes {
                 input: stage(0),
@@ -508,14 +415,14 @@ impl Pipeline {
         })
     }
 
-    /// [`Pipeline::submit`] and [`Pipeline::collect`] in one.
+    /// [`GpuPipeline::submit`] and [`GpuPipeline::collect`] in one.
     ///
     /// # Errors
     /// As theirs.
     ///
     /// # Panics
     /// If `levels` has not 3·H·W values.
-    pub fn process(&mut self, frame: &Frame<'_>, levels: &mut [u8]) -> Result<FrameReport> {
+    pub fn process(&mut self, frame: &Frame<'_>, levels: &mut [u8]) -> Result<GpuReport> {
         let ticket = self.submit(frame, Deliver::Levels)?;
         self.collect(ticket, levels)
     }

@@ -2,12 +2,11 @@
 
 use super::device::Device;
 use super::input::Frame;
-use super::pipeline::{Job, Pipeline};
-use super::{Error, Result};
-use crate::brightness::{Brightness, Percentile};
-use crate::encode::Scale;
+use super::pipeline::{GpuPipeline, Job};
+use super::{GpuError, Result};
 use crate::frame::RgbdFrame;
 use crate::slm::Response;
+use crate::target::Target;
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use std::sync::Arc;
@@ -18,43 +17,39 @@ const SIZE: (usize, usize) = (37, 43);
 /// Runs a small frame of `job` on `device` and on the CPU and compares their phases.
 ///
 /// # Errors
-/// [`Error::Wrong`] where they differ by more than the numbers' rounding, [`Error::Lost`] where no answer comes, and
-/// what [`Pipeline::new`] refuses.
+/// [`GpuError::Wrong`] where they differ by more than the numbers' rounding, [`GpuError::Lost`] where no answer comes, and
+/// what [`GpuPipeline::new`] refuses.
 pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
-    let (height, width) = SIZE;
     let job = Job {
-        height,
-        width,
+        shape: SIZE,
+        target: Target {
+            // A table for each pixel is for one size.
+            response: match &job.target.response {
+                Response::PerPixel(_) => Response::Linear { bits: 8 },
+                other => other.clone(),
+            },
+            ..job.target.clone()
+        },
         colour: super::Colour::Planar,
         depth: super::Depth::F32,
-        // A table for each pixel is for one size.
-        response: match &job.response {
-            Response::PerPixel(_) => Response::Linear { bits: 8 },
-            other => other.clone(),
-        },
         ..job.clone()
     };
+    let size = 3 * SIZE.0 * SIZE.1;
     let frame = frame()?;
     let cpu = job.on_cpu()?;
     let mut scratch = cpu.scratch();
-    let mut field = vec![Complex32::ZERO; 3 * height * width];
-    let mut expected = vec![0; 3 * height * width];
-    cpu.field(&frame, &mut field, &mut scratch)?;
-    let scale = match job.brightness {
-        Brightness::FrameMax => Scale::Max,
-        Brightness::Fixed(scale) => Scale::Fixed(scale),
-        Brightness::Steady => Scale::Fixed(Percentile::new().scale(&field, None)),
-    };
-    cpu.modulate_at(&mut field, scale, &mut expected, &mut scratch);
-    let mut gpu = Pipeline::new(device, &job)?;
-    let mut levels = vec![0; 3 * height * width];
+    let mut field = vec![Complex32::ZERO; size];
+    let mut expected = vec![0; size];
+    cpu.process(&frame, &mut field, &mut expected, &mut scratch)?;
+    let mut gpu = GpuPipeline::new(device, &job)?;
+    let mut levels = vec![0; size];
     // Twice: what one frame leaves behind must not reach the next.
     for _ in 0..2 {
         gpu.process(&Frame::of(&frame), &mut levels)?;
-        let apart = apart(&levels, &expected, &job.response);
+        let apart = apart(&levels, &expected, &job.target.response);
         let most = if gpu.numbers() == "f16" { 0.1 } else { 0.01 };
         if apart > most {
-            return Err(Error::Wrong(format!(
+            return Err(GpuError::Wrong(format!(
                 "{}: phases of a small frame differ from the CPU's by {apart:.3} on average, {most} are right",
                 gpu.describe()
             )));
@@ -94,24 +89,16 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::DeviceOptions;
     use super::super::device::testing::software;
-    use super::super::renderer::{Otherwise, Renderer};
+    use super::super::renderer::Renderer;
     use super::*;
-    use crate::encode::Encoding;
     use crate::{Display, Method, Network};
 
-    /// A driver that compiles one program wrongly is found out, and the caller has its choice.
+    /// A driver that compiles one program wrongly is found out.
     #[test]
     fn a_device_that_answers_wrongly_is_not_used() {
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
-        let job = Job::new(
-            21,
-            34,
-            Method::Network(Arc::new(network.unwrap())),
-            &Display::default(),
-            Encoding::ANTI_ALIAS,
-            Brightness::Steady,
-            Response::linear(8).unwrap(),
-        );
+        let method = Method::Network(Arc::new(network.unwrap()));
+        let job = Job::new((21, 34), method, Display::default());
         let source = include_str!("encode/mean_phase.wgsl");
         let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
         assert_ne!(forged, source);
@@ -125,20 +112,10 @@ mod tests {
         device.forge("find", source, &forged);
         let wrong = probe(&device, &job).unwrap_err();
         assert!(
-            matches!(&wrong, Error::Wrong(why) if !why.contains('\n')),
+            matches!(&wrong, GpuError::Wrong(why) if !why.contains('\n')),
             "{wrong}"
         );
-        let on = |otherwise| {
-            let (device, job) = (Some(device.clone()), job.clone());
-            Renderer::on(device, DeviceOptions::default(), job, otherwise)
-        };
-        assert_eq!(on(Otherwise::Error).err(), Some(wrong.clone()));
-        let mut renderer = on(Otherwise::Cpu).unwrap();
-        assert_eq!(renderer.reason(), Some(&wrong));
-        // The CPU is steady too.
-        let frame = RgbdFrame::black((21, 34));
-        let handed = renderer.submit(&Frame::of(&frame)).unwrap();
-        let report = renderer.collect(handed, &mut vec![0; 3 * 21 * 34]).unwrap();
-        assert!(report.scale > 0.0 && report.scale.is_finite());
+        let refused = Renderer::new(Some(device), DeviceOptions::default(), job);
+        assert_eq!(refused.err(), Some(wrong));
     }
 }

@@ -7,7 +7,7 @@
 use super::chain::time;
 use super::device::{Device, Dispatch};
 use super::hidden::Search;
-use super::{Error, Result};
+use super::{GpuError, Result};
 use crate::display::Display;
 use crate::sweep::{self, MARGIN, SweepPlan};
 
@@ -60,7 +60,7 @@ impl Sweeper {
     ) -> Result<Self> {
         let radius = plan.sweep().taps / 2;
         let most = most_together(radius).ok_or_else(|| {
-            Error::Refused(format!(
+            GpuError::Refused(format!(
                 "steps of {} taps do not fit the workgroup memory that every GPU has; {} taps at most, or more planes with fewer, are right",
                 plan.sweep().taps,
                 2 * MOST_RADIUS + 1

@@ -1,12 +1,12 @@
 //! Calls into drivers that may never come back, opening and compiling, made on a thread that can be left behind.
 
 use super::device::one_line;
-use super::{Error, Result};
+use super::{GpuError, Result};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// What `work` gives on a thread of its own, and [`Error::Lost`] where that takes over `patience` or panics.
+/// What `work` gives on a thread of its own, and [`GpuError::Lost`] where that takes over `patience` or panics.
 pub(super) fn watched<T: Send + 'static>(
     what: &str,
     patience: Duration,
@@ -17,20 +17,20 @@ pub(super) fn watched<T: Send + 'static>(
         .num_threads(1)
         .thread_name(|_| "phasefront gpu".into())
         .build()
-        .map_err(|why| Error::Lost(format!("no thread to open it on: {}", one_line(why))))?;
+        .map_err(|why| GpuError::Lost(format!("no thread to open it on: {}", one_line(why))))?;
     let (send, receive) = channel();
     pool.spawn(move || {
         let done = catch_unwind(AssertUnwindSafe(work))
-            .unwrap_or_else(|_| Err(Error::Lost("its driver's interface panicked".into())));
+            .unwrap_or_else(|_| Err(GpuError::Lost("its driver's interface panicked".into())));
         // Nobody waits any more where it took too long.
         let _ = send.send(done);
     });
     match receive.recv_timeout(patience) {
         Ok(done) => done,
         Err(RecvTimeoutError::Timeout) => {
-            Err(Error::Lost(format!("no answer for {patience:?} {what}")))
+            Err(GpuError::Lost(format!("no answer for {patience:?} {what}")))
         }
-        Err(RecvTimeoutError::Disconnected) => Err(Error::Lost(format!("its thread died {what}"))),
+        Err(RecvTimeoutError::Disconnected) => Err(GpuError::Lost(format!("its thread died {what}"))),
     }
 }
 
@@ -44,13 +44,13 @@ mod tests {
     fn work_that_never_ends_is_left_behind() {
         let long = Duration::from_secs(60);
         assert_eq!(watched("adding", long, || Ok(1 + 1)), Ok(2));
-        let own = Error::Wrong("by far".into());
+        let own = GpuError::Wrong("by far".into());
         let given = own.clone();
         assert_eq!(watched("adding", long, || Err::<(), _>(given)), Err(own));
         let panicked = watched("adding", long, || -> Result<()> {
             std::panic::resume_unwind(Box::new("no"))
         });
-        assert!(matches!(panicked, Err(Error::Lost(_))), "{panicked:?}");
+        assert!(matches!(panicked, Err(GpuError::Lost(_))), "{panicked:?}");
         let end = Arc::new(Barrier::new(2));
         let stuck = end.clone();
         let left = watched(

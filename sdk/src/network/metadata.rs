@@ -1,6 +1,7 @@
 //! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
 
 use super::Head;
+use crate::display::Display;
 use crate::sweep::MAX_PLANES;
 use crate::{Error, Result};
 use tract_onnx::pb::StringStringEntryProto;
@@ -99,6 +100,12 @@ impl std::fmt::Display for InputKind {
 /// What `phasefront.input` may be.
 const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
 
+/// How far the modulator may stand from where a pre-filter was trained for: what light spreads over it stays below a
+/// tenth of a pixel of 8 µm.
+const OFFSET_TOLERANCE_M: f64 = 20e-6;
+/// How far a display may lie from what a network was trained for, relative.
+const DISPLAY_TOLERANCE: f64 = 0.02;
+
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainedDisplay {
@@ -110,6 +117,57 @@ pub struct TrainedDisplay {
     pub volume_depth_m: f64,
     /// Distance of the hologram plane from the volume's middle, metres; 0 for a midpoint hologram.
     pub offset_m: f64,
+}
+
+impl TrainedDisplay {
+    /// Checks that a network for this display is one for `display`: on another it gives wrong depths.
+    ///
+    /// # Errors
+    /// A pitch, wavelength or volume that differs by over 2 %.
+    pub(super) fn check(&self, display: &Display) -> Result<()> {
+        let pairs = [
+            ("pitch", "µm", 1e6, self.pitch_m, display.pitch_m()),
+            (
+                "volume depth",
+                "mm",
+                1e3,
+                self.volume_depth_m,
+                display.volume_depth_m(),
+            ),
+        ];
+        let colours = self
+            .wavelengths_m
+            .into_iter()
+            .zip(display.wavelengths_m())
+            .map(|(trained, given)| ("wavelength", "nm", 1e9, trained, given));
+        for (what, unit, scale, trained, given) in pairs.into_iter().chain(colours) {
+            if (trained - given).abs() > DISPLAY_TOLERANCE * trained {
+                return Err(Error::Network(format!(
+                    "it was trained for a {what} of {:.3} {unit}, the display has {:.3}; train one for this display, or use a method without a network",
+                    trained * scale,
+                    given * scale
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// [`Self::check`], and that a pre-filter for this display is one for `display`'s offset.
+    ///
+    /// # Errors
+    /// As that, or an offset that differs by over 20 µm.
+    pub(super) fn check_offset(&self, display: &Display) -> Result<()> {
+        self.check(display)?;
+        let (trained, given) = (self.offset_m, display.offset_m());
+        if (trained - given).abs() > OFFSET_TOLERANCE_M {
+            return Err(Error::Network(format!(
+                "the pre-filter was trained for an offset of {:.3} mm, the display has {:.3} mm; take one for this offset, or another encoder",
+                trained * 1e3,
+                given * 1e3
+            )));
+        }
+        Ok(())
+    }
 }
 
 /// What a file says of its network.

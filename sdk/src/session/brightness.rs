@@ -3,43 +3,19 @@
 //! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of noise
 //! would make the whole picture flicker.
 
-use crate::brightness::{Brightness, Past, Percentile};
-use crate::encode::Scale;
-use num_complex::Complex32;
+use crate::brightness::Past;
 use std::time::Duration;
 
 /// Time in which the scale goes 63 % of the way to where it should be.
 const TIME_CONSTANT: Duration = Duration::from_secs(1);
+
 /// The scale of a sequence of frames.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct BrightnessTracker {
-    brightness: Brightness,
     current: Option<f32>,
-    percentile: Percentile,
 }
 
 impl BrightnessTracker {
-    pub(super) fn new(brightness: Brightness) -> Self {
-        BrightnessTracker {
-            brightness,
-            current: None,
-            percentile: Percentile::new(),
-        }
-    }
-
-    /// The scale for `field`, which follows the last one after `elapsed`, None where it has no past.
-    pub(super) fn next(&mut self, field: &[Complex32], elapsed: Option<Duration>) -> Scale {
-        match self.brightness {
-            Brightness::FrameMax => Scale::Max,
-            Brightness::Fixed(scale) => Scale::Fixed(scale),
-            Brightness::Steady => {
-                let next = self.percentile.scale(field, self.past(elapsed));
-                self.heed(next);
-                Scale::Fixed(next)
-            }
-        }
-    }
-
     /// Where the scale of a frame comes from that follows the last one after `elapsed`.
     pub(super) fn past(&self, elapsed: Option<Duration>) -> Option<Past> {
         let (scale, elapsed) = self.current.zip(elapsed)?;
@@ -47,7 +23,7 @@ impl BrightnessTracker {
         Some(Past { scale, share })
     }
 
-    /// Hears which scale a frame got elsewhere.
+    /// Hears which scale a frame got.
     pub(super) fn heed(&mut self, scale: f32) {
         self.current = Some(scale);
     }
@@ -56,7 +32,8 @@ impl BrightnessTracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brightness::{LEAST, MOST, STEP};
+    use crate::brightness::{Brightness, LEAST, MOST, Percentile, STEP};
+    use num_complex::Complex32;
 
     fn field(level: f32, spikes: usize) -> Vec<Complex32> {
         (0..34_000)
@@ -68,15 +45,15 @@ mod tests {
     }
 
     fn scale(tracker: &mut BrightnessTracker, field: &[Complex32], elapsed: Option<u64>) -> f32 {
-        match tracker.next(field, elapsed.map(Duration::from_millis)) {
-            Scale::Fixed(scale) => scale,
-            Scale::Max => f32::NAN,
-        }
+        let past = tracker.past(elapsed.map(Duration::from_millis));
+        let scale = Brightness::Steady.scale(field, past, &mut Percentile::new());
+        tracker.heed(scale.unwrap_or(f32::NAN));
+        scale.unwrap_or(f32::NAN)
     }
 
     #[test]
     fn a_few_bright_pixels_do_not_count() {
-        let mut tracker = BrightnessTracker::new(Brightness::Steady);
+        let mut tracker = BrightnessTracker::default();
         for (spikes, expected) in [(0, 0.8), (2, 0.8), (3, 3.0)] {
             let scale = scale(&mut tracker, &field(0.8, spikes), None);
             assert!((scale - expected).abs() < 0.01, "{spikes}: {scale}");
@@ -87,14 +64,14 @@ mod tests {
 
     #[test]
     fn the_scale_moves_slowly_in_time_and_not_at_all_where_fixed() {
-        let mut tracker = BrightnessTracker::new(Brightness::Steady);
+        let mut tracker = BrightnessTracker::default();
         let start = scale(&mut tracker, &field(0.5, 0), None);
         let next = scale(&mut tracker, &field(1.0, 0), Some(33));
         assert!(next > start && next < start * 1.05);
         let later = scale(&mut tracker, &field(1.0, 0), Some(10_000));
         assert!((later - 1.0).abs() < 0.01);
-        let mut fixed = BrightnessTracker::new(Brightness::Fixed(0.7));
-        assert_eq!(scale(&mut fixed, &field(1.0, 0), Some(33)), 0.7);
+        let fixed = Brightness::Fixed(0.7).scale(&field(1.0, 0), None, &mut Percentile::new());
+        assert_eq!(fixed, Some(0.7));
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert!(Brightness::Fixed(bad).check().is_err());
         }

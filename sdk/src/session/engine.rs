@@ -1,5 +1,5 @@
 //! Where CPU and GPU meet: what takes a frame on one rung of the ladder from amplitudes and depth to levels, and which of
-//! the two it is.
+//! the two it is. The one place that falls back from the GPU to the CPU.
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
@@ -8,12 +8,13 @@ use super::on_cpu::OnCpu;
 use super::on_gpu::{Failure, OnGpu};
 use super::quality::{Backend, Rung};
 use super::statistics::BackendReport;
+use crate::depth::camera::CameraFrame;
 use crate::error::Result;
-use crate::frame::{CameraFrame, RgbdFrame};
+use crate::frame::RgbdFrame;
 use std::time::Duration;
 
 /// A frame that is ready to become a hologram.
-pub(super) struct Ready<'a> {
+pub(super) struct FrameInput<'a> {
     /// None for a frame that comes from no camera. The GPU reads it itself.
     #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
     pub(super) camera: Option<&'a CameraFrame<'a>>,
@@ -24,7 +25,7 @@ pub(super) struct Ready<'a> {
 }
 
 /// Where levels go, (3, H, W).
-pub(super) struct Target<'a> {
+pub(super) struct LevelsOut<'a> {
     pub(super) levels: &'a mut [u8],
     /// Of a display of over 8 bits.
     pub(super) words: Option<&'a mut [u16]>,
@@ -41,7 +42,7 @@ pub(super) struct Encoded {
 
 /// What a session knows of its GPU: rungs share the device, and none of them tries one again that is of no use.
 #[derive(Default)]
-pub(super) struct Seat {
+pub(super) struct GpuState {
     #[cfg(feature = "gpu")]
     device: Option<std::sync::Arc<crate::gpu::Device>>,
     #[cfg(feature = "gpu")]
@@ -49,22 +50,22 @@ pub(super) struct Seat {
 }
 
 /// What a rung is planned from.
-pub(super) struct Ground<'a> {
+pub(super) struct RungContext<'a> {
     pub(super) options: &'a SessionOptions,
     pub(super) rung: &'a Rung,
-    pub(super) seat: &'a mut Seat,
+    pub(super) gpu: &'a mut GpuState,
 }
 
 /// The plan of a rung.
 pub(super) struct Engine {
-    place: Place,
+    processor: Processor,
     /// Why it is the CPU though the GPU was asked for.
     refusal: Option<String>,
     /// Whether [`Engine::report`] gives something new.
-    pub(super) turned: bool,
+    pub(super) report_is_new: bool,
 }
 
-enum Place {
+enum Processor {
     Cpu(Box<OnCpu>),
     #[cfg(feature = "gpu")]
     Gpu(Box<OnGpu>),
@@ -75,52 +76,46 @@ impl Engine {
     ///
     /// # Errors
     /// What the CPU refuses too.
-    pub(super) fn new(ground: &mut Ground<'_>) -> Result<Self> {
-        let asked = ground.rung.backend.unwrap_or(ground.options.backend);
-        let refusal = match asked {
-            Backend::Cpu => None,
-            Backend::Gpu => match Self::on_gpu(ground)? {
-                Ok(place) => {
-                    return Ok(Engine {
-                        place,
-                        refusal: None,
-                        turned: true,
-                    });
-                }
-                Err(why) => Some(why),
+    pub(super) fn new(context: &mut RungContext<'_>) -> Result<Self> {
+        let asked = context.rung.backend.unwrap_or(context.options.backend);
+        let on_cpu = |context: &RungContext<'_>| -> Result<Processor> {
+            let cpu = OnCpu::new(context.options, context.rung)?;
+            Ok(Processor::Cpu(Box::new(cpu)))
+        };
+        let (processor, refusal) = match asked {
+            Backend::Cpu => (on_cpu(context)?, None),
+            Backend::Gpu => match Self::on_gpu(context)? {
+                Ok(processor) => (processor, None),
+                Err(why) => (on_cpu(context)?, Some(why)),
             },
         };
         Ok(Engine {
-            place: Place::Cpu(Box::new(OnCpu::new(ground.options, ground.rung)?)),
+            processor,
             refusal,
-            turned: true,
+            report_is_new: true,
         })
     }
 
     /// The GPU, or why not.
     #[cfg(feature = "gpu")]
-    fn on_gpu(ground: &mut Ground<'_>) -> Result<std::result::Result<Place, String>> {
-        let Ground {
-            options,
-            rung,
-            seat,
-        } = ground;
-        if let Some(why) = &seat.refusal {
+    fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
+        let RungContext { options, rung, gpu } = context;
+        if let Some(why) = &gpu.refusal {
             return Ok(Err(why.clone()));
         }
-        match OnGpu::new(options, rung, seat.device.clone()) {
-            Ok(gpu) => {
-                seat.device = gpu.device().cloned();
-                Ok(Ok(Place::Gpu(Box::new(gpu))))
+        match OnGpu::new(options, rung, gpu.device.clone()) {
+            Ok(on_gpu) => {
+                gpu.device = on_gpu.device().cloned();
+                Ok(Ok(Processor::Gpu(Box::new(on_gpu))))
             }
-            Err(crate::gpu::Error::Core(why)) => Err(why),
-            Err(why) => Ok(Err(seat.refuse(&why))),
+            Err(crate::gpu::GpuError::Core(why)) => Err(why),
+            Err(why) => Ok(Err(gpu.refuse(&why))),
         }
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn on_gpu(ground: &mut Ground<'_>) -> Result<std::result::Result<Place, String>> {
-        let Seat {} = ground.seat;
+    fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
+        let GpuState {} = context.gpu;
         Ok(Err(
             "no GPU: this library was built without it (feature gpu)".into(),
         ))
@@ -128,10 +123,10 @@ impl Engine {
 
     /// What runs the frames, and why.
     pub(super) fn report(&self) -> BackendReport {
-        let mut report = match &self.place {
-            Place::Cpu(cpu) => cpu.report(),
+        let mut report = match &self.processor {
+            Processor::Cpu(cpu) => cpu.report(),
             #[cfg(feature = "gpu")]
-            Place::Gpu(gpu) => gpu.report(),
+            Processor::Gpu(gpu) => gpu.report(),
         };
         if let Some(refusal) = &self.refusal {
             if report.name.is_empty() {
@@ -149,37 +144,41 @@ impl Engine {
     ///
     /// # Errors
     /// A frame of another shape, or one that was lost with its GPU.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // The context is for falling back.
     pub(super) fn process(
         &mut self,
-        ground: &mut Ground<'_>,
-        ready: &Ready<'_>,
+        context: &mut RungContext<'_>,
+        input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
-        target: Target<'_>,
+        out: LevelsOut<'_>,
     ) -> Result<Encoded> {
-        match &mut self.place {
-            Place::Cpu(cpu) => {
-                let bits = ground.options.display.bits();
-                cpu.process(ready.rgbd, ready.elapsed, brightness, target, bits)
+        match &mut self.processor {
+            Processor::Cpu(cpu) => {
+                let past = brightness.past(input.elapsed);
+                let made = cpu.process(input.rgbd, past, out)?;
+                brightness.heed(made.scale);
+                Ok(made)
             }
             #[cfg(feature = "gpu")]
-            Place::Gpu(gpu) => {
+            Processor::Gpu(gpu) => {
                 let before = gpu.openings();
-                let made = gpu.process(ready, brightness, target.levels);
+                let made = gpu.process(input, brightness, out.levels);
                 if gpu.openings() != before {
-                    ground.seat.device = gpu.device().cloned();
-                    self.turned = true;
+                    context.gpu.device = gpu.device().cloned();
+                    self.report_is_new = true;
                 }
                 match made {
                     Ok(made) => Ok(made),
                     Err(Failure::Frame(why)) => Err(why),
                     Err(Failure::Gpu(why)) => {
                         // The GPU's memory goes first.
-                        gpu.let_go();
-                        ground.seat.device = None;
-                        self.refusal = Some(ground.seat.refuse(&why));
-                        self.place = Place::Cpu(Box::new(OnCpu::new(ground.options, ground.rung)?));
-                        self.turned = true;
-                        self.process(ground, ready, brightness, target)
+                        gpu.release();
+                        context.gpu.device = None;
+                        self.refusal = Some(context.gpu.refuse(&why));
+                        let cpu = OnCpu::new(context.options, context.rung)?;
+                        self.processor = Processor::Cpu(Box::new(cpu));
+                        self.report_is_new = true;
+                        self.process(context, input, brightness, out)
                     }
                 }
             }
@@ -188,12 +187,12 @@ impl Engine {
 }
 
 #[cfg(feature = "gpu")]
-impl Seat {
+impl GpuState {
     /// The reason in words; one that holds for all rungs is kept.
-    fn refuse(&mut self, why: &crate::gpu::Error) -> String {
-        use crate::gpu::Error;
+    fn refuse(&mut self, why: &crate::gpu::GpuError) -> String {
+        use crate::gpu::GpuError;
         let reason = why.to_string();
-        if let Error::None(_) | Error::Wrong(_) | Error::Lost(_) = why {
+        if let GpuError::None(_) | GpuError::Wrong(_) | GpuError::Lost(_) = why {
             self.refusal = Some(reason.clone());
         }
         reason

@@ -1,15 +1,11 @@
 //! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
 
-use super::SessionOptions;
 use super::live::lock;
 use super::statistics::FrameTimes;
-use crate::display::Display;
 use crate::error::{Error, Result};
-use crate::illumination::Illumination;
 use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch};
-use crate::slm::Response;
-use crate::wave::zernike::Aberration;
+use crate::target::Target;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -59,10 +55,7 @@ impl<T> Drop for Pooled<T> {
 
 /// What looking at results needs; shared by all of a session's.
 pub(super) struct Viewer {
-    pub(super) display: Display,
-    pub(super) response: Response,
-    illumination: Option<Illumination>,
-    correction: Option<Aberration>,
+    target: Target,
     plan: Mutex<Option<ViewPlan>>,
 }
 
@@ -70,18 +63,13 @@ struct ViewPlan {
     shape: (usize, usize),
     z_m: f64,
     preview: Preview,
-    /// That of the hologram's pixels.
-    response: Response,
     scratch: PreviewScratch,
 }
 
 impl Viewer {
-    pub(super) fn new(options: &SessionOptions) -> Self {
+    pub(super) fn new(target: Target) -> Self {
         Viewer {
-            display: options.display.clone(),
-            response: options.response.clone(),
-            illumination: options.illumination.clone(),
-            correction: options.correction,
+            target,
             plan: Mutex::new(None),
         }
     }
@@ -183,9 +171,9 @@ impl Hologram {
         self.rung
     }
 
-    /// The display that it is for.
-    pub fn display(&self) -> &Display {
-        &self.viewer.display
+    /// What it is for.
+    pub fn target(&self) -> &Target {
+        &self.viewer.target
     }
 
     /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, metres: where to focus
@@ -194,7 +182,10 @@ impl Hologram {
         let (height, width) = self.shape;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
         let d = self.depth.values[at(y, height) * width + at(x, width)];
-        self.viewer.display.z_of_depth(f64::from(d) / 65535.0)
+        self.viewer
+            .target
+            .display
+            .z_of_depth(f64::from(d) / 65535.0)
     }
 
     /// What an eye focused at `z_m` sees, as (`height`, `width`) rows of red, green, blue, alpha 255 into `rgba`. The
@@ -214,31 +205,20 @@ impl Hologram {
             plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
         };
         if plan.as_mut().filter(fits).is_none() {
-            let response = self.viewer.response.clone();
-            let display = &self.viewer.display;
-            let mut preview = Preview::new(self.shape, display, z_m, (height, width))?;
-            if let Some(illumination) = &self.viewer.illumination {
-                preview = preview.with_illumination(illumination.clone(), display);
-            }
-            if let Some(correction) = &self.viewer.correction {
-                preview = preview.with_correction(correction, display, z_m)?;
-            }
+            let target = &self.viewer.target;
+            let preview = Preview::new(self.shape, target, z_m, (height, width))?;
             *plan = Some(ViewPlan {
                 shape: self.shape,
                 z_m,
                 scratch: preview.scratch(),
                 preview,
-                response: response.centred(self.shape.0, self.shape.1)?,
             });
         }
         if let Some(ViewPlan {
-            preview,
-            response,
-            scratch,
-            ..
+            preview, scratch, ..
         }) = &mut *plan
         {
-            preview.look(self.levels(), response, self.scale, rgba, scratch);
+            preview.look(self.levels(), self.scale, rgba, scratch);
         }
         Ok(())
     }

@@ -1,23 +1,23 @@
 //! A rung of the ladder on the CPU: from amplitudes and depth to levels.
 
 use super::SessionOptions;
-use super::brightness::BrightnessTracker;
-use super::engine::{Encoded, Target};
+use super::engine::{Encoded, LevelsOut};
 use super::quality::Rung;
 use super::statistics::BackendReport;
-use crate::encode::Scale;
+use crate::brightness::Past;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
 use crate::pipeline::{Pipeline, PipelineScratch};
 use crate::slm;
 use num_complex::Complex32;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Plan and memory.
 pub(super) struct OnCpu {
     pipeline: Pipeline,
     scratch: PipelineScratch,
     field: Vec<Complex32>,
+    bits: u32,
     /// Where the display has over 8 bits.
     phases: Vec<f32>,
 }
@@ -25,26 +25,15 @@ pub(super) struct OnCpu {
 impl OnCpu {
     pub(super) fn new(options: &SessionOptions, rung: &Rung) -> Result<Self> {
         let (height, width) = (rung.height, rung.width);
-        let mut pipeline = Pipeline::new(
-            height,
-            width,
-            rung.method.clone(),
-            &options.display,
-            options.encoding.clone(),
-            Scale::Max,
-            options.response.clone(),
-        )?;
-        if let Some(illumination) = &options.illumination {
-            pipeline = pipeline.with_illumination(illumination.clone());
-        }
-        if let Some(correction) = &options.correction {
-            pipeline = pipeline.with_correction(correction)?;
-        }
+        let method = rung.method.clone();
+        let pipeline = Pipeline::new((height, width), method, &options.target, &options.encoder)?;
+        let bits = options.target.display.bits();
         Ok(OnCpu {
             scratch: pipeline.scratch(),
             pipeline,
             field: vec![Complex32::ZERO; 3 * height * width],
-            phases: match options.display.bits() {
+            bits,
+            phases: match bits {
                 0..=8 => Vec::new(),
                 _ => vec![0.0; 3 * height * width],
             },
@@ -59,31 +48,30 @@ impl OnCpu {
         })
     }
 
-    /// Makes the levels, of `bits`, of `frame`, which follows the last one after `elapsed`.
+    /// Makes the levels of `frame`, whose steady brightness comes from `past`.
     pub(super) fn process(
         &mut self,
         frame: &RgbdFrame,
-        elapsed: Option<Duration>,
-        brightness: &mut BrightnessTracker,
-        target: Target<'_>,
-        bits: u32,
+        past: Option<Past>,
+        out: LevelsOut<'_>,
     ) -> Result<Encoded> {
         let OnCpu {
             pipeline,
             scratch,
             field,
+            bits,
             phases,
         } = self;
-        let (method, propagate) = pipeline.field(frame, field, scratch)?;
+        let follows = past.is_some();
+        let (method, propagate) = pipeline.field_after(follows, frame, field, scratch)?;
         let start = Instant::now();
-        let scale = brightness.next(field, elapsed);
-        let modulation = match target.words {
-            None => pipeline.modulate_at(field, scale, target.levels, scratch),
+        let modulation = match out.words {
+            None => pipeline.modulate_after(past, field, out.levels, scratch),
             Some(words) => {
-                let modulation = pipeline.phases_at(field, scale, phases, scratch);
-                slm::linear_words(phases, bits, words);
-                for (level, word) in target.levels.iter_mut().zip(words) {
-                    *level = (*word >> (bits - 8)) as u8;
+                let modulation = pipeline.phases_after(past, field, phases, scratch);
+                slm::linear_words(phases, *bits, words);
+                for (level, word) in out.levels.iter_mut().zip(words) {
+                    *level = (*word >> (*bits - 8)) as u8;
                 }
                 modulation
             }

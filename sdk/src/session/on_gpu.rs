@@ -2,13 +2,13 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
-use super::engine::{Encoded, Ready};
+use super::engine::{Encoded, FrameInput};
 use super::quality::Rung;
 use super::statistics::BackendReport;
 use crate::error::Error;
 use crate::gpu::{
-    self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, Handed, Job,
-    Otherwise, Renderer,
+    self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError,
+    InFlight, Job, Renderer,
 };
 use std::sync::Arc;
 use std::time::Instant;
@@ -28,13 +28,13 @@ pub(super) enum Failure {
     /// It is lost or wrong; the next one goes on.
     Frame(Error),
     /// The GPU is of no use for this rung.
-    Gpu(gpu::Error),
+    Gpu(GpuError),
 }
 
-impl From<gpu::Error> for Failure {
-    fn from(why: gpu::Error) -> Self {
+impl From<GpuError> for Failure {
+    fn from(why: GpuError) -> Self {
         match why {
-            gpu::Error::Core(why) => Failure::Frame(why),
+            GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Gpu(why),
         }
     }
@@ -50,30 +50,19 @@ impl OnGpu {
         rung: &Rung,
         device: Option<Arc<Device>>,
     ) -> gpu::Result<Self> {
-        if options.display.bits() > 8 {
-            return Err(gpu::Error::Refused(format!(
+        if options.target.display.bits() > 8 {
+            return Err(GpuError::Refused(format!(
                 "it writes levels of up to 8 bits, the display has {}",
-                options.display.bits()
+                options.target.display.bits()
             )));
         }
-        let (height, width) = (rung.height, rung.width);
-        let response = options.response.clone().centred(height, width)?;
+        let shape = (rung.height, rung.width);
         let job = Job {
-            illumination: options.illumination.clone(),
-            correction: options.correction,
+            encoder: options.encoder.clone(),
             chain: options.gpu.chain,
-            ..Job::new(
-                height,
-                width,
-                rung.method.clone(),
-                &options.display,
-                options.encoding.clone(),
-                options.brightness,
-                response,
-            )
+            ..Job::new(shape, rung.method.clone(), options.target.clone())
         };
-        let device_options = options.gpu.device.clone();
-        Renderer::on(device, device_options, job, Otherwise::Error).map(OnGpu)
+        Renderer::new(device, options.gpu.device.clone(), job).map(OnGpu)
     }
 
     pub(super) fn device(&self) -> Option<&Arc<Device>> {
@@ -87,7 +76,7 @@ impl OnGpu {
                 why: self
                     .0
                     .reason()
-                    .map_or_else(String::new, gpu::Error::to_string),
+                    .map_or_else(String::new, GpuError::to_string),
             };
         };
         let mut why = format!(
@@ -109,29 +98,29 @@ impl OnGpu {
     }
 
     /// Gives the GPU's memory back.
-    pub(super) fn let_go(&mut self) {
-        self.0.let_go();
+    pub(super) fn release(&mut self) {
+        self.0.release();
     }
 
     /// Makes the levels of a frame, whose colour is the camera's where it comes from one.
     pub(super) fn process(
         &mut self,
-        ready: &Ready<'_>,
+        input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<Encoded, Failure> {
         let start = Instant::now();
-        let handed = self.hand_in(ready, brightness)?;
-        self.take_out(handed, start, brightness, levels)
+        let frame = self.submit(input, brightness)?;
+        self.collect(frame, start, brightness, levels)
     }
 
-    fn hand_in(
+    fn submit(
         &mut self,
-        ready: &Ready<'_>,
+        input: &FrameInput<'_>,
         brightness: &BrightnessTracker,
-    ) -> Result<Handed, Failure> {
-        let planar = Frame::of(ready.rgbd);
-        let (colour, frame) = match ready.camera {
+    ) -> Result<InFlight, Failure> {
+        let planar = Frame::of(input.rgbd);
+        let (colour, frame) = match input.camera {
             None => (Colour::Planar, planar),
             Some(camera) => {
                 let (height, width) = camera.colour.shape();
@@ -149,19 +138,19 @@ impl OnGpu {
             }
         };
         self.0.expect(colour, Depth::F32)?;
-        let past = brightness.past(ready.elapsed);
-        Ok(self.0.submit_after(past, &frame)?)
+        let past = brightness.past(input.elapsed);
+        Ok(self.0.submit(past, &frame)?)
     }
 
-    fn take_out(
+    fn collect(
         &mut self,
-        handed: Handed,
+        frame: InFlight,
         start: Instant,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<Encoded, Failure> {
-        let report = self.0.collect(handed, levels).map_err(|why| match why {
-            gpu::Error::Core(why) => Failure::Frame(why),
+        let report = self.0.collect(frame, levels).map_err(|why| match why {
+            GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Frame(Error::Lost(format!("{why}, and this frame with it"))),
         })?;
         brightness.heed(report.scale);
@@ -192,7 +181,7 @@ mod tests {
         let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
         let method = Method::Network(Arc::new(network.unwrap()));
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
-        let mut options = SessionOptions::new(display, method).unwrap();
+        let mut options = SessionOptions::new(display, method);
         options.gpu.device.name = Some("llvmpipe".into());
         let Ok(mut gpu) = OnGpu::new(&options, &options.ladder[0], None) else {
             println!("skipped: no driver in software (mesa-vulkan-drivers)");
@@ -200,28 +189,28 @@ mod tests {
         };
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
-        let mut brightness = BrightnessTracker::new(options.brightness);
+        let mut brightness = BrightnessTracker::default();
         let mut first = vec![0; 3 * 21 * 34];
-        let mut ready = Ready {
+        let mut input = FrameInput {
             camera: None,
             rgbd: &frame,
             elapsed: None,
         };
-        let made = gpu.process(&ready, &mut brightness, &mut first);
+        let made = gpu.process(&input, &mut brightness, &mut first);
         let scale = made.unwrap().scale;
-        ready.elapsed = Some(Duration::from_millis(33));
-        let handed = gpu.hand_in(&ready, &brightness).unwrap();
+        input.elapsed = Some(Duration::from_millis(33));
+        let flying = gpu.submit(&input, &brightness).unwrap();
         let before = gpu.openings();
         gpu.device().unwrap().wgpu().0.destroy();
         let mut levels = vec![0; first.len()];
-        let lost = gpu.take_out(handed, Instant::now(), &mut brightness, &mut levels);
+        let lost = gpu.collect(flying, Instant::now(), &mut brightness, &mut levels);
         assert!(
             matches!(&lost, Err(Failure::Frame(Error::Lost(why))) if !why.contains('\n')),
             "{:?}",
             lost.err()
         );
         assert_eq!(gpu.report().name, "no GPU at this moment");
-        let made = gpu.process(&ready, &mut brightness, &mut levels);
+        let made = gpu.process(&input, &mut brightness, &mut levels);
         // The same scene: its scale stays, and so do its levels.
         assert!((made.unwrap().scale - scale).abs() < 1e-6);
         assert_eq!(levels, first);

@@ -1,9 +1,10 @@
 //! A camera frame copied into the session's own memory: what a live session keeps when the camera takes its buffer
 //! back.
 
+use crate::depth::camera::{Alignment, CameraFrame};
 use crate::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
 use crate::error::Result;
-use crate::frame::{Alignment, CameraFrame, ColourFormat, ColourImage, Orientation, Plane};
+use crate::frame::{ColourFormat, ColourImage, Orientation, Plane};
 
 /// Memory of one plane, with its strides.
 #[derive(Debug, Default)]

@@ -2,13 +2,14 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
-use super::engine::{Engine, Ground, Ready, Seat, Target};
+use super::engine::{Engine, FrameInput, GpuState, LevelsOut, RungContext};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
+use crate::depth::camera::CameraFrame;
 use crate::depth::stream::DepthStream;
 use crate::error::{Error, Result};
-use crate::frame::{CameraFrame, ColourPlan, ColourScratch, RgbdFrame};
+use crate::frame::{ColourPlan, ColourScratch, RgbdFrame};
 use rayon::ThreadPool;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -29,7 +30,7 @@ pub(super) struct Stages {
     options: SessionOptions,
     pool: ThreadPool,
     ladder: Ladder,
-    seat: Seat,
+    gpu: GpuState,
     /// None after a panic: it is made anew.
     plan: Option<RungPlan>,
     brightness: BrightnessTracker,
@@ -61,10 +62,10 @@ impl Stages {
         };
         let mut stages = Stages {
             ladder: Ladder::new(options.ladder.len(), start),
-            seat: Seat::default(),
+            gpu: GpuState::default(),
             plan: None,
-            brightness: BrightnessTracker::new(options.brightness),
-            viewer: Arc::new(Viewer::new(&options)),
+            brightness: BrightnessTracker::default(),
+            viewer: Arc::new(Viewer::new(options.target.clone())),
             levels: Pool::default(),
             words: Pool::default(),
             depths: Pool::default(),
@@ -81,19 +82,15 @@ impl Stages {
             options,
             pool,
             ladder,
-            seat,
+            gpu,
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
         let shape = (rung.height, rung.width);
         let depth = DepthStream::new(options.depth, shape)?;
-        let mut ground = Ground {
-            options,
-            rung,
-            seat,
-        };
+        let mut context = RungContext { options, rung, gpu };
         Ok(RungPlan {
-            engine: pool.install(|| Engine::new(&mut ground))?,
+            engine: pool.install(|| Engine::new(&mut context))?,
             frame: RgbdFrame::black(shape),
             depth,
             colour: None,
@@ -111,14 +108,14 @@ impl Stages {
     }
 
     /// What runs the frames, where that is not what it was when this was last asked.
-    pub(super) fn news(&mut self) -> Option<BackendReport> {
+    pub(super) fn new_report(&mut self) -> Option<BackendReport> {
         let engine = &mut self.plan.as_mut()?.engine;
-        std::mem::take(&mut engine.turned).then(|| engine.report())
+        std::mem::take(&mut engine.report_is_new).then(|| engine.report())
     }
 
     #[cfg(feature = "gpu")]
     pub(super) fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
-        self.seat.device()
+        self.gpu.device()
     }
 
     /// Runs a black frame through all stages that do not need a camera's frame.
@@ -128,28 +125,24 @@ impl Stages {
             pool,
             levels,
             options,
-            seat,
+            gpu,
             ladder,
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
         let mut levels = levels.take(3 * rung.height * rung.width);
-        let mut brightness = BrightnessTracker::new(options.brightness);
+        let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
         let result = pool.install(|| {
             plan.engine.process(
-                &mut Ground {
-                    options,
-                    rung,
-                    seat,
-                },
-                &Ready {
+                &mut RungContext { options, rung, gpu },
+                &FrameInput {
                     camera: None,
                     rgbd: &plan.frame,
                     elapsed: None,
                 },
                 &mut brightness,
-                Target {
+                LevelsOut {
                     levels: &mut levels.values,
                     words: None,
                 },
@@ -213,13 +206,13 @@ impl Stages {
             depths,
             options,
             ladder,
-            seat,
+            gpu,
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
         let shape = (rung.height, rung.width);
         let mut levels = levels.take(3 * shape.0 * shape.1);
-        let wide = options.display.bits() > 8;
+        let wide = options.target.display.bits() > 8;
         let mut words = wide.then(|| words.take(3 * shape.0 * shape.1));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
@@ -244,18 +237,14 @@ impl Stages {
             }
             times.depth = start.elapsed();
             let encoded = plan.engine.process(
-                &mut Ground {
-                    options,
-                    rung,
-                    seat,
-                },
-                &Ready {
+                &mut RungContext { options, rung, gpu },
+                &FrameInput {
                     camera: Some(frame),
                     rgbd: &plan.frame,
                     elapsed,
                 },
                 brightness,
-                Target {
+                LevelsOut {
                     levels: &mut levels.values,
                     words: words.as_mut().map(|words| &mut words.values[..]),
                 },

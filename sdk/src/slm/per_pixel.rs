@@ -367,7 +367,7 @@ impl PerPixel {
             let next = value(k + 1);
             if next >= wanted {
                 let t = k as f32 + (wanted - here) / (next - here);
-                return crate::encode::double_phase::wrap(t * (TAU / self.intervals as f32));
+                return super::wrap(t * (TAU / self.intervals as f32));
             }
             here = next;
         }

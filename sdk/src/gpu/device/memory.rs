@@ -1,7 +1,7 @@
 //! Memory of a GPU, and its way back.
 
 use super::{Device, one_line};
-use crate::gpu::{Error, Result};
+use crate::gpu::{GpuError, Result};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 
 /// Constants of a program and where they lie.
@@ -31,7 +31,7 @@ impl Device {
             .max_storage_buffer_binding_size
             .min(self.limits.max_buffer_size);
         if bytes as u64 > most {
-            return Err(Error::Refused(format!(
+            return Err(GpuError::Refused(format!(
                 "{what} of {} MB is too large for {}, which takes {} MB; smaller frames are right",
                 bytes >> 20,
                 self.name(),
@@ -61,7 +61,7 @@ impl Device {
     pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
         if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
-            return Err(Error::Refused(format!("{what} do not fit {}", self.name())));
+            return Err(GpuError::Refused(format!("{what} do not fit {}", self.name())));
         }
         let usage = match uniform {
             true => wgpu::BufferUsages::UNIFORM,
@@ -124,8 +124,8 @@ impl Device {
         // Another thread that polls the device may be the one that says so.
         match receive.recv_timeout(self.patience) {
             Ok(Ok(())) => Ok(()),
-            Ok(Err(why)) => Err(Error::Lost(one_line(why))),
-            Err(why) => Err(Error::Lost(one_line(why))),
+            Ok(Err(why)) => Err(GpuError::Lost(one_line(why))),
+            Err(why) => Err(GpuError::Lost(one_line(why))),
         }
     }
 }
@@ -134,7 +134,7 @@ impl Device {
 pub(crate) fn copy_mapped(buffer: &wgpu::Buffer, into: &mut [u8]) -> Result<()> {
     let view = buffer
         .get_mapped_range(..)
-        .map_err(|why| Error::Lost(one_line(why)))?;
+        .map_err(|why| GpuError::Lost(one_line(why)))?;
     into.copy_from_slice(&view[..into.len()]);
     Ok(())
 }

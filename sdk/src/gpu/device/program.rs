@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::{Device, lock};
-use crate::gpu::{Error, Result};
+use crate::gpu::{GpuError, Result};
 
 /// A compiled program.
 #[derive(Clone)]
@@ -18,7 +18,7 @@ impl Program {
     ) -> Result<Dispatch> {
         let most = device.limits.max_compute_workgroups_per_dimension as usize;
         if grid.iter().any(|&n| n > most) {
-            return Err(Error::Refused(format!(
+            return Err(GpuError::Refused(format!(
                 "{grid:?} workgroups are too many for {}, which takes {most} a side; smaller frames are right",
                 device.name()
             )));

@@ -1,17 +1,17 @@
 //! Double phase and the modulator's response: from a filtered field to levels, in one sweep.
 
 use super::filter::Filtered;
-use super::{COLUMNS, EncoderJob, Target};
+use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::brightness::Brightness;
 use crate::gpu::Result;
 use crate::gpu::device::{Constants, Device, Dispatch};
 use crate::slm::{Response, per_pixel};
 
-/// Double phase of one field into several targets.
+/// Double phase of one field into several buffers.
 pub(super) struct DoublePhase {
     /// Finds the largest amplitude, where it is what full light stands for.
     peak: Option<Dispatch>,
-    /// For each target.
+    /// For each of the buffers.
     encode: Vec<Dispatch>,
 }
 
@@ -23,9 +23,9 @@ impl DoublePhase {
         frame: &Constants,
         filtered: &Filtered<'_>,
         largest: &wgpu::Buffer,
-        targets: &[Target],
+        buffers: &[LevelsBuffers],
     ) -> Result<Self> {
-        let fixed = match job.brightness {
+        let fixed = match job.options.brightness {
             Brightness::Fixed(scale) => scale,
             _ => 0.0,
         };
@@ -33,7 +33,8 @@ impl DoublePhase {
         settings[..filtered.taps.len()].copy_from_slice(&filtered.taps);
         let settings = device.constants("settings", bytemuck::cast_slice(&settings))?;
         static UNLIT: [f32; 12] = [1.0; 12];
-        let gains = job.light.map_or(&UNLIT[..], |(light, _)| light.gains());
+        let light = job.target.illumination.as_ref();
+        let gains = light.map_or(&UNLIT[..], |light| light.gains());
         let gains = device.table("light", bytemuck::cast_slice(gains))?;
         let curves = Curves::of(job.response, job.size);
         let source = header(job, filtered, &curves) + include_str!("double_phase.wgsl");
@@ -47,7 +48,7 @@ impl DoublePhase {
             (3, turn.as_entire_binding()),
         ];
         let grid = [job.size.1.div_ceil(COLUMNS), job.size.0, 1];
-        let peak = if job.brightness == Brightness::FrameMax {
+        let peak = if job.options.brightness == Brightness::FrameMax {
             let program = device.program("the largest amplitude", source.clone(), "peak");
             let mut arguments = common.to_vec();
             arguments.push((4, largest.as_entire_binding()));
@@ -56,25 +57,25 @@ impl DoublePhase {
             None
         };
         let program = device.program("double phase", source, "encode");
-        let into = |target: &Target| {
-            let view = target.texture.create_view(&Default::default());
+        let into = |buffers: &LevelsBuffers| {
+            let view = buffers.texture.create_view(&Default::default());
             let mut arguments = common.to_vec();
             arguments.push((5, largest.as_entire_binding()));
-            arguments.push((6, target.levels.as_entire_binding()));
+            arguments.push((6, buffers.levels.as_entire_binding()));
             arguments.push((7, wgpu::BindingResource::TextureView(&view)));
             arguments.push((8, response.buffer.as_entire_binding()));
             program.on(device, &arguments, grid)
         };
-        let encode = targets.iter().map(into).collect::<Result<_>>()?;
+        let encode = buffers.iter().map(into).collect::<Result<_>>()?;
         Ok(DoublePhase { peak, encode })
     }
 
-    /// Encodes into the target of that index.
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, target: usize) {
+    /// Encodes into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         if let Some(peak) = &self.peak {
             peak.run(pass);
         }
-        self.encode[target].run(pass);
+        self.encode[buffers].run(pass);
     }
 }
 
@@ -119,8 +120,8 @@ impl Curves {
 
 /// What is constant in the program.
 fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> String {
-    let (lit, modulator) = match job.light {
-        Some((light, modulator)) => (light.nodes(), modulator),
+    let (lit, modulator) = match &job.target.illumination {
+        Some(light) => (light.nodes(), job.target.modulator()),
         None => ((2, 2), job.size),
     };
     format!(
@@ -142,7 +143,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         ",
         filtered.taps.len() - 1,
         filtered.turn.is_some(),
-        matches!(job.brightness, Brightness::Fixed(_)),
+        matches!(job.options.brightness, Brightness::Fixed(_)),
         curves.steps,
         curves.table.len() > 1,
         curves.pixels,
@@ -150,7 +151,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         curves.nodes.1,
         curves.spacing,
         curves.intervals,
-        job.light.is_some(),
+        job.target.illumination.is_some(),
         lit.0,
         lit.1,
         modulator.0,

@@ -45,7 +45,7 @@ impl Filter {
             turn: job.turn,
             taps: vec![1.0],
         };
-        let filter = match job.encoding {
+        let filter = match &job.options.encoding {
             Encoding::DoublePhase => Filter::None,
             Encoding::AntiAlias { sigma, width } => {
                 let blur = AntiAlias::new(*sigma, *width)?;

@@ -1,7 +1,7 @@
 //! The rounding of a chain's int8 input as comparisons.
 
 use crate::gpu::device::{Constants, Device};
-use crate::gpu::{Error, Result};
+use crate::gpu::{GpuError, Result};
 use crate::network::chain::{Chain, Quantisation};
 
 /// The smallest real numbers that round to each u8 value or above, as the first layer and as the last one round their
@@ -10,7 +10,7 @@ pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
     let rounding = |i: usize| {
         let layer = &chain.layers[i];
         layer.quantisation.input.ok_or_else(|| {
-            Error::Core(crate::Error::Network(format!(
+            GpuError::Core(crate::Error::Network(format!(
                 "layer {i}'s input is not rounded"
             )))
         })

@@ -1,9 +1,9 @@
 //! What a camera gives at one moment: colour, depth, and how they belong together.
 
-use super::{ColourImage, Orientation};
-use crate::depth::align::Cameras;
-use crate::depth::image::DepthImage;
+use super::align::Cameras;
+use super::image::DepthImage;
 use crate::error::{Error, Result};
+use crate::frame::{ColourImage, Orientation};
 
 /// How far the aspect ratios of aligned colour and depth may lie apart, relative.
 const ASPECT_TOLERANCE: f64 = 0.02;

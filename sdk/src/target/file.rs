@@ -1,9 +1,9 @@
-//! A calibrated display in one file, for an app to carry: its physics, what its modulator answers, its laser, what
-//! corrects its optics. `phasefront calibrate pack` writes it from what calibration found.
+//! A target in one file, for an app to carry. `phasefront calibrate pack` writes it from what calibration found.
 //!
 //! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the laser's gains as f32, (3, Gh, Gw), then the
 //! bytes of the per-pixel table; numbers little-endian.
 
+use super::Target;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
@@ -17,19 +17,6 @@ use std::sync::Arc;
 const MAGIC: &[u8; 8] = b"PFCALIB1";
 /// Most nodes of a laser's map along an axis.
 const MOST_NODES: usize = 65536;
-
-/// A display as it was calibrated.
-#[derive(Debug, Clone)]
-pub struct Calibration {
-    /// The physics.
-    pub display: Display,
-    /// What the modulator answers to a phase.
-    pub response: Response,
-    /// The laser's light over the modulator.
-    pub illumination: Option<Illumination>,
-    /// What corrects the optics, one for all depths.
-    pub correction: Option<Aberration>,
-}
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,7 +38,7 @@ fn refuse(what: impl std::fmt::Display) -> Error {
     Error::Plan(format!("calibration file: {what}"))
 }
 
-impl Calibration {
+impl Target {
     /// Reads the file's bytes.
     ///
     /// # Errors
@@ -93,7 +80,7 @@ impl Calibration {
             }
         };
         let response = match (header.lut, table) {
-            (None, []) => Response::linear(header.display.bits().min(8))?,
+            (None, []) => Target::from(&header.display).response,
             (Some(levels), []) => {
                 let count = levels.len();
                 Response::lut(levels.try_into().map_err(|_| {
@@ -105,28 +92,22 @@ impl Calibration {
             (None, table) => Response::PerPixel(Arc::new(PerPixel::from_bytes(table)?)),
             (Some(_), _) => return Err(refuse("holds both a table and one for each pixel")),
         };
-        let shape = (header.display.height(), header.display.width());
-        if let Some(other) = response.shape()
-            && other != shape
-        {
-            return Err(refuse(format!(
-                "its table is for {}×{} pixels, its display has {}×{}",
-                other.1, other.0, shape.1, shape.0
-            )));
-        }
-        Ok(Calibration {
+        let target = Target {
             display: header.display,
             response,
             illumination,
             correction: header.correction.map(Aberration::new).transpose()?,
-        })
+        };
+        target.check().map_err(refuse)?;
+        Ok(target)
     }
 
     /// The file's bytes.
     ///
     /// # Errors
-    /// None for values that were checked when they were made.
+    /// As [`Self::from_bytes`] would.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
+        self.check()?;
         let (lut, table) = match &self.response {
             Response::Linear { .. } => (None, vec![]),
             Response::Lut { level, .. } => (Some(level.to_vec()), vec![]),
@@ -157,7 +138,7 @@ mod tests {
     use crate::slm::per_pixel::nodes;
     use ndarray::Array3;
 
-    fn calibration() -> Calibration {
+    fn calibration() -> Target {
         let display = Display::from_toml("width = 40\nheight = 24\noffset_mm = 3.5").unwrap();
         let (rows, columns) = nodes(24, 40, 16);
         let levels: Vec<f32> = (0..3 * rows * columns)
@@ -167,7 +148,7 @@ mod tests {
         let table = PerPixel::new(24, 40, 16, 4, &levels, &turns).unwrap();
         let amplitude =
             Array3::from_shape_fn((3, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
-        Calibration {
+        Target {
             display,
             response: Response::PerPixel(Arc::new(table)),
             illumination: Some(Illumination::new(amplitude.view()).unwrap()),
@@ -179,11 +160,11 @@ mod tests {
     fn what_is_written_is_read() {
         let want = calibration();
         let bytes = want.to_bytes().unwrap();
-        let got = Calibration::from_bytes(&bytes).unwrap();
+        let got = Target::from_bytes(&bytes).unwrap();
         assert_eq!(got.display, want.display);
         assert_eq!(got.response, want.response);
         assert_eq!(got.correction, want.correction);
-        let gains = |of: &Calibration| of.illumination.as_ref().unwrap().gains().to_vec();
+        let gains = |of: &Target| of.illumination.as_ref().unwrap().gains().to_vec();
         for (got, want) in gains(&got).iter().zip(gains(&want)) {
             assert!((got / want - 1.0).abs() < 1e-6);
         }
@@ -191,13 +172,13 @@ mod tests {
             Response::lut(std::array::from_fn(|i| 255 - i as u8)),
             Response::linear(8).unwrap(),
         ] {
-            let plain = Calibration {
+            let plain = Target {
                 response: response.clone(),
                 illumination: None,
                 correction: None,
                 ..want.clone()
             };
-            let got = Calibration::from_bytes(&plain.to_bytes().unwrap()).unwrap();
+            let got = Target::from_bytes(&plain.to_bytes().unwrap()).unwrap();
             assert_eq!(got.response, response);
             assert!(got.illumination.is_none() && got.correction.is_none());
         }
@@ -207,26 +188,23 @@ mod tests {
     fn damaged_files_are_refused() {
         let bytes = calibration().to_bytes().unwrap();
         for length in 0..bytes.len() {
-            assert!(
-                Calibration::from_bytes(&bytes[..length]).is_err(),
-                "{length}"
-            );
+            assert!(Target::from_bytes(&bytes[..length]).is_err(), "{length}");
         }
         let mut long = bytes.clone();
         long.push(0);
-        assert!(Calibration::from_bytes(&long).is_err());
+        assert!(Target::from_bytes(&long).is_err());
         // A header that promises a laser's map beyond any memory.
         let text = "laser = [60000, 60000]\n[display]\n";
         let mut huge = MAGIC.to_vec();
         huge.extend((text.len() as u32).to_le_bytes());
         huge.extend(text.as_bytes());
-        let error = Calibration::from_bytes(&huge).unwrap_err().to_string();
+        let error = Target::from_bytes(&huge).unwrap_err().to_string();
         assert!(error.contains("cut short"), "{error}");
-        let other = Calibration {
+        let other = Target {
             display: Display::default(),
             ..calibration()
         };
-        let error = Calibration::from_bytes(&other.to_bytes().unwrap()).unwrap_err();
+        let error = Target::from_bytes(&other.to_bytes().unwrap()).unwrap_err();
         assert!(error.to_string().contains("40×24"), "{error}");
     }
 }

@@ -1,0 +1,214 @@
+//! The trained networks that come with Phasefront, for the display of the paper: 8 µm, 638/520/450 nm, a volume of 6 mm.
+//! What each of them measures stands in its card, the `.md` beside its file.
+//!
+//! ```
+//! use phasefront::Display;
+//!
+//! let options = phasefront_models::session_options(Display::default().with_offset_m(6e-3)?);
+//! assert_eq!(options.ladder.len(), 1);
+//! # Ok::<(), phasefront::Error>(())
+//! ```
+
+use phasefront::{Display, Encoding, Method, Network, SessionOptions, Sweep, Target};
+use std::sync::Arc;
+
+/// Numbers that a network computes in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Precision {
+    /// Whole numbers of 8 bits: the fastest.
+    #[default]
+    Int8,
+    /// Floating point. Needs the feature `float32`.
+    Float32,
+}
+
+/// A file of each precision that is compiled in.
+#[derive(Debug)]
+struct Files {
+    int8: &'static [u8],
+    float32: Option<&'static [u8]>,
+}
+
+impl Files {
+    fn read(&self, precision: Precision) -> Option<Arc<Network>> {
+        let onnx = match precision {
+            Precision::Int8 => Some(self.int8),
+            Precision::Float32 => self.float32,
+        };
+        let network = Network::from_onnx(onnx?).expect("the tests read every file");
+        Some(Arc::new(network))
+    }
+}
+
+/// The files of a network by their name.
+macro_rules! files {
+    ($name:literal) => {
+        Files {
+            int8: include_bytes!(concat!("../", $name, "-int8.onnx")),
+            #[cfg(feature = "float32")]
+            float32: Some(include_bytes!(concat!("../", $name, ".onnx"))),
+            #[cfg(not(feature = "float32"))]
+            float32: None,
+        }
+    };
+}
+
+/// A hologram network.
+#[derive(Debug)]
+pub struct Model {
+    /// The name of its card.
+    pub name: &'static str,
+    files: Files,
+}
+
+impl Model {
+    /// The network; None where float32 is not compiled in.
+    pub fn network(&self, precision: Precision) -> Option<Arc<Network>> {
+        self.files.read(precision)
+    }
+}
+
+/// The hologram networks that need no pre-filter.
+pub const NETWORKS: &[Model] = &[
+    Model {
+        name: "rgbd-8",
+        files: files!("rgbd-8"),
+    },
+    Model {
+        name: "rgbd-15",
+        files: files!("rgbd-15"),
+    },
+    Model {
+        name: "seeded-6",
+        files: files!("seeded-6"),
+    },
+];
+
+/// The network of [`NETWORKS`] called `name`, where it is compiled in in this precision.
+pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
+    let model = NETWORKS.iter().find(|model| model.name == name)?;
+    model.network(precision)
+}
+
+/// A hologram network and the pre-filter that was trained with it, for modulators at one offset.
+#[derive(Debug)]
+pub struct Pair {
+    /// The name of its card.
+    pub name: &'static str,
+    /// z of the modulator, mm.
+    pub offset_mm: f64,
+    hologram: Files,
+    prefilter: Files,
+}
+
+/// A pair by the name of its files.
+macro_rules! pair {
+    ($offset_mm:literal, $name:literal) => {
+        Pair {
+            name: $name,
+            offset_mm: $offset_mm,
+            hologram: files!($name),
+            prefilter: Files {
+                int8: include_bytes!(concat!("../", $name, "-prefilter-int8.onnx")),
+                #[cfg(feature = "float32")]
+                float32: Some(include_bytes!(concat!("../", $name, "-prefilter.onnx"))),
+                #[cfg(not(feature = "float32"))]
+                float32: None,
+            },
+        }
+    };
+}
+
+/// The pairs for the deep double phase method.
+pub const PAIRS: &[Pair] = &[
+    pair!(0.0, "ddpm-8"),
+    pair!(6.0, "ddpm-8-6mm"),
+    pair!(12.0, "ddpm-8-12mm"),
+];
+
+/// The two networks of a [`Pair`].
+#[derive(Debug, Clone)]
+pub struct DeepPair {
+    /// Makes the midpoint hologram.
+    pub hologram: Arc<Network>,
+    /// Prepares it for its encoding.
+    pub prefilter: Arc<Network>,
+}
+
+impl Pair {
+    /// Both networks; None where float32 is not compiled in.
+    pub fn networks(&self, precision: Precision) -> Option<DeepPair> {
+        Some(DeepPair {
+            hologram: self.hologram.read(precision)?,
+            prefilter: self.prefilter.read(precision)?,
+        })
+    }
+}
+
+/// The pair for `display`, if one was trained for it.
+pub fn pair_for(display: &Display, precision: Precision) -> Option<DeepPair> {
+    let mut pairs = PAIRS.iter().filter_map(|pair| pair.networks(precision));
+    pairs.find(|pair| pair.prefilter.check_prefilter(display).is_ok())
+}
+
+/// What is usual for `target`: the pair that was trained for its display, in int8; the plane sweep where there is none.
+pub fn session_options(target: impl Into<Target>) -> SessionOptions {
+    let target = target.into();
+    match pair_for(&target.display, Precision::Int8) {
+        Some(pair) => {
+            let mut options = SessionOptions::new(target, Method::Network(pair.hologram));
+            options.encoder.encoding = Encoding::Deep(pair.prefilter);
+            options
+        }
+        None => {
+            let sweep = Sweep::for_display(&target.display);
+            SessionOptions::new(target, Method::Sweep(sweep))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn precisions() -> Vec<Precision> {
+        let float32 = cfg!(feature = "float32").then_some(Precision::Float32);
+        [Precision::Int8].into_iter().chain(float32).collect()
+    }
+
+    #[test]
+    fn every_file_is_a_network_for_the_papers_display() {
+        for precision in precisions() {
+            for model in NETWORKS {
+                let network = model.network(precision).unwrap();
+                network.check_display(&Display::default()).unwrap();
+            }
+            for pair in PAIRS {
+                let display = Display::default().with_offset_m(pair.offset_mm * 1e-3);
+                let networks = pair.networks(precision).unwrap();
+                networks
+                    .prefilter
+                    .check_prefilter(&display.unwrap())
+                    .unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn a_display_gets_its_pair_or_the_sweep() {
+        for (offset_mm, paired) in [(0.0, true), (6.0, true), (12.0, true), (3.0, false)] {
+            let display = Display::default().with_offset_m(offset_mm * 1e-3).unwrap();
+            assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
+            let options = session_options(display);
+            let deep = matches!(options.encoder.encoding, Encoding::Deep(_));
+            assert_eq!(deep, paired, "{offset_mm} mm");
+            assert_eq!(
+                matches!(options.ladder[0].method, Method::Sweep(_)),
+                !paired
+            );
+        }
+        let other = Display::from_toml("pitch_um = 3.74").unwrap();
+        assert!(pair_for(&other, Precision::Int8).is_none());
+    }
+}
