@@ -5,10 +5,10 @@ use phasefront::unstable::gpu::{Device, DeviceOptions};
 use std::io::Write;
 use std::path::PathBuf;
 
-impl From<phasefront::unstable::gpu::Error> for Error {
-    fn from(why: phasefront::unstable::gpu::Error) -> Self {
+impl From<phasefront::unstable::gpu::GpuError> for Error {
+    fn from(why: phasefront::unstable::gpu::GpuError) -> Self {
         match why {
-            phasefront::unstable::gpu::Error::Core(why) => Error::Core(why),
+            phasefront::unstable::gpu::GpuError::Core(why) => Error::Core(why),
             why => Error::Input(format!("{why}; --backend cpu needs no GPU")),
         }
     }

@@ -40,7 +40,7 @@ mod sweep;
 mod watch;
 
 pub use crate::brightness::Past;
-pub use chain::{ChainOptions, ChainPlan, Float, Fusion};
+pub use chain::{ChainOptions, Float, Fusion, GpuNetworkPlan};
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use peak::Peak;

@@ -13,10 +13,12 @@ use phasefront::input::{
 use phasefront::target::{Aberration, Illumination, Response};
 use phasefront::unstable::gpu::{
     self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions,
-    Float, Frame, Fusion, Job, NetworkPlan,
+    Float, Frame, Fusion, GpuNetworkPlan, GpuPipeline, Job,
 };
 use phasefront::unstable::network::{Isa, reference};
-use phasefront::{Display, Encoding, Method, Network, RgbdFrame, Sweep};
+use phasefront::{
+    Brightness, Display, EncoderOptions, Encoding, Method, Network, RgbdFrame, Sweep,
+};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
@@ -54,7 +56,7 @@ fn run(
     input: &[f32],
 ) -> Vec<f32> {
     let device = device().unwrap();
-    let plan = NetworkPlan::new(&device, network, h, w, options).unwrap();
+    let plan = GpuNetworkPlan::new(&device, network, h, w, options).unwrap();
     let mut output = vec![f32::NAN; 6 * h * w];
     plan.run(input, &mut output).unwrap();
     output
@@ -241,9 +243,25 @@ fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
     sum / a.len() as f32
 }
 
+fn planned(
+    shape: (usize, usize),
+    method: Method,
+    display: &Display,
+    encoding: Encoding,
+    brightness: Brightness,
+) -> Job {
+    Job {
+        encoder: EncoderOptions {
+            encoding,
+            brightness,
+        },
+        ..Job::new(shape, method, display)
+    }
+}
+
 /// The CPU's levels and scale of a job.
 fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
-    let (h, w) = (job.height, job.width);
+    let (h, w) = job.shape;
     let plan = job.on_cpu().unwrap();
     let mut levels = vec![0; 3 * h * w];
     let mut field = vec![Complex32::ZERO; 3 * h * w];
@@ -268,7 +286,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (61, 47),
             0.0,
             Encoding::ANTI_ALIAS,
-            Scale::Max,
+            Brightness::FrameMax,
             &linear,
             Float::F32,
         ),
@@ -277,7 +295,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (61, 47),
             6e-3,
             Encoding::BAND_LIMIT,
-            Scale::Max,
+            Brightness::FrameMax,
             &lut,
             Float::F32,
         ),
@@ -286,7 +304,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (61, 47),
             -3e-3,
             Encoding::DoublePhase,
-            Scale::Fixed(1.0),
+            Brightness::Fixed(1.0),
             &linear,
             Float::F32,
         ),
@@ -295,7 +313,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (61, 47),
             2e-3,
             Encoding::ANTI_ALIAS,
-            Scale::Fixed(0.8),
+            Brightness::Fixed(0.8),
             &lut,
             half,
         ),
@@ -304,7 +322,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (384, 384),
             4e-3,
             Encoding::ANTI_ALIAS,
-            Scale::Max,
+            Brightness::FrameMax,
             &linear,
             Float::F32,
         ),
@@ -313,7 +331,7 @@ fn whole_frames_are_those_of_the_cpu() {
             (540, 960),
             0.0,
             Encoding::ANTI_ALIAS,
-            Scale::Fixed(1.0),
+            Brightness::Fixed(1.0),
             &linear,
             Float::F32,
         ),
@@ -322,11 +340,12 @@ fn whole_frames_are_those_of_the_cpu() {
         let display = Display::default().with_offset_m(offset_m).unwrap();
         let method = Method::Network(network.clone());
         let encoded = format!("{encoding:?} {scale:?}");
-        let mut job = Job::new(h, w, method, &display, encoding, scale, response.clone());
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.target.response = response.clone();
         job.chain.float = float;
         let frame = rgbd(h, w);
         let (expected, expected_scale) = on_cpu(&job, &frame);
-        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let mut levels = vec![0; 3 * h * w];
         let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
         let tolerance = if float == Float::F16 { 0.05 } else { 0.002 };
@@ -427,16 +446,15 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         ),
     ] {
         let display = display.clone().with_offset_m(offset_m).unwrap();
-        let response = Response::linear(8).unwrap();
-        let mut job = Job::new(h, w, method, &display, encoding, Scale::Max, response);
+        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
         job.chain.float = float;
         let frame = rgbd(h, w);
         let (expected, expected_scale) = on_cpu(&job, &frame);
-        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let mut levels = vec![0; 3 * h * w];
         let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
         let what = format!("{} {h}×{w} {offset_m}", plan.describe());
-        let apart = apart(&levels, &expected, &job.response);
+        let apart = apart(&levels, &expected, &job.target.response);
         println!("{what}: {apart} {report:?}");
         assert!(apart < tolerance, "{what}: {apart}");
         let scales = (report.scale - expected_scale).abs() / expected_scale;
@@ -528,10 +546,9 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
     let (h, w) = (33, 45);
     let words: Vec<u16> = (0..h * w).map(|i| (i * 4099 % 65536) as u16).collect();
     let display = Display::default();
-    let response = Response::linear(8).unwrap();
     let method = Method::Network(network);
-    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-    let planar = Job::new(h, w, method, &display, encoding, scale, response);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let planar = planned((h, w), method, &display, encoding, scale);
     let turned = Orientation {
         rotation: Rotation::Clockwise90,
         mirrored: true,
@@ -555,9 +572,9 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
             };
             let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
             let mut levels = vec![0; 3 * h * w];
-            let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+            let mut plan = GpuPipeline::new(&device, &job).unwrap();
             plan.process(&frame, &mut levels).unwrap();
-            let apart = apart(&levels, &expected, &planar.response);
+            let apart = apart(&levels, &expected, &planar.target.response);
             assert!(apart < 0.003, "{:?} {sensor:?}: {apart}", camera.format);
             for other in [
                 Frame {
@@ -620,17 +637,16 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
         let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
         let (h, w) = (47, 61);
         let display = Display::default();
-        let response = Response::linear(8).unwrap();
         let method = Method::Network(f32_network());
         let encoding = Encoding::Deep(prefilter);
-        let mut job = Job::new(h, w, method, &display, encoding, Scale::Max, response);
+        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
         job.chain.float = Float::F32;
         let frame = rgbd(h, w);
         let (expected, scale) = on_cpu(&job, &frame);
         let mut levels = vec![0; 3 * h * w];
-        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
         let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
-        let apart = apart(&levels, &expected, &job.response);
+        let apart = apart(&levels, &expected, &job.target.response);
         // A step of 8 bits to the other side is worth more than rounding.
         let tolerance = if model.int8 { 0.02 } else { 0.003 };
         assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
@@ -647,10 +663,9 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let network = int8_network();
     let (h, w) = (33, 45);
     let display = Display::default();
-    let response = Response::linear(8).unwrap();
     let method = Method::Network(network.clone());
-    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-    let job = Job::new(h, w, method, &display, encoding, scale, response);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let job = planned((h, w), method, &display, encoding, scale);
     let frames: Vec<RgbdFrame> = (0..3)
         .map(|i| {
             let frame = rgbd(h, w);
@@ -660,7 +675,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
             RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
         })
         .collect();
-    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
     let tickets: Vec<_> = frames
         .iter()
         .map(|frame| plan.submit(&Frame::of(frame), Deliver::Levels).unwrap())
@@ -673,7 +688,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
         let (expected, scale) = on_cpu(&job, frame);
         let mut levels = vec![0; 3 * h * w];
         let report = plan.collect(ticket, &mut levels).unwrap();
-        let apart = apart(&levels, &expected, &job.response);
+        let apart = apart(&levels, &expected, &job.target.response);
         assert!(apart < 0.002, "{apart}");
         assert!((report.scale - scale).abs() < 1e-3, "{report:?} {scale}");
         scales.push(report.scale);
@@ -695,11 +710,10 @@ fn an_app_shows_the_texture_itself() {
     let Some(device) = device() else { return };
     let (h, w) = (33, 45);
     let display = Display::default();
-    let response = Response::linear(8).unwrap();
     let method = Method::Network(int8_network());
-    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-    let job = Job::new(h, w, method, &display, encoding, scale, response);
-    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let job = planned((h, w), method, &display, encoding, scale);
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
     let frame = rgbd(h, w);
     let mut expected = vec![0; 3 * h * w];
     plan.process(&Frame::of(&frame), &mut expected).unwrap();
@@ -819,17 +833,16 @@ fn a_network_that_reads_the_place_is_that_of_the_cpu() {
     let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
     let (h, w) = (21, 34);
     let display = Display::default();
-    let response = Response::linear(8).unwrap();
     let method = Method::Network(network);
-    let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-    let mut job = Job::new(h, w, method, &display, encoding, scale, response);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let mut job = planned((h, w), method, &display, encoding, scale);
     job.chain.float = Float::F32;
     let frame = rgbd(h, w);
     let (expected, _) = on_cpu(&job, &frame);
     let mut levels = vec![0; 3 * h * w];
-    let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
     plan.process(&Frame::of(&frame), &mut levels).unwrap();
-    let apart = apart(&levels, &expected, &job.response);
+    let apart = apart(&levels, &expected, &job.target.response);
     assert!(apart < 0.003, "{apart}");
 }
 
@@ -852,23 +865,19 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
         // A modulator that is wider than the frame, and lower.
         let display = Display::default().with_size(h - 3, w + 9).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
-        let response = Response::linear(8).unwrap();
         let method = Method::Network(network.clone());
-        let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-        let job = Job {
-            illumination,
-            correction,
-            ..Job::new(h, w, method, &display, encoding, scale, response)
-        };
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.target.illumination = illumination;
+        job.target.correction = correction;
         let (expected, _) = on_cpu(&job, &frame);
         let mut levels = vec![0; 3 * h * w];
-        let mut plan = gpu::Pipeline::new(&device, &job).unwrap();
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
         plan.process(&Frame::of(&frame), &mut levels).unwrap();
-        let apart = apart(&levels, &expected, &job.response);
+        let apart = apart(&levels, &expected, &job.target.response);
         assert!(apart < 0.002, "{offset_m}: {apart}");
         let plain = Job {
-            illumination: None,
-            correction: None,
+            target: display.into(),
             ..job
         };
         assert!(on_cpu(&plain, &frame).0 != expected);
@@ -881,10 +890,9 @@ fn a_device_is_tried_out_before_it_is_used() {
     let (int8, f32) = (int8_network(), f32_network());
     for network in [&int8, &f32] {
         let display = Display::default().with_offset_m(5e-3).unwrap();
-        let response = Response::linear(8).unwrap();
         let method = Method::Network(network.clone());
-        let (encoding, scale) = (Encoding::ANTI_ALIAS, Scale::Max);
-        let job = Job::new(1080, 1920, method, &display, encoding, scale, response);
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let job = planned((1080, 1920), method, &display, encoding, scale);
         gpu::probe(&device, &job).unwrap();
     }
 }

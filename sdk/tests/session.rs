@@ -42,7 +42,7 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     );
     assert_eq!(hologram.valid_depth(), 1.0);
     // A tap on the square focuses near, one on the wall's right end far.
-    let display = hologram.display();
+    let display = &hologram.target().display;
     assert!((hologram.z_at(0.3, 0.4) - display.z_of_depth(0.0)).abs() < 1e-4);
     assert!(hologram.z_at(0.99, 0.9) < display.z_of_depth(0.9));
     assert_eq!(hologram.z_at(-3.0, f64::NAN), hologram.z_at(0.0, 0.0));

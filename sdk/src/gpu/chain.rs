@@ -251,7 +251,7 @@ pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
         drop(pass);
         let start = Instant::now();
         device.wait(&device.queue.submit([encoder.finish()]))?;
-        Ok::<_, Error>(start.elapsed())
+        Ok::<_, GpuError>(start.elapsed())
     };
     run()?;
     let mut best = Duration::MAX;
@@ -590,8 +590,8 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
     Ok(all)
 }
 
-/// A network on the GPU for one frame size: the twin of [`crate::ChainPlan`].
-pub struct ChainPlan {
+/// A network on the GPU for one frame size: the twin of [`crate::GpuNetworkPlan`].
+pub struct GpuNetworkPlan {
     device: Arc<Device>,
     size: (usize, usize),
     inputs: usize,
@@ -600,7 +600,7 @@ pub struct ChainPlan {
     chain: ChainPlan,
 }
 
-impl ChainPlan {
+impl GpuNetworkPlan {
     /// Prepares `network` for frames of `height` × `width` pixels.
     ///
     /// # Errors
@@ -626,7 +626,7 @@ impl ChainPlan {
             )?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
-            Ok(ChainPlan {
+            Ok(GpuNetworkPlan {
                 device: device.clone(),
                 size,
                 inputs: chain.inputs,
@@ -647,7 +647,7 @@ impl ChainPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::ChainPlan::run`] takes it, `output`
+    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::GpuNetworkPlan::run`] takes it, `output`
     /// (6, H, W).
     ///
     /// # Errors

@@ -252,7 +252,9 @@ impl Device {
             self.ask()?;
         }
         match error {
-            Some(wgpu::Error::OutOfMemory { source }) => Err(GpuError::OutOfMemory(one_line(source))),
+            Some(wgpu::Error::OutOfMemory { source }) => {
+                Err(GpuError::OutOfMemory(one_line(source)))
+            }
             Some(why) => Err(GpuError::Refused(format!(
                 "{}: {}",
                 self.name(),

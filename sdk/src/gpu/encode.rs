@@ -89,7 +89,11 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) fn new(device: &Device, job: &EncoderJob<'_>, buffers: &[LevelsBuffers]) -> Result<Self> {
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
         let (height, width) = job.size;
         let frame = [width, height, width * height, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
@@ -183,12 +187,7 @@ mod tests {
         let table = PerPixel::new(61, 47, 16, intervals, &knots, &turns).unwrap();
         let pixels = Response::PerPixel(Arc::new(table));
         let cases = [
-            (
-                (61, 47),
-                Encoding::ANTI_ALIAS,
-                Fixed(1.0),
-                pixels.clone(),
-            ),
+            ((61, 47), Encoding::ANTI_ALIAS, Fixed(1.0), pixels.clone()),
             ((61, 47), Encoding::DoublePhase, FrameMax, pixels),
             ((61, 47), Encoding::DoublePhase, FrameMax, eight.clone()),
             ((61, 47), Encoding::ANTI_ALIAS, FrameMax, lut.clone()),

@@ -44,7 +44,6 @@ pub(super) struct Planes<'a> {
 /// A convolution of three planes, ready to run.
 pub(super) struct Convolution {
     steps: [Dispatch; 3],
-    table: wgpu::Buffer,
 }
 
 /// What one of the three dispatches does.
@@ -163,17 +162,7 @@ impl Convolution {
                 places(spectra, frame),
             )?,
         ];
-        Ok(Convolution {
-            steps,
-            table: table.buffer,
-        })
-    }
-
-    /// Another filter from the next submission on: as many factors as were planned, one colour after another.
-    pub(super) fn set(&self, device: &Device, factors: &[Complex32]) {
-        device
-            .queue
-            .write_buffer(&self.table, 0, bytemuck::cast_slice(factors));
+        Ok(Convolution { steps })
     }
 
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {

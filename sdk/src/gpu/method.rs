@@ -69,7 +69,7 @@ impl MethodPlan {
         let swept = |plan: SweepPlan| {
             let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
             let sweep = Sweeper::new(device, &plan, display, &packer.input.first)?;
-            Ok::<_, Error>((packer, sweep))
+            Ok::<_, GpuError>((packer, sweep))
         };
         let (height, width) = size;
         let (packer, way) = match method {

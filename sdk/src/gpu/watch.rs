@@ -30,7 +30,9 @@ pub(super) fn watched<T: Send + 'static>(
         Err(RecvTimeoutError::Timeout) => {
             Err(GpuError::Lost(format!("no answer for {patience:?} {what}")))
         }
-        Err(RecvTimeoutError::Disconnected) => Err(GpuError::Lost(format!("its thread died {what}"))),
+        Err(RecvTimeoutError::Disconnected) => {
+            Err(GpuError::Lost(format!("its thread died {what}")))
+        }
     }
 }
 

@@ -61,7 +61,10 @@ impl Device {
     pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
         if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
-            return Err(GpuError::Refused(format!("{what} do not fit {}", self.name())));
+            return Err(GpuError::Refused(format!(
+                "{what} do not fit {}",
+                self.name()
+            )));
         }
         let usage = match uniform {
             true => wgpu::BufferUsages::UNIFORM,
