@@ -7,7 +7,7 @@
 
 use phasefront_ffi::{
     Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
-    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, Quality, RawHologram,
+    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram,
     RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
     session_options,
 };

@@ -3,7 +3,7 @@
 
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
-use phasefront::target::{Aberration, Response};
+use phasefront::target::Aberration;
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::wave::{
     asm::{Padding, Propagator},

@@ -66,10 +66,10 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
         Brightness::FrameMax,
     ] {
         let (mut plain, mut gpu) = (plain.clone(), gpu.clone());
-        (plain.brightness, gpu.brightness) = (brightness, brightness);
+        (plain.encoder.brightness, gpu.encoder.brightness) = (brightness, brightness);
         if brightness == Brightness::FrameMax {
             let lut = Response::lut(std::array::from_fn(|i| 255 - i as u8));
-            (plain.response, gpu.response) = (lut.clone(), lut);
+            (plain.target.response, gpu.target.response) = (lut.clone(), lut);
         }
         let cpu = Session::new(plain, RunningMode::Image).unwrap();
         let gpu = Session::new(gpu, RunningMode::Image).unwrap();
@@ -133,7 +133,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(W, H);
     let seeded = Network::from_onnx(include_bytes!("../../models/seeded-6.onnx")).unwrap();
-    let sweep = Method::Sweep(Sweep::for_display(&plain.display));
+    let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [
         (sweep, "the sweep"),
         (Method::Seeded(Arc::new(seeded)), "Layers"),
@@ -299,26 +299,25 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         let mut sweep = gpu.clone();
         sweep.ladder[0].method = Method::Sweep(Sweep {
             taps: 31,
-            ..Sweep::for_display(&sweep.display)
+            ..Sweep::for_display(&sweep.target.display)
         });
         cases.push((sweep, "31 taps"));
         let mut either = gpu.clone();
         let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
-        let sweep = Sweep::for_display(&either.display);
+        let sweep = Sweep::for_display(&either.target.display);
         either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
         cases.push((either, "sharpness"));
         let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
         let mut ten = SessionOptions::new(
             Display::from_toml(text).unwrap(),
             gpu.ladder[0].method.clone(),
-        )
-        .unwrap();
+        );
         (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
         cases.push((ten, "8 bits"));
         // A line that no workgroup's memory holds.
         let mut long = gpu.clone();
         let text = "width = 9000\nheight = 4\noffset_mm = 2";
-        long.display = Display::from_toml(text).unwrap();
+        long.target.display = Display::from_toml(text).unwrap();
         (long.ladder[0].height, long.ladder[0].width) = (4, 9000);
         cases.push((long, "workgroup"));
         if let Some(mut half) = on_gpu(options(W, H)) {
@@ -344,7 +343,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut wrong = options(W, H);
     wrong.backend = Backend::Gpu;
     wrong.gpu.device.name = Some("no such card".into());
-    wrong.display = Display::from_toml("width = 64\nheight = 48\npitch_um = 4").unwrap();
+    wrong.target.display = Display::from_toml("width = 64\nheight = 48\npitch_um = 4").unwrap();
     assert!(Session::new(wrong, RunningMode::Image).is_err());
 }
 

@@ -73,7 +73,7 @@ pub(crate) struct Lut {
 
 impl Lut {
     fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        let display = self.display.read()?.target.display;
         let pattern = Pattern::new(display.height(), display.width())?;
         match (&self.patterns, &self.captures, &self.output) {
             (Some(folder), ..) => {
@@ -217,7 +217,7 @@ impl Laser {
         if !files::has_extension(&self.output, "png") {
             return Err(Error::file(&self.output, "the name must end in .png"));
         }
-        let display = self.display.read()?.display;
+        let display = self.display.read()?.target.display;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
         let (mut maps, mut left) = (Vec::new(), Vec::new());

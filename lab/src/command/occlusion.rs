@@ -34,7 +34,7 @@ pub(crate) struct Occlusion {
 
 impl Occlusion {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?.display;
+        let display = self.display.read()?.target.display;
         let ldi = match &self.ldi {
             Some(dir) => Ldi::read(dir)?,
             None => occlusion::two_bars(),

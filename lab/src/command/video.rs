@@ -304,6 +304,7 @@ impl Video {
             ..target
         };
         let display = target.display.clone();
+        let (name, precision) = (self.network.as_deref(), self.precision.precision());
         let sweep = Sweep::for_display(&display);
         let (method, encoder) = match self.method {
             MethodName::Network => {
