@@ -83,6 +83,35 @@ pub(crate) struct Packed {
     pub(crate) weights: Vec<i32>,
 }
 
+impl Packed {
+    /// A layer for `kernels`; `next_zero` stands for 0 in what reads it.
+    fn new(taps: &Taps<'_>, next_zero: u8, kernels: &Kernels) -> Packed {
+        let layer = taps.layer;
+        let of_filter = |(w, b): (&[i8], &i32)| {
+            let weights: i32 = w.iter().map(|&w| i32::from(w)).sum();
+            b + (kernels.offset - i32::from(layer.zero_point)) * weights
+        };
+        let filters = layer.kernel.chunks_exact(layer.inputs * 9);
+        let mut bias: Vec<i32> = filters.zip(&layer.bias).map(of_filter).collect();
+        let mut multiplier = layer.multiplier.clone();
+        let padded = layer.outputs.next_multiple_of(32);
+        bias.resize(padded, 0);
+        multiplier.resize(padded, 0.0);
+        Packed {
+            groups: taps.groups(),
+            outputs: layer.outputs,
+            bias,
+            multiplier,
+            skip: layer.requantise.skip,
+            zero_point: match layer.requantise.rescale {
+                Some(_) => 0,
+                None => next_zero,
+            },
+            weights: (kernels.pack)(taps),
+        }
+    }
+}
+
 /// A layer's weights by filter, group of channels and tap, for packing: channels that pad a group have weight 0.
 pub(crate) struct Taps<'a> {
     layer: &'a Int8Layer,
@@ -238,34 +267,8 @@ impl Int8Chain {
                 layer,
                 features: if is_last { filters } else { layer.inputs },
             };
-            let per_filter = layer.inputs * 9;
-            let mut bias: Vec<i32> = layer
-                .kernel
-                .chunks_exact(per_filter)
-                .zip(&layer.bias)
-                .map(|(w, b)| {
-                    let weights: i32 = w.iter().map(|&w| i32::from(w)).sum();
-                    b + (kernels.offset - i32::from(layer.zero_point)) * weights
-                })
-                .collect();
-            let mut multiplier = layer.multiplier.clone();
-            let padded = layer.outputs.next_multiple_of(32);
-            bias.resize(padded, 0);
-            multiplier.resize(padded, 0.0);
             let next_zero = layers.get(i + 1).map_or(0, |next| next.zero_point);
-            packed.push(Packed {
-                groups: taps.groups(),
-                outputs: layer.outputs,
-                bias,
-                multiplier,
-                skip: layer.requantise.skip,
-                zero_point: if layer.requantise.rescale.is_some() {
-                    0
-                } else {
-                    next_zero
-                },
-                weights: (kernels.pack)(&taps),
-            });
+            packed.push(Packed::new(&taps, next_zero, &kernels));
         }
         let zero_points: Vec<u8> = layers.iter().map(|l| l.zero_point).collect();
         let settled =

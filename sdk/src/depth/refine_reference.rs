@@ -16,116 +16,157 @@ pub fn refine(
     crop: Crop,
     rgb: ArrayView3<'_, f32>,
 ) -> Array2<f32> {
-    let (height, width) = depth.dim();
     let (_, out_height, out_width) = rgb.dim();
-    // Display pixel o of an axis lies at this place, in readings.
-    let place = |o: usize, from: f64, length: f64, out: usize| {
-        from + (o as f64 + 0.5) * length / out as f64 - 0.5
+    let (height, width) = depth.dim();
+    let rows = Axis {
+        from: crop.y,
+        length: crop.height,
+        readings: height,
+        pixels: out_height,
     };
-    let cell = |place: f64, cells: usize| place.round().clamp(0.0, cells as f64 - 1.0) as usize;
-    let place_x = |x| place(x, crop.x, crop.width, out_width);
-    let place_y = |y| place(y, crop.y, crop.height, out_height);
-    // The display pixels of a reading; where it has none, the first behind it or the last of all.
-    let pixels = |reading: usize, cells: usize, out: usize, place: &dyn Fn(usize) -> f64| {
-        let of: Vec<usize> = (0..out)
-            .filter(|o| cell(place(*o), cells) == reading)
-            .collect();
-        match of.is_empty() {
-            true => vec![
-                (0..out)
-                    .find(|o| cell(place(*o), cells) > reading)
-                    .unwrap_or(out - 1),
-            ],
-            false => of,
+    let columns = Axis {
+        from: crop.x,
+        length: crop.width,
+        readings: width,
+        pixels: out_width,
+    };
+    let guide = guide(rgb, &rows, &columns);
+    let depth = depth.to_owned();
+    let sure = |y, x| f64::from(confidence[(y, x)]);
+    let mut cleaned = Array2::from_shape_fn((height, width), |at| clean(&depth, &sure, &guide, at));
+    for _ in 0..FILL_PASSES {
+        let before = cleaned.clone();
+        for (at, value) in cleaned.indexed_iter_mut() {
+            if value.is_nan() {
+                *value = clean(&before, &|_, _| 1.0, &guide, at);
+            }
         }
-    };
-    let guide = Array2::from_shape_fn((height, width), |(y, x)| {
-        let (rows, columns) = (
-            pixels(y, height, out_height, &place_y),
-            pixels(x, width, out_width, &place_x),
-        );
+    }
+    super::fill_nearest(&mut cleaned).expect("there is a reading");
+    Array2::from_shape_fn((out_height, out_width), |(y, x)| {
+        let (cell_y, cell_x) = (rows.reading(y), columns.reading(x));
+        let around = |row: isize, column: isize| {
+            let y = (cell_y as isize + row).clamp(0, height as isize - 1) as usize;
+            let x = (cell_x as isize + column).clamp(0, width as isize - 1) as usize;
+            (f64::from(cleaned[(y, x)]), guide[(y, x)])
+        };
+        let off = [
+            (rows.place(y) - cell_y as f64).clamp(-0.5, 0.5),
+            (columns.place(x) - cell_x as f64).clamp(-0.5, 0.5),
+        ];
+        enlarged(&around, off, [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)])))
+    })
+}
+
+/// The readings of `pixels` display pixels along one side: `length` of them, from `from` on.
+struct Axis {
+    from: f64,
+    length: f64,
+    readings: usize,
+    pixels: usize,
+}
+
+impl Axis {
+    /// Where a display pixel lies, in readings.
+    fn place(&self, pixel: usize) -> f64 {
+        self.from + (pixel as f64 + 0.5) * self.length / self.pixels as f64 - 0.5
+    }
+
+    fn reading(&self, pixel: usize) -> usize {
+        let last = self.readings as f64 - 1.0;
+        self.place(pixel).round().clamp(0.0, last) as usize
+    }
+
+    /// The display pixels of a reading; where it has none, the first behind it or the last of all.
+    fn pixels(&self, reading: usize) -> Vec<usize> {
+        let of: Vec<usize> = (0..self.pixels)
+            .filter(|pixel| self.reading(*pixel) == reading)
+            .collect();
+        if !of.is_empty() {
+            return of;
+        }
+        let behind = (0..self.pixels).find(|pixel| self.reading(*pixel) > reading);
+        vec![behind.unwrap_or(self.pixels - 1)]
+    }
+}
+
+/// The mean colour of each reading.
+fn guide(rgb: ArrayView3<'_, f32>, rows: &Axis, columns: &Axis) -> Array2<[f64; 3]> {
+    Array2::from_shape_fn((rows.readings, columns.readings), |(y, x)| {
+        let (rows, columns) = (rows.pixels(y), columns.pixels(x));
         [0, 1, 2].map(|c| {
             let sum: f64 = (rows.iter())
                 .flat_map(|y| columns.iter().map(|x| f64::from(rgb[(c, *y, *x)])))
                 .sum();
             sum / (rows.len() * columns.len()) as f64
         })
-    });
-    let clean = |from: &Array2<f32>,
-                 confidence: &dyn Fn(usize, usize) -> f64,
-                 y: usize,
-                 x: usize| {
-        let reach = CLEAN_REACH as isize;
-        let mut votes = Vec::new();
-        for dy in -reach..=reach {
-            for dx in -reach..=reach {
-                let (y2, x2) = (y.wrapping_add_signed(dy), x.wrapping_add_signed(dx));
-                if y2 < height && x2 < width && !from[(y2, x2)].is_nan() {
-                    let near = gauss((dy * dy + dx * dx) as f64, CLEAN_SIGMA) * confidence(y2, x2);
-                    let alike = gauss(apart(guide[(y, x)], guide[(y2, x2)]), CLEAN_COLOUR_SIGMA);
-                    votes.push((
-                        f64::from(from[(y2, x2)]),
-                        near,
-                        alike.max(LEAST_CLOSENESS.into()),
-                    ));
-                }
-            }
-        }
-        match votes.is_empty() {
-            true => f32::NAN,
-            false => match one_surface(&votes) {
-                true => mean(votes.iter().map(|(d, near, _)| (*d, *near))),
-                false => surface(votes),
-            },
-        }
-    };
-    let depth = depth.to_owned();
-    let sure = |y, x| f64::from(confidence[(y, x)]);
-    let mut cleaned = Array2::from_shape_fn((height, width), |(y, x)| clean(&depth, &sure, y, x));
-    for _ in 0..FILL_PASSES {
-        let before = cleaned.clone();
-        for ((y, x), value) in cleaned.indexed_iter_mut() {
-            if value.is_nan() {
-                *value = clean(&before, &|_, _| 1.0, y, x);
-            }
-        }
-    }
-    super::fill_nearest(&mut cleaned).expect("there is a reading");
-    Array2::from_shape_fn((out_height, out_width), |(y, x)| {
-        let (cell_y, cell_x) = (cell(place_y(y), height), cell(place_x(x), width));
-        let dy = (place_y(y) - cell_y as f64).clamp(-0.5, 0.5);
-        let dx = (place_x(x) - cell_x as f64).clamp(-0.5, 0.5);
-        let colour = [0, 1, 2].map(|c| f64::from(rgb[(c, y, x)]));
-        let around = |row: isize, column: isize| {
-            let y = (cell_y as isize + row).clamp(0, height as isize - 1) as usize;
-            let x = (cell_x as isize + column).clamp(0, width as isize - 1) as usize;
-            (f64::from(cleaned[(y, x)]), guide[(y, x)])
-        };
-        let mut votes = Vec::new();
-        for row in -1..=1 {
-            for column in -1..=1 {
-                let (depth, guide) = around(row, column);
-                let square = (column as f64 - dx).powi(2) + (row as f64 - dy).powi(2);
-                let alike = gauss(apart(guide, colour), UP_COLOUR_SIGMA);
+    })
+}
+
+/// What the readings around say of one, or NaN.
+fn clean(
+    from: &Array2<f32>,
+    confidence: &dyn Fn(usize, usize) -> f64,
+    guide: &Array2<[f64; 3]>,
+    (y, x): (usize, usize),
+) -> f32 {
+    let (height, width) = from.dim();
+    let reach = CLEAN_REACH as isize;
+    let mut votes = Vec::new();
+    for dy in -reach..=reach {
+        for dx in -reach..=reach {
+            let (y2, x2) = (y.wrapping_add_signed(dy), x.wrapping_add_signed(dx));
+            if y2 < height && x2 < width && !from[(y2, x2)].is_nan() {
+                let near = gauss((dy * dy + dx * dx) as f64, CLEAN_SIGMA) * confidence(y2, x2);
+                let alike = gauss(apart(guide[(y, x)], guide[(y2, x2)]), CLEAN_COLOUR_SIGMA);
                 votes.push((
-                    depth,
-                    gauss(square, UP_SIGMA),
+                    f64::from(from[(y2, x2)]),
+                    near,
                     alike.max(LEAST_CLOSENESS.into()),
                 ));
             }
         }
-        if !one_surface(&votes) {
-            return surface(votes);
+    }
+    match votes.is_empty() {
+        true => f32::NAN,
+        false => match one_surface(&votes) {
+            true => mean(votes.iter().map(|(d, near, _)| (*d, *near))),
+            false => surface(votes),
+        },
+    }
+}
+
+/// The depth of a display pixel of `colour` that lies `off` its reading, (y, x); `around` gives the depth and the colour
+/// of the readings beside that.
+fn enlarged(
+    around: &dyn Fn(isize, isize) -> (f64, [f64; 3]),
+    [dy, dx]: [f64; 2],
+    colour: [f64; 3],
+) -> f32 {
+    let mut votes = Vec::new();
+    for row in -1..=1 {
+        for column in -1..=1 {
+            let (depth, guide) = around(row, column);
+            let square = (column as f64 - dx).powi(2) + (row as f64 - dy).powi(2);
+            let alike = gauss(apart(guide, colour), UP_COLOUR_SIGMA);
+            votes.push((
+                depth,
+                gauss(square, UP_SIGMA),
+                alike.max(LEAST_CLOSENESS.into()),
+            ));
         }
-        // Between the four readings around.
-        let (row, column) = (dy.signum() as isize, dx.signum() as isize);
-        let (dy, dx) = (dy.abs(), dx.abs());
-        let sum = around(0, 0).0 * (1.0 - dy) * (1.0 - dx)
-            + around(row, 0).0 * dy * (1.0 - dx)
-            + around(0, column).0 * (1.0 - dy) * dx
-            + around(row, column).0 * dy * dx;
-        sum as f32
-    })
+    }
+    if !one_surface(&votes) {
+        return surface(votes);
+    }
+    // Between the four readings around.
+    let (row, column) = (dy.signum() as isize, dx.signum() as isize);
+    let (dy, dx) = (dy.abs(), dx.abs());
+    let sum = around(0, 0).0 * (1.0 - dy) * (1.0 - dx)
+        + around(row, 0).0 * dy * (1.0 - dx)
+        + around(0, column).0 * (1.0 - dy) * dx
+        + around(row, column).0 * dy * dx;
+    sum as f32
 }
 
 fn gauss(square: f64, sigma: f32) -> f64 {

@@ -203,7 +203,15 @@ impl ChainPlan {
             parts: tiles.0 * tiles.1,
             bytes: 0,
         };
-        let make = |fusion| maker.steps(chain, &packed, input, &features, &plan, end, fusion);
+        let all = Layers {
+            chain,
+            packed: &packed,
+            input,
+            features: &features,
+            plan: &plan,
+            end,
+        };
+        let make = |fusion| maker.steps(&all, fusion);
         let between = groups * PAIR_TILE * PAIR_TILE * numbers.value_bytes();
         let fits = between <= device.limits().max_compute_workgroup_storage_size as usize;
         let pairs = packed.len() > 3 && fits;
@@ -261,18 +269,26 @@ pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     Ok(best)
 }
 
+/// A chain's layers and what they read and write.
+struct Layers<'a> {
+    chain: &'a Chain,
+    packed: &'a [Packed],
+    input: &'a ChainInput,
+    /// What hidden layers write, in turn.
+    features: &'a [wgpu::Buffer; 2],
+    /// With what the last layer writes.
+    plan: &'a ChainPlan,
+    end: End,
+}
+
 impl Maker<'_> {
-    #[allow(clippy::too_many_arguments)]
-    fn steps(
-        &self,
-        chain: &Chain,
-        packed: &[Packed],
-        input: &ChainInput,
-        features: &[wgpu::Buffer; 2],
-        plan: &ChainPlan,
-        end: End,
-        fusion: Fusion,
-    ) -> Result<Vec<Dispatch>> {
+    fn steps(&self, all: &Layers<'_>, fusion: Fusion) -> Result<Vec<Dispatch>> {
+        let Layers {
+            packed,
+            input,
+            features,
+            ..
+        } = *all;
         let last = packed.len() - 1;
         let mut steps = vec![self.layer(&packed[0], &input.first, &features[0], false)?];
         // Where the current layer's input lies.
@@ -289,7 +305,7 @@ impl Maker<'_> {
             at = 1 - at;
             i += if pair { 2 } else { 1 };
         }
-        steps.push(self.last(&packed[last], &features[at], input, plan, end, chain.tanh)?);
+        steps.push(self.last(&packed[last], &features[at], all)?);
         Ok(steps)
     }
 
@@ -332,17 +348,10 @@ impl Maker<'_> {
         program.on(self.device, &arguments, grid)
     }
 
-    fn last(
-        &self,
-        layer: &Packed,
-        from: &wgpu::Buffer,
-        input: &ChainInput,
-        plan: &ChainPlan,
-        end: End,
-        tanh: bool,
-    ) -> Result<Dispatch> {
+    fn last(&self, layer: &Packed, from: &wgpu::Buffer, all: &Layers<'_>) -> Result<Dispatch> {
+        let &Layers { input, plan, .. } = all;
         let weights = self.device.constants("weights", &layer.bytes)?;
-        let head = match end {
+        let head = match all.end {
             End::Planes => 0,
             End::Field(Head::AmplitudePhase, _) => 1,
             End::Field(Head::RealImaginary, InputKind::Field | InputKind::BlurredField) => 3,
@@ -351,7 +360,8 @@ impl Maker<'_> {
             End::Field(Head::RealImaginary, _) => 2,
         };
         let more = format!(
-            "const HEAD: u32 = {head}u;\nconst TANH: bool = {tanh};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            "const HEAD: u32 = {head}u;\nconst TANH: bool = {};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            all.chain.tanh,
             InputKind::REMAINDER_GAIN
         );
         let source = self.source(layer, &weights, false, &more) + include_str!("chain_last.wgsl");

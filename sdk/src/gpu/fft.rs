@@ -3,7 +3,7 @@
 //!
 //! A line is transformed in workgroup memory, so its length is bounded by that: 4096 where there are 32 KiB.
 
-use super::device::{Device, Dispatch};
+use super::device::{Constants, Device, Dispatch};
 use super::{GpuError, Result};
 use num_complex::Complex32;
 use std::f64::consts::PI;
@@ -58,6 +58,22 @@ struct Stage {
     turn: bool,
 }
 
+/// Lines of three planes in one buffer: values from plane to plane, from line to line and along a line, and how many there
+/// are along it.
+struct Lines<'a> {
+    buffer: &'a wgpu::Buffer,
+    places: [usize; 4],
+}
+
+/// What the three dispatches share.
+struct Shared<'a> {
+    device: &'a Device,
+    filter: &'a wgpu::Buffer,
+    /// From one colour's filter to the next one's; 0 where one serves all.
+    filter_plane: usize,
+    turn: &'a wgpu::Buffer,
+}
+
 impl Convolution {
     pub(super) fn new(device: &Device, planes: &Planes<'_>) -> Result<Self> {
         let (height, width) = planes.size;
@@ -67,18 +83,88 @@ impl Convolution {
         let table: Vec<Complex32> = planes.factors.concat();
         let table = device.table("a filter", bytemuck::cast_slice(&table))?;
         let rows = device.buffer("spectra", 3 * height * padded_width * 8)?;
-        let [row_roots, column_roots] = [padded_width, padded_height].map(|n| {
-            let roots: Vec<Complex32> = (0..n)
-                .map(|j| {
-                    let (sin, cos) = (2.0 * PI * j as f64 / n as f64).sin_cos();
-                    Complex32::new(cos as f32, sin as f32)
-                })
-                .collect();
-            device.table("roots of unity", bytemuck::cast_slice(&roots))
-        });
-        let (row_roots, column_roots) = (row_roots?, column_roots?);
+        let row_roots = roots(device, padded_width)?.buffer;
+        let column_roots = roots(device, padded_height)?.buffer;
+        let [row, column, back] = Stage::of(planes, even);
+        let shared = Shared {
+            device,
+            filter: &table.buffer,
+            filter_plane: if planes.factors.len() > 1 { one } else { 0 },
+            turn: planes.turn.unwrap_or(&row_roots),
+        };
+        let at = |buffer, places| Lines { buffer, places };
+        let frame = || at(planes.field, [height * width, width, 1, width]);
+        let spectra = || {
+            at(
+                &rows,
+                [height * padded_width, padded_width, 1, padded_width],
+            )
+        };
+        let columns = [height * padded_width, 1, padded_width, height];
+        let steps = [
+            shared.step("rows", row, &row_roots, (frame(), spectra()), height)?,
+            // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
+            shared.step(
+                "columns",
+                column,
+                &column_roots,
+                (at(&column_roots, columns), at(&rows, columns)),
+                padded_width,
+            )?,
+            shared.step("rows back", back, &row_roots, (spectra(), frame()), height)?,
+        ];
+        Ok(Convolution { steps })
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.steps.iter().for_each(|step| step.run(pass));
+    }
+}
+
+/// exp(2πi j/n) for each j below `n`.
+fn roots(device: &Device, n: usize) -> Result<Constants> {
+    let root = |j: usize| {
+        let (sin, cos) = (2.0 * PI * j as f64 / n as f64).sin_cos();
+        Complex32::new(cos as f32, sin as f32)
+    };
+    let roots: Vec<Complex32> = (0..n).map(root).collect();
+    device.table("roots of unity", bytemuck::cast_slice(&roots))
+}
+
+impl Shared<'_> {
+    /// `stage` of so many `lines`, from the first place to the second.
+    fn step(
+        &self,
+        what: &str,
+        stage: Stage,
+        roots: &wgpu::Buffer,
+        (from, to): (Lines<'_>, Lines<'_>),
+        lines: usize,
+    ) -> Result<Dispatch> {
+        let device = self.device;
+        let together = stage.lines_together(device)?;
+        let numbers = [&[lines], &from.places[..], &to.places, &[self.filter_plane]].concat();
+        let mut numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
+        numbers.resize(12, 0);
+        let numbers = device.constants("lines", bytemuck::cast_slice(&numbers))?;
+        let program = device.program(what, stage.source(together), "convolve");
+        let arguments = [
+            (0, numbers.buffer.as_entire_binding()),
+            (1, roots.as_entire_binding()),
+            (2, from.buffer.as_entire_binding()),
+            (3, to.buffer.as_entire_binding()),
+            (4, self.filter.as_entire_binding()),
+            (5, self.turn.as_entire_binding()),
+        ];
+        program.on(device, &arguments, [lines.div_ceil(together), 3, 1])
+    }
+}
+
+impl Stage {
+    /// Rows, columns, rows back; `even` where the filter is one quadrant.
+    fn of(planes: &Planes<'_>, even: bool) -> [Stage; 3] {
         let row = Stage {
-            length: padded_width,
+            length: planes.padded.1,
             forward: true,
             filter: false,
             inverse: false,
@@ -87,7 +173,7 @@ impl Convolution {
             turn: planes.turn.is_some(),
         };
         let column = Stage {
-            length: padded_height,
+            length: planes.padded.0,
             filter: true,
             inverse: true,
             in_place: true,
@@ -100,77 +186,9 @@ impl Convolution {
             turn: false,
             ..row
         };
-        let turn = planes.turn.unwrap_or(&row_roots.buffer);
-        let make = |what,
-                    stage: Stage,
-                    lines: usize,
-                    roots: &wgpu::Buffer,
-                    from: &wgpu::Buffer,
-                    to: &wgpu::Buffer,
-                    places: [usize; 8]| {
-            let together = stage.lines_together(device)?;
-            let mut numbers = vec![lines];
-            numbers.extend(places);
-            numbers.push(if planes.factors.len() > 1 { one } else { 0 });
-            numbers.resize(12, 0);
-            let numbers: Vec<u32> = numbers.into_iter().map(|n| n as u32).collect();
-            let numbers = device.constants("lines", bytemuck::cast_slice(&numbers))?;
-            let program = device.program(what, stage.source(together), "convolve");
-            let arguments = [
-                (0, numbers.buffer.as_entire_binding()),
-                (1, roots.as_entire_binding()),
-                (2, from.as_entire_binding()),
-                (3, to.as_entire_binding()),
-                (4, table.buffer.as_entire_binding()),
-                (5, turn.as_entire_binding()),
-            ];
-            program.on(device, &arguments, [lines.div_ceil(together), 3, 1])
-        };
-        let frame = [height * width, width, 1, width];
-        let spectra = [height * padded_width, padded_width, 1, padded_width];
-        let columns = [height * padded_width, 1, padded_width, height];
-        let places = |from: [usize; 4], to: [usize; 4]| -> [usize; 8] {
-            std::array::from_fn(|i| if i < 4 { from[i] } else { to[i - 4] })
-        };
-        let steps = [
-            make(
-                "rows",
-                row,
-                height,
-                &row_roots.buffer,
-                planes.field,
-                &rows,
-                places(frame, spectra),
-            )?,
-            // In place: the program reads its result's buffer; what is bound as its source it leaves alone.
-            make(
-                "columns",
-                column,
-                padded_width,
-                &column_roots.buffer,
-                &column_roots.buffer,
-                &rows,
-                places(columns, columns),
-            )?,
-            make(
-                "rows back",
-                back,
-                height,
-                &row_roots.buffer,
-                &rows,
-                planes.field,
-                places(spectra, frame),
-            )?,
-        ];
-        Ok(Convolution { steps })
+        [row, column, back]
     }
 
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        self.steps.iter().for_each(|step| step.run(pass));
-    }
-}
-
-impl Stage {
     /// How many lines a workgroup transforms: columns in fours where they fit, since four values are what memory
     /// hands out at a time.
     fn lines_together(&self, device: &Device) -> Result<usize> {

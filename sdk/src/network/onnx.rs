@@ -508,32 +508,7 @@ impl<'a> Reader<'a> {
             )?
             .scale;
         let bias = match bias {
-            Some(Value::Dequantised {
-                constant,
-                scale: bias_scale,
-            }) => {
-                let right = spread(bias_scale, outputs).is_some_and(|bias_scale| {
-                    bias_scale
-                        .iter()
-                        .zip(&scale)
-                        .all(|(b, w)| (b / (input_scale * w) - 1.0).abs() < 1e-3)
-                });
-                if !right {
-                    return Err("the bias scale must be input scale × weight scale".into());
-                }
-                constant.i32s()?.to_vec()
-            }
-            // A bias in f32 is rounded to the accumulator's step here.
-            Some(Value::Constant(constant)) => constant
-                .f32s()?
-                .iter()
-                .zip(&scale)
-                .map(|(b, w)| {
-                    (f64::from(*b) / (f64::from(input_scale) * f64::from(*w))).round_ties_even()
-                        as i32
-                })
-                .collect(),
-            Some(_) => return Err(wrong_bias()),
+            Some(bias) => int8_bias(bias, input_scale, &scale)?.ok_or_else(wrong_bias)?,
             None => vec![0; outputs],
         };
         if bias.len() != outputs {
@@ -770,6 +745,37 @@ fn check_multipliers(weights: &Weights, quantisation: &InputQuantisation) -> Rea
         }
     }
     Ok(())
+}
+
+/// A bias in steps of the accumulator, input scale × weight scale; none of a value that is no bias.
+fn int8_bias(bias: &Value<'_>, input_scale: f32, scale: &[f32]) -> Read<Option<Vec<i32>>> {
+    match bias {
+        Value::Dequantised {
+            constant,
+            scale: bias_scale,
+        } => {
+            let right = spread(bias_scale, scale.len()).is_some_and(|bias_scale| {
+                bias_scale
+                    .iter()
+                    .zip(scale)
+                    .all(|(b, w)| (b / (input_scale * w) - 1.0).abs() < 1e-3)
+            });
+            if !right {
+                return Err("the bias scale must be input scale × weight scale".into());
+            }
+            Ok(Some(constant.i32s()?.to_vec()))
+        }
+        Value::Constant(constant) => {
+            let rounded = |(b, w): (&f32, &f32)| {
+                let step = f64::from(input_scale) * f64::from(*w);
+                (f64::from(*b) / step).round_ties_even() as i32
+            };
+            Ok(Some(
+                constant.f32s()?.iter().zip(scale).map(rounded).collect(),
+            ))
+        }
+        _ => Ok(None),
+    }
 }
 
 fn spread(scale: &[f32], outputs: usize) -> Option<Vec<f32>> {
