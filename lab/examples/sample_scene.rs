@@ -11,7 +11,7 @@ use std::sync::Arc;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder, Rgb, RgbImage};
-use ndarray::Array2;
+use ndarray::{Array2, Array3};
 use phasefront_lab::scene::dice::Dice;
 use phasefront_lab::scene::pattern::Pattern;
 use phasefront_lab::scene::shapes::{Place, Shape, star, turn};
@@ -646,10 +646,55 @@ fn duck(room: &mut Vec<Item>) {
     part([-138.0, 312.0, 104.0], [14.0, 17.0, 12.0], 0.0, INK, 1.0);
 }
 
-/// A test chart on an easel: strokes of all widths, a star, writing.
+/// A test chart on an easel.
 fn chart(room: &mut Vec<Item>, dice: &mut Dice) {
     let (x, y, d) = (362.0, 660.0, 0.10);
     let (half_w, half_h) = (262.0, 215.0);
+    let canvas = chart_picture();
+    let board = Canvas::wood(dice, [0.42, 0.27, 0.15]);
+    put(
+        room,
+        &Shape::sheet(),
+        [x, y, d],
+        [half_w, half_h, 1.0],
+        upright(),
+        1.0,
+        Skin(canvas.texture(), 0.05),
+    );
+    put(
+        room,
+        &Shape::cuboid(),
+        [x, y, d + 0.008],
+        [half_w + 12.0, half_h + 12.0, 4.0],
+        upright(),
+        1.0,
+        Skin(board.clone(), 0.2),
+    );
+    for (dx, angle, back) in [(-190.0, -0.10, 0.0), (190.0, 0.10, 0.0)] {
+        let leg = turn([0.0, 0.0, 1.0], angle);
+        put(
+            room,
+            &Shape::cuboid(),
+            [x + dx, y + 160.0, d + 0.022 + back],
+            [11.0, 245.0, 8.0],
+            leg,
+            1.0,
+            Skin(board.clone(), 0.2),
+        );
+    }
+    put(
+        room,
+        &Shape::cuboid(),
+        [x, y + half_h + 14.0, d - 0.005],
+        [half_w - 20.0, 9.0, 14.0],
+        upright(),
+        1.0,
+        Skin(board, 0.2),
+    );
+}
+
+/// Strokes of all widths, a star, writing.
+fn chart_picture() -> Canvas {
     let size = (1048, 860);
     let mut canvas = Canvas::new(size, PAPER);
     for (from, to) in [
@@ -700,46 +745,7 @@ fn chart(room: &mut Vec<Item>, dice: &mut Dice) {
         canvas.write(line, [78.0, top], height, height * 0.085, INK);
         top += height + 21.0;
     }
-    let board = Canvas::wood(dice, [0.42, 0.27, 0.15]);
-    put(
-        room,
-        &Shape::sheet(),
-        [x, y, d],
-        [half_w, half_h, 1.0],
-        upright(),
-        1.0,
-        Skin(canvas.texture(), 0.05),
-    );
-    put(
-        room,
-        &Shape::cuboid(),
-        [x, y, d + 0.008],
-        [half_w + 12.0, half_h + 12.0, 4.0],
-        upright(),
-        1.0,
-        Skin(board.clone(), 0.2),
-    );
-    for (dx, angle, back) in [(-190.0, -0.10, 0.0), (190.0, 0.10, 0.0)] {
-        let leg = turn([0.0, 0.0, 1.0], angle);
-        put(
-            room,
-            &Shape::cuboid(),
-            [x + dx, y + 160.0, d + 0.022 + back],
-            [11.0, 245.0, 8.0],
-            leg,
-            1.0,
-            Skin(board.clone(), 0.2),
-        );
-    }
-    put(
-        room,
-        &Shape::cuboid(),
-        [x, y + half_h + 14.0, d - 0.005],
-        [half_w - 20.0, 9.0, 14.0],
-        upright(),
-        1.0,
-        Skin(board, 0.2),
-    );
+    canvas
 }
 
 fn multiply(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
@@ -988,7 +994,28 @@ fn shaded(room: &[Item]) -> phasefront_lab::Result<RgbImage> {
     })?;
     let depth = albedo.depth;
 
-    // Red, green and blue light, and the lamp's highlight.
+    let light = light(room, &normals.rgb, &depth)?;
+    Ok(RgbImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, y| {
+        let mut sum = [0.0f32; 3];
+        for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let (fy, fx) = (y as usize * FINE + dy, x as usize * FINE + dx);
+            let light = light[fy * width + fx];
+            let shine = 0.55 * gloss.rgb[[0, fy, fx]] * light[3];
+            for (c, sum) in sum.iter_mut().enumerate() {
+                *sum += film(albedo.rgb[[c, fy, fx]].powf(2.2) * light[c] + shine);
+            }
+        }
+        Rgb(sum.map(|v| (255.0 * v / (FINE * FINE) as f32).round() as u8))
+    }))
+}
+
+/// Red, green and blue light of each fine pixel, and the lamp's highlight.
+fn light(
+    room: &[Item],
+    normals: &Array3<f32>,
+    depth: &Array2<f32>,
+) -> phasefront_lab::Result<Vec<[f32; 4]>> {
+    let (height, width) = depth.dim();
     let mut light = vec![[0.0f32; 4]; height * width];
     let scene = Scene {
         meshes: room.iter().map(|item| item.mesh.clone()).collect(),
@@ -1006,7 +1033,7 @@ fn shaded(room: &[Item]) -> phasefront_lab::Result<RgbImage> {
             .for_each(|(y, row)| {
                 for (x, light) in row.iter_mut().enumerate() {
                     let n: [f64; 3] =
-                        std::array::from_fn(|c| 2.0 * f64::from(normals.rgb[[c, y, x]]) - 1.0);
+                        std::array::from_fn(|c| 2.0 * f64::from(normals[[c, y, x]]) - 1.0);
                     let cosine: f64 = (0..3).map(|i| n[i] * sun.direction[i]).sum();
                     let place = [
                         (x as f64 + 0.5) / FINE as f64,
@@ -1030,18 +1057,7 @@ fn shaded(room: &[Item]) -> phasefront_lab::Result<RgbImage> {
                 }
             });
     }
-    Ok(RgbImage::from_fn(WIDTH as u32, HEIGHT as u32, |x, y| {
-        let mut sum = [0.0f32; 3];
-        for (dy, dx) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let (fy, fx) = (y as usize * FINE + dy, x as usize * FINE + dx);
-            let light = light[fy * width + fx];
-            let shine = 0.55 * gloss.rgb[[0, fy, fx]] * light[3];
-            for (c, sum) in sum.iter_mut().enumerate() {
-                *sum += film(albedo.rgb[[c, fy, fx]].powf(2.2) * light[c] + shine);
-            }
-        }
-        Rgb(sum.map(|v| (255.0 * v / (FINE * FINE) as f32).round() as u8))
-    }))
+    Ok(light)
 }
 
 /// Light to picture value: bright parts bend toward one.

@@ -33,24 +33,7 @@ fn main() -> Result<()> {
     let (height, width) = frame.shape();
     let display = Display::default();
     let usual = Sweep::for_display(&display);
-    let mut cases = vec![usual];
-    if let [_, planes, taps, hidden_layers, tile] = numbers[..] {
-        cases = vec![Sweep {
-            planes,
-            taps,
-            hidden_layers,
-            tile,
-            ..usual
-        }];
-    } else {
-        cases
-            .extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep::of_planes(&display, planes)));
-        cases.extend([0, 1].map(|hidden_layers| Sweep {
-            hidden_layers,
-            ..usual
-        }));
-        cases.extend([64, 128, 192, 384].map(|tile| Sweep { tile, ..usual }));
-    }
+    let cases = sweeps(&display, &numbers);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(numbers.first().copied().unwrap_or(0))
         .build()
@@ -114,4 +97,26 @@ fn main() -> Result<()> {
         }
         Ok(())
     })
+}
+
+/// The sweep that is asked for by its four numbers, or all that are of interest.
+fn sweeps(display: &Display, numbers: &[usize]) -> Vec<Sweep> {
+    let usual = Sweep::for_display(display);
+    if let [_, planes, taps, hidden_layers, tile] = *numbers {
+        return vec![Sweep {
+            planes,
+            taps,
+            hidden_layers,
+            tile,
+            ..usual
+        }];
+    }
+    let mut all = vec![usual];
+    all.extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep::of_planes(display, planes)));
+    all.extend([0, 1].map(|hidden_layers| Sweep {
+        hidden_layers,
+        ..usual
+    }));
+    all.extend([64, 128, 192, 384].map(|tile| Sweep { tile, ..usual }));
+    all
 }

@@ -138,39 +138,11 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         brightness,
     };
     let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
-    let options = EncoderOptions {
-        encoding: Encoding::ANTI_ALIAS,
-        brightness,
-    };
-    let by_table = (target.response.shape())
-        .map(|_| Modulator::new((height, width), target, &options))
-        .transpose()?;
-    let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
-    let frame = test_frame(height, width)?;
-    let mut scratch = pipeline.scratch();
-    let mut field = vec![Complex32::ZERO; 3 * height * width];
-    let mut levels = vec![0; 3 * height * width];
-    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    let (mut totals, mut table_encode) = (Vec::new(), Vec::new());
-    pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
-    let start = Instant::now();
-    while totals.len() < 5 || start.elapsed() < budget {
-        let ms = |time: Duration| time.as_secs_f64() * 1e3;
-        let (method, propagate) = pipeline.field(&frame, &mut field, &mut scratch)?;
-        if let Some((scratch, plan)) = &mut by_table {
-            // The encoder's filter changes the field.
-            let mut field = field.clone();
-            let modulation = plan.modulate(&mut field, &mut levels, scratch);
-            table_encode.push(ms(modulation.encode));
-        }
-        let encode = pipeline
-            .modulate(&mut field, &mut levels, &mut scratch)
-            .encode;
-        for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
-            stages.entry(stage).or_default().push(ms(time));
-        }
-        totals.push(ms(method + propagate + encode));
-    }
+    let Times {
+        stages,
+        mut totals,
+        mut table_encode,
+    } = time_frames(case, target, &pipeline, budget)?;
     let stage_ms: BTreeMap<_, _> = (stages.into_iter())
         .map(|(stage, mut times)| (stage, median(&mut times)))
         .collect();
@@ -214,6 +186,59 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
             .map(|(peak, gmac_per_s)| 100.0 * gmac_per_s * 1e9 / peak),
         peak_memory_mb: peak_memory_mb(),
     })
+}
+
+/// Times of frames, milliseconds.
+#[derive(Default)]
+struct Times {
+    stages: BTreeMap<&'static str, Vec<f64>>,
+    totals: Vec<f64>,
+    /// Of encoding through the table.
+    table_encode: Vec<f64>,
+}
+
+/// Frames until `budget` is spent, five at least, after one that is not counted.
+fn time_frames(
+    case: &Case<'_>,
+    target: &Target,
+    pipeline: &Pipeline,
+    budget: Duration,
+) -> Result<Times> {
+    let (width, height) = case.size;
+    let (name, _) = named(case.method);
+    let options = EncoderOptions {
+        encoding: Encoding::ANTI_ALIAS,
+        brightness: Brightness::Fixed(1.0),
+    };
+    let by_table = (target.response.shape())
+        .map(|_| Modulator::new((height, width), target, &options))
+        .transpose()?;
+    let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
+    let frame = test_frame(height, width)?;
+    let mut scratch = pipeline.scratch();
+    let mut field = vec![Complex32::ZERO; 3 * height * width];
+    let mut levels = vec![0; 3 * height * width];
+    let mut times = Times::default();
+    pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
+    let start = Instant::now();
+    while times.totals.len() < 5 || start.elapsed() < budget {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let (method, propagate) = pipeline.field(&frame, &mut field, &mut scratch)?;
+        if let Some((scratch, plan)) = &mut by_table {
+            // The encoder's filter changes the field.
+            let mut field = field.clone();
+            let modulation = plan.modulate(&mut field, &mut levels, scratch);
+            times.table_encode.push(ms(modulation.encode));
+        }
+        let encode = pipeline
+            .modulate(&mut field, &mut levels, &mut scratch)
+            .encode;
+        for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
+            times.stages.entry(stage).or_default().push(ms(time));
+        }
+        times.totals.push(ms(method + propagate + encode));
+    }
+    Ok(times)
 }
 
 /// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it. What

@@ -16,16 +16,18 @@ pub mod spatial;
 
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
-use crate::sm_lbm::{Planes, cross, plane_z_m};
-use ndarray::{Array3, ArrayView1, Axis};
+use crate::sm_lbm::{Planes, Point, crop, cross, place, plane_z_m};
+use ndarray::{Array3, Axis};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
 use phasefront::unstable::wave::{
     asm::{self, Padding, Transfer},
-    fft::Fft2,
+    fft::{Fft2, Scratch},
     zernike::Aberrations,
 };
 use rayon::prelude::*;
+use std::cell::Cell;
+use std::ops::Range;
 
 /// The most propagations of one colour: those of 512 planes with a kernel each.
 pub const MAX_PROPAGATIONS: usize = 512 * 512 / 2;
@@ -280,8 +282,7 @@ pub fn hologram(
     let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
     let mut sum = vec![Complex32::ZERO; padded_height * padded_width];
     let mut hologram = Array3::zeros((3, height, width));
-    let step_m = display.volume_depth_m() / planes as f64;
-    let mut done = 0;
+    let done = Cell::new(0);
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
         let transfer = |distance_m| {
             Transfer::new(
@@ -292,66 +293,105 @@ pub fn hologram(
                 |_, _| true,
             )
         };
-        let neighbour = transfer(step_m);
-        let home = transfer(-z(front));
+        let step_m = display.volume_depth_m() / planes as f64;
+        let wave = Wave {
+            fft: &fft,
+            points: &scene.points,
+            neighbour: transfer(step_m),
+            across: &|steps| transfer(steps as f64 * step_m),
+            // To the start of each content and on to z = 0 is −z of the front plane for all.
+            home: transfer(-z(front)),
+            done: &|| {
+                done.set(done.get() + 1);
+                progress(done.get(), 3 * propagations);
+            },
+        };
         sum.fill(Complex32::ZERO);
         for (i, swept) in &sweeps {
             let content = |k: usize, rgb: &[f32; 3]| {
                 Complex32::from(correction.weight(*i, z(k)) * rgb[colour])
             };
-            let (back, points) = &swept[0];
-            plane.fill(Complex32::ZERO);
-            for point in &scene.points[points.clone()] {
-                plane[point.y as usize * padded_width + point.x as usize] =
-                    content(*back, &point.rgb);
-            }
-            fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
-            let mut at = *back;
-            for (k, points) in &swept[1..] {
-                let points = &scene.points[points.clone()];
-                let across;
-                let transfer = match at - k {
-                    1 => &neighbour,
-                    steps => {
-                        across = transfer(steps as f64 * step_m);
-                        &across
-                    }
-                };
-                // Content that this kernel does not correct is weighted 0: its silhouette still blocks.
-                cross(&fft, &mut scratch, transfer, points, |point| {
-                    content(*k, &point.rgb)
-                });
-                at = *k;
-                done += 1;
-                progress(done, 3 * propagations);
-            }
-            // To the start of each content and on to z = 0 is −z of the front plane for all; Φ on the way.
-            fft.spectrum(
-                &scratch.rows,
-                &mut scratch.columns,
-                |x, column, _| home.apply(x, column),
-                &mut scratch.work,
-            );
+            wave.sweep(swept, &content, &mut plane, &mut scratch);
+            // Φ on the way.
             let kernel = correction.kernels[*i].index_axis(Axis(0), colour);
             let kernel = kernel.to_slice().expect("standard layout");
-            (sum.par_chunks_exact_mut(padded_height))
-                .zip(scratch.columns.par_chunks_exact(padded_height))
-                .zip(kernel.par_chunks_exact(padded_height))
-                .for_each(|((sum, column), kernel)| {
-                    for ((sum, value), factor) in sum.iter_mut().zip(column).zip(kernel) {
-                        *sum += value * factor;
-                    }
-                });
-            done += 1;
-            progress(done, 3 * propagations);
+            add_product(&mut sum, &scratch.columns, kernel, padded_height);
         }
         fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
         fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work);
-        let rows = scratch.rows.chunks_exact(padded_width);
-        let mut out = hologram.index_axis_mut(Axis(0), colour);
-        for (mut out, row) in out.rows_mut().into_iter().zip(rows) {
-            out.assign(&ArrayView1::from(&row[..width]));
-        }
+        let frame = hologram.index_axis_mut(Axis(0), colour);
+        crop(&scratch.rows, padded_width, frame);
     }
     Ok(hologram)
+}
+
+/// Adds `values` times `factors`, by runs of `length`.
+fn add_product(sum: &mut [Complex32], values: &[Complex32], factors: &[Complex32], length: usize) {
+    sum.par_chunks_exact_mut(length)
+        .zip(values.par_chunks_exact(length))
+        .zip(factors.par_chunks_exact(length))
+        .for_each(|((sum, values), factors)| {
+            for ((sum, value), factor) in sum.iter_mut().zip(values).zip(factors) {
+                *sum += value * factor;
+            }
+        });
+}
+
+/// One colour's wave through a scene.
+struct Wave<'a> {
+    fft: &'a Fft2,
+    points: &'a [Point],
+    /// From one plane to the next.
+    neighbour: Transfer,
+    /// Over so many planes.
+    across: &'a dyn Fn(usize) -> Transfer,
+    /// From the front plane to z = 0.
+    home: Transfer,
+    /// Told of each propagation.
+    done: &'a dyn Fn(),
+}
+
+impl Wave<'_> {
+    /// The spectrum at z = 0, in the scratch's columns, of what `content` gives for the points of the planes `swept`, back
+    /// first; `plane` is room for one plane.
+    fn sweep(
+        &self,
+        swept: &[(usize, Range<usize>)],
+        content: &(dyn Fn(usize, &[f32; 3]) -> Complex32 + Sync),
+        plane: &mut [Complex32],
+        scratch: &mut Scratch,
+    ) {
+        let fft = self.fft;
+        let (back, points) = &swept[0];
+        let points = &self.points[points.clone()];
+        let width = fft.padded_shape().1;
+        place(points, plane, width, |point| content(*back, &point.rgb));
+        fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
+        let mut at = *back;
+        for (k, points) in &swept[1..] {
+            let points = &self.points[points.clone()];
+            let across;
+            let transfer = match at - k {
+                1 => &self.neighbour,
+                steps => {
+                    across = (self.across)(steps);
+                    &across
+                }
+            };
+            // Content that this kernel does not correct is weighted 0: its silhouette still blocks.
+            cross(fft, scratch, transfer, points, |point| {
+                content(*k, &point.rgb)
+            });
+            at = *k;
+            (self.done)();
+        }
+        let home = &self.home;
+        fft.spectrum(
+            &scratch.rows,
+            &mut scratch.columns,
+            |x, column, _| home.apply(x, column),
+            &mut scratch.work,
+        );
+        (self.done)();
+    }
 }

@@ -15,7 +15,7 @@
 
 use crate::error::Result;
 use crate::ldi::Ldi;
-use ndarray::Array3;
+use ndarray::{Array3, ArrayView1, ArrayViewMut2, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::unstable::wave::{
@@ -132,6 +132,27 @@ pub(crate) fn cross(
     );
 }
 
+/// `points` alone on a plane whose rows have `width` values.
+pub(crate) fn place(
+    points: &[Point],
+    plane: &mut [Complex32],
+    width: usize,
+    content: impl Fn(&Point) -> Complex32,
+) {
+    plane.fill(Complex32::ZERO);
+    for point in points {
+        plane[point.y as usize * width + point.x as usize] = content(point);
+    }
+}
+
+/// The frame's part of padded `rows` of `width` values.
+pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_, Complex32>) {
+    let columns = frame.ncols();
+    for (mut out, row) in frame.rows_mut().into_iter().zip(rows.chunks_exact(width)) {
+        out.assign(&ArrayView1::from(&row[..columns]));
+    }
+}
+
 /// The complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
 /// the planes done, of all those that hold points in three colours.
 ///
@@ -185,10 +206,8 @@ pub fn hologram(
         };
         // The columns are not in use yet: their buffer holds the farthest plane.
         let plane = &mut scratch.columns;
-        plane.fill(Complex32::ZERO);
-        for point in &scene.points[points.clone()] {
-            plane[point.y as usize * padded_width + point.x as usize] = point.rgb[colour].into();
-        }
+        let content = |point: &Point| Complex32::from(point.rgb[colour]);
+        place(&scene.points[points.clone()], plane, padded_width, content);
         fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         let mut at = *back;
         let done = colour * scene.occupied.len();
@@ -202,9 +221,7 @@ pub fn hologram(
                     &across
                 }
             };
-            cross(&fft, &mut scratch, transfer, points, |point| {
-                point.rgb[colour].into()
-            });
+            cross(&fft, &mut scratch, transfer, points, content);
             at = *k;
             progress(done + i, total);
         }
@@ -216,15 +233,11 @@ pub fn hologram(
             &mut scratch.work,
         );
         fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
-        let rows = scratch.rows.chunks_exact(padded_width);
-        for (mut out, row) in hologram
-            .index_axis_mut(ndarray::Axis(0), colour)
-            .rows_mut()
-            .into_iter()
-            .zip(rows)
-        {
-            out.assign(&ndarray::ArrayView1::from(&row[..width]));
-        }
+        crop(
+            &scratch.rows,
+            padded_width,
+            hologram.index_axis_mut(Axis(0), colour),
+        );
         progress(done + scene.occupied.len(), total);
     }
     Ok(hologram)

@@ -70,7 +70,6 @@ pub fn measure(
     job.encoder.brightness = Brightness::Fixed(1.0);
     job.chain = chain;
     probe(device, &job)?;
-    // As phones give frames: luma, chroma at half the resolution, depth of 16 bits.
     let format = ColourFormat::Nv12(YuvEncoding::default());
     job.colour = Colour::Camera {
         format,
@@ -86,67 +85,18 @@ pub fn measure(
             GpuPipeline::new(device, &job)
         })
         .transpose()?;
-    let byte = |i: usize| (i * 7 % 256) as u8;
-    let luma: Vec<u8> = (0..height * width).map(byte).collect();
-    let chroma: Vec<u8> = (0..2 * height.div_ceil(2) * width.div_ceil(2))
-        .map(byte)
-        .collect();
-    let depth: Vec<u16> = (0..height * width).map(|i| (i / 8 * 257) as u16).collect();
-    let planes = [
-        Plane::new(&luma, width, 1),
-        Plane::new(&chroma, 2 * width.div_ceil(2), 2),
-    ];
+    let images = Images::new(width, height);
+    let planes = images.planes();
     let frame = Frame {
         colour: ColourData::Camera(ColourImage::new(format, width, height, &planes)?),
-        depth: DepthData::U16(&depth),
+        depth: DepthData::U16(&images.depth),
     };
-    let mut levels = vec![0; 3 * height * width];
-    let mut stages: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
-    let (mut totals, mut table_encode) = (Vec::new(), Vec::new());
-    let ms = |time: Duration| time.as_secs_f64() * 1e3;
-    pipeline.process(&frame, &mut levels)?;
-    let start = Instant::now();
-    while totals.len() < 5 || start.elapsed() < budget {
-        let begin = Instant::now();
-        let report = pipeline.process(&frame, &mut levels)?;
-        totals.push(ms(begin.elapsed()));
-        if let Some(times) = report.times {
-            let StageTimes {
-                input,
-                method,
-                propagate,
-                encode,
-            } = times;
-            for (stage, time) in [
-                ("input", input),
-                (name, method),
-                ("propagate", propagate),
-                ("encode", encode),
-            ] {
-                stages.entry(stage).or_default().push(ms(time));
-            }
-        }
-        if let Some(by_table) = &mut by_table
-            && let Some(times) = by_table.process(&frame, &mut levels)?.times
-        {
-            table_encode.push(ms(times.encode));
-        }
-    }
-    let start = Instant::now();
-    let mut flying = VecDeque::new();
-    let mut flown = 0;
-    while flown < 5 || start.elapsed() < budget {
-        if flying.len() == FLIGHTS {
-            pipeline.finish(flying.pop_front().expect("not empty"))?;
-            flown += 1;
-        }
-        flying.push_back(pipeline.submit(&frame, Deliver::Shown)?);
-    }
-    for ticket in flying {
-        pipeline.finish(ticket)?;
-        flown += 1;
-    }
-    let flying_ms = ms(start.elapsed()) / f64::from(flown);
+    let Alone {
+        mut totals,
+        stages,
+        mut table_encode,
+    } = Alone::measure(name, &mut pipeline, by_table.as_mut(), &frame, budget)?;
+    let flying_ms = flying_ms(&mut pipeline, &frame, budget)?;
     let stage_ms: BTreeMap<_, _> = (stages.into_iter())
         .map(|(stage, mut times)| (stage, median(&mut times)))
         .collect();
@@ -180,4 +130,113 @@ pub fn measure(
         bandwidth_percent: method_s
             .map(|s| 100.0 * pipeline.method_bytes() as f64 / s / peak.bytes_per_s),
     })
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// Times of frames one at a time, milliseconds.
+#[derive(Default)]
+struct Alone {
+    totals: Vec<f64>,
+    stages: BTreeMap<&'static str, Vec<f64>>,
+    /// Of encoding through the table.
+    table_encode: Vec<f64>,
+}
+
+impl Alone {
+    /// Frames until `budget` is spent, five at least, after one that is not counted; each once more `by_table`, where
+    /// there is one. `name` is that of the method's stage.
+    fn measure(
+        name: &'static str,
+        pipeline: &mut GpuPipeline,
+        mut by_table: Option<&mut GpuPipeline>,
+        frame: &Frame<'_>,
+        budget: Duration,
+    ) -> Result<Self> {
+        let mut alone = Alone::default();
+        let (height, width) = pipeline.shape();
+        let mut levels = vec![0; 3 * height * width];
+        pipeline.process(frame, &mut levels)?;
+        let start = Instant::now();
+        while alone.totals.len() < 5 || start.elapsed() < budget {
+            let begin = Instant::now();
+            let report = pipeline.process(frame, &mut levels)?;
+            alone.totals.push(ms(begin.elapsed()));
+            if let Some(times) = report.times {
+                alone.note(name, &times);
+            }
+            if let Some(by_table) = &mut by_table
+                && let Some(times) = by_table.process(frame, &mut levels)?.times
+            {
+                alone.table_encode.push(ms(times.encode));
+            }
+        }
+        Ok(alone)
+    }
+
+    /// Takes a frame's times.
+    fn note(&mut self, name: &'static str, times: &StageTimes) {
+        let StageTimes {
+            input,
+            method,
+            propagate,
+            encode,
+        } = *times;
+        for (stage, time) in [
+            ("input", input),
+            (name, method),
+            ("propagate", propagate),
+            ("encode", encode),
+        ] {
+            self.stages.entry(stage).or_default().push(ms(time));
+        }
+    }
+}
+
+/// Time a frame with several in flight whose levels stay on the GPU, milliseconds.
+fn flying_ms(pipeline: &mut GpuPipeline, frame: &Frame<'_>, budget: Duration) -> Result<f64> {
+    let start = Instant::now();
+    let mut flying = VecDeque::new();
+    let mut flown = 0;
+    while flown < 5 || start.elapsed() < budget {
+        if flying.len() == FLIGHTS {
+            pipeline.finish(flying.pop_front().expect("not empty"))?;
+            flown += 1;
+        }
+        flying.push_back(pipeline.submit(frame, Deliver::Shown)?);
+    }
+    for ticket in flying {
+        pipeline.finish(ticket)?;
+        flown += 1;
+    }
+    Ok(ms(start.elapsed()) / f64::from(flown))
+}
+
+/// A frame as phones give it: luma, chroma at half the resolution, depth of 16 bits.
+struct Images {
+    width: usize,
+    luma: Vec<u8>,
+    chroma: Vec<u8>,
+    depth: Vec<u16>,
+}
+
+impl Images {
+    fn new(width: usize, height: usize) -> Self {
+        let bytes = |n: usize| (0..n).map(|i| (i * 7 % 256) as u8).collect();
+        Images {
+            width,
+            luma: bytes(height * width),
+            chroma: bytes(2 * height.div_ceil(2) * width.div_ceil(2)),
+            depth: (0..height * width).map(|i| (i / 8 * 257) as u16).collect(),
+        }
+    }
+
+    fn planes(&self) -> [Plane<'_>; 2] {
+        [
+            Plane::new(&self.luma, self.width, 1),
+            Plane::new(&self.chroma, 2 * self.width.div_ceil(2), 2),
+        ]
+    }
 }

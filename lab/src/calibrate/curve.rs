@@ -23,6 +23,10 @@ pub const COEFFICIENTS: usize = 12;
 const INCREMENTS: usize = COEFFICIENTS - 1;
 /// Unknowns of a fit: increments, a and b.
 const UNKNOWNS: usize = INCREMENTS + 2;
+/// Coefficients, then a and b.
+const N: usize = COEFFICIENTS + 2;
+const A: usize = COEFFICIENTS;
+const B: usize = COEFFICIENTS + 1;
 /// The weight of the penalty against light of amplitude 1: as for noise of 1/30 and increments whose second differences are
 /// 0.2 rad.
 const PENALTY: f64 = 0.03;
@@ -231,56 +235,8 @@ impl Basis {
 
     /// Where the linear model about `p` is best, increments at 0 or above; a = b where the minimum was not seen.
     fn step(&self, p: &[f64; UNKNOWNS], seen: &[f64], free: bool) -> [f64; UNKNOWNS] {
-        const A: usize = COEFFICIENTS;
-        const B: usize = COEFFICIENTS + 1;
-        const N: usize = COEFFICIENTS + 2;
-        let (a, b) = (p[INCREMENTS], p[INCREMENTS + 1]);
-        // Normal equations in coefficients, where splines are local, a and b.
-        let mut gram = [[0.0; N]; N];
-        let mut right = [0.0; N];
-        for (((first, values), phase), seen) in self.rows.iter().zip(self.phases(p)).zip(seen) {
-            let (sin, cos) = phase.sin_cos();
-            let slope = -b * sin;
-            let residual = seen - a - b * cos;
-            for (i, v) in values.iter().enumerate() {
-                let row = first + i;
-                let v = v * slope;
-                right[row] += v * residual;
-                for (j, u) in values.iter().enumerate().take(i + 1) {
-                    gram[row][first + j] += v * u * slope;
-                }
-                gram[A][row] += v;
-                gram[B][row] += v * cos;
-            }
-            right[A] += residual;
-            right[B] += residual * cos;
-            gram[A][A] += 1.0;
-            gram[B][A] += cos;
-            gram[B][B] += cos * cos;
-        }
-        // To increments: coefficient i is the sum of the increments below it, so sums from the end.
-        for i in 1..N {
-            let (above, row) = gram.split_at_mut(i);
-            for (j, above) in above.iter_mut().enumerate() {
-                above[i] = row[0][j];
-            }
-        }
-        for row in &mut gram {
-            for j in (1..COEFFICIENTS - 1).rev() {
-                row[j] += row[j + 1];
-            }
-        }
-        for i in (1..COEFFICIENTS - 1).rev() {
-            let below = gram[i + 1];
-            (gram[i].iter_mut().zip(below)).for_each(|(v, b)| *v += b);
-            right[i] += right[i + 1];
-        }
-        let mut system = [[0.0; UNKNOWNS]; UNKNOWNS];
-        let mut wanted = [0.0; UNKNOWNS];
-        for i in 0..UNKNOWNS {
-            system[i].copy_from_slice(&gram[i + 1][1..]);
-            wanted[i] = right[i + 1];
-        }
+        let (gram, right) = self.normal_equations(p, seen);
+        let (mut system, mut wanted) = of_increments(gram, right);
         if !free {
             // One unknown for both: their columns and rows summed, the second left alone.
             let (a, b) = (INCREMENTS, INCREMENTS + 1);
@@ -311,25 +267,90 @@ impl Basis {
                 }
             }
         }
-        let mut held = [false; UNKNOWNS];
-        loop {
-            let (mut now, mut right) = (system, wanted);
-            for i in (0..UNKNOWNS).filter(|i| held[*i]) {
-                now[i] = [0.0; UNKNOWNS];
-                now.iter_mut().for_each(|row| row[i] = 0.0);
-                (now[i][i], right[i]) = (1.0, 0.0);
-            }
-            let mut next = cholesky(now, right, UNKNOWNS);
-            let before = held;
-            for i in 0..INCREMENTS {
-                held[i] |= next[i] < 0.0;
-            }
-            if held == before {
-                if !free {
-                    next[INCREMENTS + 1] = next[INCREMENTS];
+        let mut next = non_negative(system, wanted);
+        if !free {
+            next[INCREMENTS + 1] = next[INCREMENTS];
+        }
+        next
+    }
+
+    /// Of the linear model about `p`, in coefficients, where splines are local, a and b; the lower triangle.
+    fn normal_equations(&self, p: &[f64; UNKNOWNS], seen: &[f64]) -> ([[f64; N]; N], [f64; N]) {
+        let (a, b) = (p[INCREMENTS], p[INCREMENTS + 1]);
+        let mut gram = [[0.0; N]; N];
+        let mut right = [0.0; N];
+        for (((first, values), phase), seen) in self.rows.iter().zip(self.phases(p)).zip(seen) {
+            let (sin, cos) = phase.sin_cos();
+            let slope = -b * sin;
+            let residual = seen - a - b * cos;
+            for (i, v) in values.iter().enumerate() {
+                let row = first + i;
+                let v = v * slope;
+                right[row] += v * residual;
+                for (j, u) in values.iter().enumerate().take(i + 1) {
+                    gram[row][first + j] += v * u * slope;
                 }
-                return next;
+                gram[A][row] += v;
+                gram[B][row] += v * cos;
             }
+            right[A] += residual;
+            right[B] += residual * cos;
+            gram[A][A] += 1.0;
+            gram[B][A] += cos;
+            gram[B][B] += cos * cos;
+        }
+        (gram, right)
+    }
+}
+
+/// Normal equations in increments, a and b, of those in coefficients: coefficient i is the sum of the increments below
+/// it, so sums from the end.
+fn of_increments(
+    mut gram: [[f64; N]; N],
+    mut right: [f64; N],
+) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
+    for i in 1..N {
+        let (above, row) = gram.split_at_mut(i);
+        for (j, above) in above.iter_mut().enumerate() {
+            above[i] = row[0][j];
+        }
+    }
+    for row in &mut gram {
+        for j in (1..COEFFICIENTS - 1).rev() {
+            row[j] += row[j + 1];
+        }
+    }
+    for i in (1..COEFFICIENTS - 1).rev() {
+        let below = gram[i + 1];
+        (gram[i].iter_mut().zip(below)).for_each(|(v, b)| *v += b);
+        right[i] += right[i + 1];
+    }
+    let mut system = [[0.0; UNKNOWNS]; UNKNOWNS];
+    let mut wanted = [0.0; UNKNOWNS];
+    for i in 0..UNKNOWNS {
+        system[i].copy_from_slice(&gram[i + 1][1..]);
+        wanted[i] = right[i + 1];
+    }
+    (system, wanted)
+}
+
+/// Solves `system`, with increments that would be below 0 held at 0.
+fn non_negative(system: [[f64; UNKNOWNS]; UNKNOWNS], wanted: [f64; UNKNOWNS]) -> [f64; UNKNOWNS] {
+    let mut held = [false; UNKNOWNS];
+    loop {
+        let (mut now, mut right) = (system, wanted);
+        for i in (0..UNKNOWNS).filter(|i| held[*i]) {
+            now[i] = [0.0; UNKNOWNS];
+            now.iter_mut().for_each(|row| row[i] = 0.0);
+            (now[i][i], right[i]) = (1.0, 0.0);
+        }
+        let next = cholesky(now, right, UNKNOWNS);
+        let before = held;
+        for i in 0..INCREMENTS {
+            held[i] |= next[i] < 0.0;
+        }
+        if held == before {
+            return next;
         }
     }
 }

@@ -24,7 +24,7 @@ use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is rehearsed.
 #[derive(Debug, Clone)]
@@ -82,179 +82,276 @@ pub fn run(
     progress: &dyn Fn(usize, usize),
 ) -> Result<Outcome> {
     let display = &rehearsal.display;
-    let shape @ (height, width) = (display.height(), display.width());
-    let pattern = Pattern::new(height, width)?;
-    let simulated = SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?;
-    let factory = Response::linear(display.bits())?;
-    let rounds = 3 * spot::ROUNDS * TRIALS;
-    let work = 3 * (PATTERNS + height) + rounds;
-    let mut photographs = 0;
-
-    // Curves: 256 photographs a colour, focused on the modulator.
-    let modulator_z_m = display.offset_m();
-    let captures = folder.join("captures");
-    let mut curves = Vec::new();
-    for (colour, name) in COLOURS.iter().enumerate() {
-        let captures = captures.join(name);
-        if rehearsal.keep_captures {
-            make(&captures)?;
-        }
-        let shoot = |k: usize| -> Result<Photograph> {
-            let frame = pattern.frame(k as u8);
-            let photo = simulated.photograph(frame.view(), colour, modulator_z_m, k as u64)?;
-            if rehearsal.keep_captures {
-                photo.write(&captures.join(format!("capture_{k:03}.png")))?;
-            }
-            Ok(photo)
-        };
-        let source = |k: usize| shoot(k).map_err(|e| lut::What::Unreadable(e.to_string()));
-        let done = |n: usize, of: usize| progress(colour * of + n, work);
-        let measured = lut::measure(&pattern, colour, &source, folder, &done);
-        curves.push(measured.map_err(|refusal| match refusal {
-            Refusal::Other(e) => e,
-            Refusal::Problems(all) => {
-                Error::Input(all.first().map_or_else(String::new, ToString::to_string))
-            }
-        })?);
-        photographs += PATTERNS;
-    }
-    let curves: [lut::Curves; 3] = curves
-        .try_into()
-        .map_err(|_| Error::Input("three colours".into()))?;
+    let stage = Stage {
+        rehearsal,
+        folder,
+        pattern: Pattern::new(display.height(), display.width())?,
+        simulated: SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
+        progress,
+    };
+    let curves = stage.curves()?;
     let per_pixel = lut::compact(&curves)?;
     table::write_per_pixel(&folder.join("table.pfp"), &per_pixel)?;
     report::draw(&curves, folder)?;
-    let lut_report = report::report(&curves, &per_pixel);
+    let lut = report::report(&curves, &per_pixel);
     let calibrated = Response::PerPixel(per_pixel.into());
-
-    // The laser: a photograph of a diffuser a colour.
-    let mut maps = Vec::new();
-    for (colour, name) in COLOURS.iter().enumerate() {
-        let marked = simulated.photograph(pattern.frame(0).view(), colour, modulator_z_m, 0)?;
-        let registration = marks::register(&marked, &pattern)?;
-        let photo = simulated.photograph_diffuser(colour, 1 << 20)?;
-        photographs += 1;
-        if rehearsal.keep_captures {
-            photo.write(&captures.join(name).join("diffuser.png"))?;
-        }
-        maps.push(laser::mixture(&laser::map(&photo, &registration, shape)?, 1)?.0);
-    }
-    let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
-    let laser_map = stack(Axis(0), &views).map_err(|e| Error::Input(e.to_string()))?;
-    table::write_laser(&folder.join("laser.png"), laser_map.view())?;
-
-    // Aberrations: the same lens for all colours, as path; its phase goes with 1/λ.
-    let mut dice = Dice::new(rehearsal.seed ^ 0xab);
-    let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
-    let wavelengths = display.wavelengths_m();
-    let truth = wavelengths.map(|lambda| green.map(|a| a * wavelengths[1] / lambda));
-    let aberrated = simulated.clone().with_aberration(Aberration::new(truth)?);
-    let target = Target {
-        response: calibrated.clone(),
-        ..Target::from(display)
-    };
-    let mut found = [[0.0; 5]; 3];
-    let mut tried = Vec::new();
-    let mut spots = Vec::new();
-    for colour in 0..3 {
-        let mut camera = aberrated.camera().clone();
-        camera.exposure = spot::exposure(display, colour, rehearsal.spot_z_m);
-        let before_lens = aberrated.clone().with_camera(camera);
-        let shoot = |a: &Coefficients, shot: usize| -> Result<Photograph> {
-            let z_m = rehearsal.spot_z_m;
-            let levels = spot::levels(&target, colour, z_m, MIDDLE, a)?;
-            before_lens.photograph(levels.view(), colour, z_m, (1 << 21) + shot as u64)
-        };
-        let mut search = Search::from([0.0; 5]);
-        let mut history = vec![(0.0, spot::strehl(&truth[colour]))];
-        while !search.is_done() {
-            let mut sharp = [0.0; TRIALS];
-            for (i, trial) in search.trials().iter().enumerate() {
-                let photo = shoot(trial, search.round * TRIALS + i)?;
-                sharp[i] = spot::sharpness(&photo, spot::window(rehearsal.zoom))?;
-                photographs += 1;
-            }
-            search = search.learn(&sharp);
-            let left = apart(&truth[colour], &search.best);
-            history.push((search.round as f64, spot::strehl(&left)));
-            progress(
-                3 * (PATTERNS + height) + (colour * spot::ROUNDS + search.round) * TRIALS,
-                work,
-            );
-        }
-        found[colour] = search.best;
-        tried.push(Curve {
-            name: COLOURS[colour].into(),
-            points: history,
-            dots: false,
-        });
-        if colour == 1 {
-            spots = vec![shoot(&[0.0; 5], 9000)?, shoot(&search.best, 9001)?];
-        }
-    }
-    let entry = Entry {
-        z_mm: rehearsal.spot_z_m * 1e3,
-        x: None,
-        y: None,
-        red: found[0],
-        green: found[1],
-        blue: found[2],
-    };
-    table::write_aberrations(&folder.join("aberration.toml"), &[entry])?;
-    let panel = Panel {
-        title: "Strehl ratio of the search".into(),
-        x: "round",
-        y: "Strehl ratio",
-        curves: tried,
-    };
-    chart::write_curves(&folder.join("search.svg"), &[panel], 1)?;
+    let laser_map = stage.laser_map()?;
+    let aberrations = stage.aberrations(&calibrated)?;
     write_display(&folder.join("display.toml"), display)?;
 
-    // What it is worth.
-    let side = (24.0 * rehearsal.zoom) as usize;
-    let cropped: Vec<_> = spots.iter().map(|photo| crop(photo, side)).collect();
-    write_pair(&folder.join("spot.png"), &cropped)?;
-    draw_laser(folder, &simulated, &laser_map)?;
-    let file = files::read_display(&folder.join("display.toml"))?;
-    let bare = Target::from(display);
-    let both = |f: &dyn Fn(&Response, usize) -> Result<f64>| -> Result<BeforeAfter> {
-        let mut all = BeforeAfter::default();
-        for colour in 0..3 {
-            all.before[colour] = f(&factory, colour)?;
-            all.after[colour] = f(&calibrated, colour)?;
-        }
-        Ok(all)
-    };
-    let phase_error_rad = both(&|response, c| Ok(phase_error(&simulated, response, c)))?;
-    let black_db = both(&|response, c| black_level(&simulated, response, c))?;
-    let mut unevenness = BeforeAfter::default();
-    for colour in 0..3 {
-        unevenness.before[colour] = flat_grey(&simulated, &bare, colour)?;
-        unevenness.after[colour] = flat_grey(&simulated, &file.target, colour)?;
-    }
-    black_pictures(&simulated, &factory, &calibrated, folder)?;
-    for k in [0usize, 128] {
-        let frame = pattern.frame(k as u8);
-        let photo = simulated.photograph(frame.view(), 1, modulator_z_m, k as u64)?;
-        photo.write(&folder.join(format!("capture_{k:03}.png")))?;
-    }
+    let worth = stage.worth(&calibrated)?;
+    stage.pictures(&calibrated, &laser_map, &aberrations.spots)?;
+    let Aberrations { truth, found, .. } = aberrations;
     let outcome = Outcome {
-        lut: lut_report,
-        phase_error_rad,
-        black_db,
-        unevenness,
+        lut,
+        phase_error_rad: worth.phase_error_rad,
+        black_db: worth.black_db,
+        unevenness: worth.unevenness,
         strehl: BeforeAfter {
             before: truth.map(|a| spot::strehl(&a)),
             after: std::array::from_fn(|c| spot::strehl(&apart(&truth[c], &found[c]))),
         },
         true_coefficients: truth,
         found_coefficients: found,
-        photographs,
+        photographs: COLOURS.len() * (PATTERNS + 1) + aberrations.photographs,
     };
     let path = folder.join("outcome.json");
     let text = serde_json::to_string_pretty(&outcome).map_err(|e| Error::file(&path, e))?;
     files::write_atomically(&path, |file| writeln!(file, "{text}"))?;
     Ok(outcome)
+}
+
+/// What is calibrated, where to, and who hears of it.
+struct Stage<'a> {
+    rehearsal: &'a Rehearsal,
+    folder: &'a Path,
+    pattern: Pattern,
+    simulated: SimulatedDisplay,
+    progress: &'a dyn Fn(usize, usize),
+}
+
+/// What the search for aberrations found.
+struct Aberrations {
+    truth: [Coefficients; 3],
+    found: [Coefficients; 3],
+    /// The green spot without a correction and with the one that was found.
+    spots: [Photograph; 2],
+    photographs: usize,
+}
+
+/// What a calibration is worth, by the simulation's own truth.
+struct Worth {
+    phase_error_rad: BeforeAfter,
+    black_db: BeforeAfter,
+    unevenness: BeforeAfter,
+}
+
+impl Stage<'_> {
+    /// Photographs and rows before the search for aberrations, and of all.
+    fn work(&self) -> [usize; 2] {
+        let before = 3 * (PATTERNS + self.rehearsal.display.height());
+        [before, before + 3 * spot::ROUNDS * TRIALS]
+    }
+
+    /// Where the photographs of a colour are kept, if they are.
+    fn captures(&self, colour: usize) -> Option<PathBuf> {
+        let kept = self.rehearsal.keep_captures;
+        kept.then(|| self.folder.join("captures").join(COLOURS[colour]))
+    }
+
+    /// From 256 photographs a colour, focused on the modulator.
+    fn curves(&self) -> Result<[lut::Curves; 3]> {
+        let modulator_z_m = self.rehearsal.display.offset_m();
+        let [_, work] = self.work();
+        let mut curves = Vec::new();
+        for colour in 0..COLOURS.len() {
+            let captures = self.captures(colour);
+            captures.as_deref().map_or(Ok(()), make)?;
+            let shoot = |k: usize| -> Result<Photograph> {
+                let frame = self.pattern.frame(k as u8);
+                let frame = frame.view();
+                let photo = (self.simulated).photograph(frame, colour, modulator_z_m, k as u64)?;
+                if let Some(captures) = &captures {
+                    photo.write(&captures.join(format!("capture_{k:03}.png")))?;
+                }
+                Ok(photo)
+            };
+            let source = |k: usize| shoot(k).map_err(|e| lut::What::Unreadable(e.to_string()));
+            let done = |n: usize, of: usize| (self.progress)(colour * of + n, work);
+            let measured = lut::measure(&self.pattern, colour, &source, self.folder, &done);
+            curves.push(measured.map_err(|refusal| match refusal {
+                Refusal::Other(e) => e,
+                Refusal::Problems(all) => {
+                    Error::Input(all.first().map_or_else(String::new, ToString::to_string))
+                }
+            })?);
+        }
+        curves
+            .try_into()
+            .map_err(|_| Error::Input("three colours".into()))
+    }
+
+    /// The laser's light, from a photograph of a diffuser a colour.
+    fn laser_map(&self) -> Result<Array3<f32>> {
+        let display = &self.rehearsal.display;
+        let shape = (display.height(), display.width());
+        let frame = self.pattern.frame(0);
+        let mut maps = Vec::new();
+        for colour in 0..COLOURS.len() {
+            let marked =
+                (self.simulated).photograph(frame.view(), colour, display.offset_m(), 0)?;
+            let registration = marks::register(&marked, &self.pattern)?;
+            let photo = self.simulated.photograph_diffuser(colour, 1 << 20)?;
+            if let Some(captures) = self.captures(colour) {
+                photo.write(&captures.join("diffuser.png"))?;
+            }
+            maps.push(laser::mixture(&laser::map(&photo, &registration, shape)?, 1)?.0);
+        }
+        let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
+        let map = stack(Axis(0), &views).map_err(|e| Error::Input(e.to_string()))?;
+        table::write_laser(&self.folder.join("laser.png"), map.view())?;
+        Ok(map)
+    }
+
+    /// Searched on a focused spot: of the same lens for all colours, as path; its phase goes with 1/λ.
+    fn aberrations(&self, calibrated: &Response) -> Result<Aberrations> {
+        let Rehearsal {
+            display,
+            spot_z_m: z_m,
+            ..
+        } = self.rehearsal;
+        let mut dice = Dice::new(self.rehearsal.seed ^ 0xab);
+        let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
+        let wavelengths = display.wavelengths_m();
+        let truth = wavelengths.map(|lambda| green.map(|a| a * wavelengths[1] / lambda));
+        let aberrated = (self.simulated.clone()).with_aberration(Aberration::new(truth)?);
+        let target = Target {
+            response: calibrated.clone(),
+            ..Target::from(display)
+        };
+        let (mut found, mut photographs) = ([[0.0; 5]; 3], 0);
+        let (mut tried, mut spots) = (Vec::new(), Vec::new());
+        for colour in 0..3 {
+            let mut camera = aberrated.camera().clone();
+            camera.exposure = spot::exposure(display, colour, *z_m);
+            let before_lens = aberrated.clone().with_camera(camera);
+            let shoot = |a: &Coefficients, shot: usize| -> Result<Photograph> {
+                let levels = spot::levels(&target, colour, *z_m, MIDDLE, a)?;
+                before_lens.photograph(levels.view(), colour, *z_m, (1 << 21) + shot as u64)
+            };
+            let (search, points) = self.search(colour, &truth[colour], &shoot)?;
+            photographs += search.round * TRIALS;
+            found[colour] = search.best;
+            tried.push(Curve {
+                name: COLOURS[colour].into(),
+                points,
+                dots: false,
+            });
+            if colour == 1 {
+                spots = vec![shoot(&[0.0; 5], 9000)?, shoot(&search.best, 9001)?];
+            }
+        }
+        self.write_aberrations(found, tried)?;
+        Ok(Aberrations {
+            truth,
+            found,
+            spots: (spots.try_into()).map_err(|_| Error::Input("two spots".into()))?,
+            photographs,
+        })
+    }
+
+    /// A colour's search to its end, with the Strehl ratio after each round.
+    fn search(
+        &self,
+        colour: usize,
+        truth: &Coefficients,
+        shoot: &dyn Fn(&Coefficients, usize) -> Result<Photograph>,
+    ) -> Result<(Search, Vec<(f64, f64)>)> {
+        let [before, work] = self.work();
+        let mut search = Search::from([0.0; 5]);
+        let mut history = vec![(0.0, spot::strehl(truth))];
+        while !search.is_done() {
+            let mut sharp = [0.0; TRIALS];
+            for (i, trial) in search.trials().iter().enumerate() {
+                let photo = shoot(trial, search.round * TRIALS + i)?;
+                sharp[i] = spot::sharpness(&photo, spot::window(self.rehearsal.zoom))?;
+            }
+            search = search.learn(&sharp);
+            let left = apart(truth, &search.best);
+            history.push((search.round as f64, spot::strehl(&left)));
+            let rounds = colour * spot::ROUNDS + search.round;
+            (self.progress)(before + rounds * TRIALS, work);
+        }
+        Ok((search, history))
+    }
+
+    fn write_aberrations(&self, found: [Coefficients; 3], tried: Vec<Curve>) -> Result<()> {
+        let [red, green, blue] = found;
+        let entry = Entry {
+            z_mm: self.rehearsal.spot_z_m * 1e3,
+            x: None,
+            y: None,
+            red,
+            green,
+            blue,
+        };
+        table::write_aberrations(&self.folder.join("aberration.toml"), &[entry])?;
+        let panel = Panel {
+            title: "Strehl ratio of the search".into(),
+            x: "round",
+            y: "Strehl ratio",
+            curves: tried,
+        };
+        chart::write_curves(&self.folder.join("search.svg"), &[panel], 1)
+    }
+
+    fn worth(&self, calibrated: &Response) -> Result<Worth> {
+        let simulated = &self.simulated;
+        let display = &self.rehearsal.display;
+        let factory = Response::linear(display.bits())?;
+        let file = files::read_display(&self.folder.join("display.toml"))?;
+        let bare = Target::from(display);
+        let both = |f: &dyn Fn(&Response, usize) -> Result<f64>| -> Result<BeforeAfter> {
+            let mut all = BeforeAfter::default();
+            for colour in 0..3 {
+                all.before[colour] = f(&factory, colour)?;
+                all.after[colour] = f(calibrated, colour)?;
+            }
+            Ok(all)
+        };
+        let mut unevenness = BeforeAfter::default();
+        for colour in 0..3 {
+            unevenness.before[colour] = flat_grey(simulated, &bare, colour)?;
+            unevenness.after[colour] = flat_grey(simulated, &file.target, colour)?;
+        }
+        Ok(Worth {
+            phase_error_rad: both(&|response, c| Ok(phase_error(simulated, response, c)))?,
+            black_db: both(&|response, c| black_level(simulated, response, c))?,
+            unevenness,
+        })
+    }
+
+    fn pictures(
+        &self,
+        calibrated: &Response,
+        laser_map: &Array3<f32>,
+        spots: &[Photograph; 2],
+    ) -> Result<()> {
+        let (folder, display) = (self.folder, &self.rehearsal.display);
+        let side = (24.0 * self.rehearsal.zoom) as usize;
+        let cropped = spots.each_ref().map(|photo| crop(photo, side));
+        write_pair(&folder.join("spot.png"), &cropped)?;
+        draw_laser(folder, &self.simulated, laser_map)?;
+        let factory = Response::linear(display.bits())?;
+        black_pictures(&self.simulated, &factory, calibrated, folder)?;
+        for k in [0usize, 128] {
+            let frame = self.pattern.frame(k as u8);
+            let photo =
+                (self.simulated).photograph(frame.view(), 1, display.offset_m(), k as u64)?;
+            photo.write(&folder.join(format!("capture_{k:03}.png")))?;
+        }
+        Ok(())
+    }
 }
 
 fn make(folder: &Path) -> Result<()> {

@@ -14,8 +14,8 @@
 use super::{MAX_PROPAGATIONS, padded_shape_with};
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
-use crate::sm_lbm::{Planes, cross, plane_z_m};
-use ndarray::{Array2, Array3, ArrayView1, Axis};
+use crate::sm_lbm::{Planes, crop, cross, place, plane_z_m};
+use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::target::Aberration;
@@ -354,49 +354,30 @@ pub fn hologram(
         sum.fill(Complex32::ZERO);
         for first in 0..count {
             let (k, points) = &scene.occupied[first];
-            plane.fill(Complex32::ZERO);
-            for point in &scene.points[points.clone()] {
-                plane[point.y as usize * padded_width + point.x as usize] =
-                    point.rgb[colour].into();
-            }
+            let points = &scene.points[points.clone()];
+            place(points, &mut plane, padded_width, |point| {
+                point.rgb[colour].into()
+            });
             fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
             let mut at = *k;
             for (next, points) in &scene.occupied[first + 1..] {
                 let across = transfer((at - next) as f64 * step_m);
-                cross(
-                    &fft,
-                    &mut scratch,
-                    &across,
-                    &scene.points[points.clone()],
-                    |_| Complex32::ZERO,
-                );
+                let points = &scene.points[points.clone()];
+                cross(&fft, &mut scratch, &across, points, |_| Complex32::ZERO);
                 at = *next;
                 done += 1;
                 progress(done, 3 * propagations);
             }
-            // Back to where the content started, and there its points spread.
-            let back = transfer(z(*k) - z(front));
-            let mut columns = std::mem::take(&mut scratch.columns);
-            fft.columns(
-                &scratch.rows,
-                &mut columns,
-                |x, c| back.apply(x, c),
-                &mut scratch.work,
-            );
-            fft.rows_inverse(&columns, &mut scratch.rows, &mut scratch.work);
-            scratch.columns = columns;
-            let field = Array2::from_shape_vec(shape, scratch.rows.clone())
-                .expect("a plane of the padded shape");
-            let place = Place {
+            let here = Place {
                 aberrations,
                 display,
                 colour,
                 z_m: z(*k),
                 frame,
             };
-            let spread = convolve(&field, place);
-            let spread = spread.as_slice().expect("standard layout");
-            fft.rows_forward(spread, &mut scratch.rows, &mut scratch.work);
+            // Back to where the content started, and there its points spread.
+            let back = transfer(z(*k) - z(front));
+            spread(&fft, &mut scratch, &back, here);
             let home = transfer(-z(*k));
             fft.spectrum(
                 &scratch.rows,
@@ -410,13 +391,26 @@ pub fn hologram(
         }
         fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
         fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work);
-        let rows = scratch.rows.chunks_exact(padded_width);
-        let mut out = hologram.index_axis_mut(Axis(0), colour);
-        for (mut out, row) in out.rows_mut().into_iter().zip(rows) {
-            out.assign(&ArrayView1::from(&row[..width]));
-        }
+        let frame = hologram.index_axis_mut(Axis(0), colour);
+        crop(&scratch.rows, padded_width, frame);
     }
     Ok(hologram)
+}
+
+/// Takes the wave, whose transformed rows `scratch` holds, `back` to a place, and spreads it `here`.
+fn spread(fft: &Fft2, scratch: &mut Scratch, back: &Transfer, here: Place<'_>) {
+    fft.columns(
+        &scratch.rows,
+        &mut scratch.columns,
+        |x, column| back.apply(x, column),
+        &mut scratch.work,
+    );
+    fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
+    let field = Array2::from_shape_vec(fft.padded_shape(), scratch.rows.clone())
+        .expect("a plane of the padded shape");
+    let field = convolve(&field, here);
+    let field = field.as_slice().expect("standard layout");
+    fft.rows_forward(field, &mut scratch.rows, &mut scratch.work);
 }
 
 #[cfg(test)]

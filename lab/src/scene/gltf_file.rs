@@ -118,30 +118,7 @@ impl Reader<'_> {
                 .collect(),
             ..Part::default()
         };
-        let indices: Vec<u32> = match primitive.indices() {
-            None => (0..count as u32).collect(),
-            Some(indices) => {
-                check(
-                    &indices,
-                    &[DataType::U8, DataType::U16, DataType::U32],
-                    &[Dimensions::Scalar],
-                )?;
-                reader
-                    .read_indices()
-                    .ok_or_else(|| missing("indices"))?
-                    .into_u32()
-                    .collect()
-            }
-        };
-        if let Some(index) = indices
-            .iter()
-            .find(|&&index| index as usize >= part.positions.len())
-        {
-            return Err(format!(
-                "a triangle names vertex {index}, but there are {}",
-                part.positions.len()
-            ));
-        }
+        let indices = self.indices(primitive, part.positions.len())?;
         part.triangles = triangles(&indices, mode);
         if let Some(normals) = primitive.get(&Semantic::Normals) {
             check(&normals, &[DataType::F32], &[Dimensions::Vec3])?;
@@ -173,6 +150,30 @@ impl Reader<'_> {
         transform(&mut part, matrix);
         self.parts.push(part);
         Ok(())
+    }
+
+    /// Which of `count` vertices the corners of its triangles are.
+    fn indices(&self, primitive: &Primitive, count: usize) -> Result<Vec<u32>> {
+        let Some(indices) = primitive.indices() else {
+            return Ok((0..count as u32).collect());
+        };
+        check(
+            &indices,
+            &[DataType::U8, DataType::U16, DataType::U32],
+            &[Dimensions::Scalar],
+        )?;
+        let buffers = &self.buffers;
+        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
+        let indices = reader
+            .read_indices()
+            .ok_or("indices lie outside their buffer")?;
+        let indices: Vec<u32> = indices.into_u32().collect();
+        match indices.iter().find(|&&index| index as usize >= count) {
+            Some(index) => Err(format!(
+                "a triangle names vertex {index}, but there are {count}"
+            )),
+            None => Ok(indices),
+        }
     }
 
     /// Gives the part its texture and where on it its vertices lie.

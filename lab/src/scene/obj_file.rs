@@ -36,64 +36,77 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         .iter()
         .map(|material| texture(folder, material))
         .collect::<Result<Vec<_>>>()?;
-    let part = |model: tobj::Model| {
-        let mesh = model.mesh;
-        let mut part = Part {
-            positions: triples(&mesh.positions),
-            triangles: triples(&mesh.indices),
-            normals: triples(&mesh.normals),
-            colour: triples(&mesh.vertex_color),
-            // OBJ counts from the picture's bottom.
-            uv: mesh
-                .texcoords
-                .chunks_exact(2)
-                .map(|t| [t[0], 1.0 - t[1]])
-                .collect(),
-            ..Part::default()
-        };
-        let count = part.positions.len();
-        if [part.normals.len(), part.colour.len()]
-            .iter()
-            .any(|&length| length != 0 && length != count)
-        {
-            return Err(format!(
-                "object {}: its vertices and their normals or colours differ in number",
-                model.name
-            ));
-        }
-        if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= count) {
-            return Err(format!(
-                "object {}: a face names vertex {index}, but there are {count}",
-                model.name
-            ));
-        }
-        if let Some((material, texture)) = mesh
-            .material_id
-            .and_then(|id| Some((materials.get(id)?, textures.get(id)?)))
-        {
-            let pictured = texture.is_some() && part.uv.len() == count;
-            if texture.is_some() && !pictured {
-                log::warn!(
-                    "object {} has a texture but no texture coordinates: its plain colour is used",
-                    model.name
-                );
-            }
-            part.texture = texture.clone().filter(|_| pictured);
-            let diffuse = material
-                .diffuse
-                .unwrap_or([1.0; 3])
-                .map(|v| v.clamp(0.0, 1.0));
-            // A picture stands for the diffuse colour, which many files leave black beside one.
-            if !pictured {
-                part.texture = Some(Arc::new(Texture::plain(diffuse)));
-            }
-        }
-        if part.uv.len() != count {
-            part.uv.clear();
-        }
-        Ok(part)
+    models
+        .into_iter()
+        .map(|model| part(model, &materials, &textures))
+        .collect()
+}
+
+/// A model's part; `textures` are those of `materials`.
+fn part(
+    model: tobj::Model,
+    materials: &[Material],
+    textures: &[Option<Arc<Texture>>],
+) -> Result<Part> {
+    let mesh = model.mesh;
+    let mut part = Part {
+        positions: triples(&mesh.positions),
+        triangles: triples(&mesh.indices),
+        normals: triples(&mesh.normals),
+        colour: triples(&mesh.vertex_color),
+        // OBJ counts from the picture's bottom.
+        uv: mesh
+            .texcoords
+            .chunks_exact(2)
+            .map(|t| [t[0], 1.0 - t[1]])
+            .collect(),
+        ..Part::default()
     };
-    models.into_iter().map(part).collect()
+    let count = part.positions.len();
+    if [part.normals.len(), part.colour.len()]
+        .iter()
+        .any(|&length| length != 0 && length != count)
+    {
+        return Err(format!(
+            "object {}: its vertices and their normals or colours differ in number",
+            model.name
+        ));
+    }
+    if let Some(index) = mesh.indices.iter().find(|&&index| index as usize >= count) {
+        return Err(format!(
+            "object {}: a face names vertex {index}, but there are {count}",
+            model.name
+        ));
+    }
+    let number = mesh.material_id;
+    if let Some((material, texture)) =
+        number.and_then(|id| Some((materials.get(id)?, textures.get(id)?)))
+    {
+        clothe(&mut part, material, texture, &model.name);
+    }
+    if part.uv.len() != count {
+        part.uv.clear();
+    }
+    Ok(part)
+}
+
+/// Gives a part of the object `name` its picture, or its plain colour.
+fn clothe(part: &mut Part, material: &Material, texture: &Option<Arc<Texture>>, name: &str) {
+    let pictured = texture.is_some() && part.uv.len() == part.positions.len();
+    if texture.is_some() && !pictured {
+        log::warn!(
+            "object {name} has a texture but no texture coordinates: its plain colour is used"
+        );
+    }
+    part.texture = texture.clone().filter(|_| pictured);
+    let diffuse = material
+        .diffuse
+        .unwrap_or([1.0; 3])
+        .map(|v| v.clamp(0.0, 1.0));
+    // A picture stands for the diffuse colour, which many files leave black beside one.
+    if !pictured {
+        part.texture = Some(Arc::new(Texture::plain(diffuse)));
+    }
 }
 
 /// The picture of a material's diffuse colour, if it names one that is there.

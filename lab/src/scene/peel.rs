@@ -271,32 +271,7 @@ impl DepthPeeler {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let mut results = Vec::with_capacity(layers);
         for layer in 0..layers {
-            let nothing = wgpu::Color {
-                r: 0.0,
-                g: 0.0,
-                b: 0.0,
-                a: NO_HIT,
-            };
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &target_view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(nothing),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &depth_views[layer % 2],
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(1.0),
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: None,
-                }),
-                ..Default::default()
-            });
+            let mut pass = begin(&mut encoder, &target_view, &depth_views[layer % 2]);
             pass.set_pipeline(if layer == 0 { &self.first } else { &self.later });
             pass.set_bind_group(0, &bound[(layer + 1) % 2], &[]);
             for draw in scene.draws.iter().filter(|draw| !draw.indices.is_empty()) {
@@ -483,4 +458,38 @@ fn one_line(error: &impl std::fmt::Display) -> String {
         .split_whitespace()
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// Begins a pass that paints over an empty `target`, tested against an empty `depth`.
+fn begin<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    target: &wgpu::TextureView,
+    depth: &wgpu::TextureView,
+) -> wgpu::RenderPass<'a> {
+    let nothing = wgpu::Color {
+        r: 0.0,
+        g: 0.0,
+        b: 0.0,
+        a: NO_HIT,
+    };
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(nothing),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+            view: depth,
+            depth_ops: Some(wgpu::Operations {
+                load: wgpu::LoadOp::Clear(1.0),
+                store: wgpu::StoreOp::Store,
+            }),
+            stencil_ops: None,
+        }),
+        ..Default::default()
+    })
 }

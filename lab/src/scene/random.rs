@@ -187,25 +187,7 @@ impl Maker {
             0 => (Shape::cuboid(), false),
             1 => (Shape::ball(detail, |_| 1.0), false),
             2 => (Shape::torus(detail, dice.range(0.12, 0.45)), false),
-            3 => {
-                let waves = [0; 3].map(|_| {
-                    (
-                        dice.direction(),
-                        dice.range(1.5, 6.0),
-                        dice.range(0.05, 0.22),
-                    )
-                });
-                let bumpy = move |p: [f64; 3]| {
-                    let bump = |(d, rate, height): ([f64; 3], f64, f64)| {
-                        height
-                            * libm::sin(
-                                rate * (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) + 7.0 * d[0],
-                            )
-                    };
-                    0.8 + waves.into_iter().map(bump).sum::<f64>()
-                };
-                (Shape::ball(detail, bumpy), false)
-            }
+            3 => (bumpy(dice, detail), false),
             4 => (
                 Shape::cylinder(detail, dice.pick(&[1.0, 1.0, 0.5, 0.0])),
                 false,
@@ -241,33 +223,8 @@ impl Maker {
                 };
                 (Shape::grid(detail, detail, wave), true)
             }
-            9 => {
-                let (turns, lobes) = dice.pick(&[(2.0, 3.0), (3.0, 2.0), (2.0, 5.0), (1.0, 6.0)]);
-                let wide = dice.range(0.2, 0.4);
-                let curve = |t: f64| {
-                    let (sin_a, cos_a) = libm::sincos(TAU * turns * t);
-                    let (sin_b, cos_b) = libm::sincos(TAU * lobes * t);
-                    let r = 1.0 - wide + wide * cos_b;
-                    [r * cos_a, r * sin_a, wide * sin_b]
-                };
-                (
-                    Shape::loop_tube(3 * detail, dice.range(0.05, 0.14), curve),
-                    false,
-                )
-            }
-            _ => {
-                // A swarm: leaves, confetti, gravel.
-                let leaf = Shape::polygon(&star(dice.integer(2, 4), dice.range(0.4, 1.0)));
-                let mut swarm = Shape::default();
-                for _ in 0..dice.integer(6, 24) {
-                    let size = dice.range(0.08, 0.3);
-                    let (sin, cos) = libm::sincos(TAU * dice.unit());
-                    let tilt = turn([cos, sin, 0.0], dice.range(0.0, 1.2));
-                    let [x, y, z] = dice.direction();
-                    swarm.append(&leaf.clone().moved([size; 3], tilt, [x, y, z]));
-                }
-                (swarm, true)
-            }
+            9 => (knot(dice, detail), false),
+            _ => (swarm(dice), true),
         }
     }
 
@@ -431,6 +388,51 @@ fn settle(mut mesh: Mesh, depth: f64) -> Mesh {
 
 fn multiply(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+/// A ball with waves on it.
+fn bumpy(dice: &mut Dice, detail: usize) -> Shape {
+    let waves = [0; 3].map(|_| {
+        (
+            dice.direction(),
+            dice.range(1.5, 6.0),
+            dice.range(0.05, 0.22),
+        )
+    });
+    let bumpy = move |p: [f64; 3]| {
+        let bump = |(d, rate, height): ([f64; 3], f64, f64)| {
+            height * libm::sin(rate * (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) + 7.0 * d[0])
+        };
+        0.8 + waves.into_iter().map(bump).sum::<f64>()
+    };
+    Shape::ball(detail, bumpy)
+}
+
+/// A tube along a torus knot.
+fn knot(dice: &mut Dice, detail: usize) -> Shape {
+    let (turns, lobes) = dice.pick(&[(2.0, 3.0), (3.0, 2.0), (2.0, 5.0), (1.0, 6.0)]);
+    let wide = dice.range(0.2, 0.4);
+    let curve = |t: f64| {
+        let (sin_a, cos_a) = libm::sincos(TAU * turns * t);
+        let (sin_b, cos_b) = libm::sincos(TAU * lobes * t);
+        let r = 1.0 - wide + wide * cos_b;
+        [r * cos_a, r * sin_a, wide * sin_b]
+    };
+    Shape::loop_tube(3 * detail, dice.range(0.05, 0.14), curve)
+}
+
+/// Leaves, confetti, gravel.
+fn swarm(dice: &mut Dice) -> Shape {
+    let leaf = Shape::polygon(&star(dice.integer(2, 4), dice.range(0.4, 1.0)));
+    let mut swarm = Shape::default();
+    for _ in 0..dice.integer(6, 24) {
+        let size = dice.range(0.08, 0.3);
+        let (sin, cos) = libm::sincos(TAU * dice.unit());
+        let tilt = turn([cos, sin, 0.0], dice.range(0.0, 1.2));
+        let [x, y, z] = dice.direction();
+        swarm.append(&leaf.clone().moved([size; 3], tilt, [x, y, z]));
+    }
+    swarm
 }
 
 #[cfg(test)]
