@@ -14,6 +14,22 @@ use phasefront_lab::simulated_display::SimulatedDisplay;
 use phasefront_lab::{files, metrics};
 use std::fs;
 
+/// The table from the rehearsal's photographs, by hand.
+const LUT: [&str; 12] = [
+    "calibrate",
+    "lut",
+    "--captures",
+    "out/captures",
+    "--display",
+    "bare.toml",
+    "--full",
+    "full",
+    "--report",
+    "report",
+    "-o",
+    "table.pfp",
+];
+
 #[test]
 fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     let folder = Folder::new();
@@ -57,32 +73,28 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     // Nothing is written over.
     assert!(folder.fails(&rehearse, 1).contains("--force"));
 
-    // The same photographs by hand give the same files.
+    the_same_by_hand(&folder);
+    bad_captures_are_named(&folder);
+    holograms_are_for_it(&folder);
+    another_size_is_refused(&folder);
+}
+
+fn bytes(folder: &Folder, name: &str) -> Vec<u8> {
+    fs::read(folder.path(name)).unwrap()
+}
+
+/// The same photographs by hand give the same files.
+fn the_same_by_hand(folder: &Folder) {
     fs::write(folder.path("bare.toml"), "width = 144\nheight = 64").unwrap();
-    let lut = [
-        "calibrate",
-        "lut",
-        "--captures",
-        "out/captures",
-        "--display",
-        "bare.toml",
-        "--full",
-        "full",
-        "--report",
-        "report",
-        "-o",
-        "table.pfp",
-    ];
-    let said = folder.succeeds(&lut);
+    let said = folder.succeeds(&LUT);
     assert!(said.contains("red") && said.contains("table:"), "{said}");
-    let bytes = |name: &str| fs::read(folder.path(name)).unwrap();
-    assert_eq!(bytes("table.pfp"), bytes("out/table.pfp"));
+    assert_eq!(bytes(folder, "table.pfp"), bytes(folder, "out/table.pfp"));
     assert!(folder.path("report/curves.svg").is_file());
     let full: ndarray::Array3<u8> =
         ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
     assert_eq!(full.dim(), (64, 144, 256));
     assert!(full[(32, 72, 255)] > 150 && full[(32, 72, 0)] == 0);
-    assert!(folder.fails(&lut, 1).contains("--force"));
+    assert!(folder.fails(&LUT, 1).contains("--force"));
     folder.succeeds(&[
         "calibrate",
         "laser",
@@ -94,9 +106,11 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         "-o",
         "laser.png",
     ]);
-    assert_eq!(bytes("laser.png"), bytes("out/laser.png"));
+    assert_eq!(bytes(folder, "laser.png"), bytes(folder, "out/laser.png"));
+}
 
-    // Bad captures: each by its name, and the table that was there stays.
+/// Each by its name, and the table that was there stays.
+fn bad_captures_are_named(folder: &Folder) {
     let captures = folder.path("out/captures");
     fs::remove_file(captures.join("green/capture_007.png")).unwrap();
     fs::rename(
@@ -105,7 +119,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     )
     .unwrap();
     fs::write(captures.join("blue/capture_001.png"), b"no picture").unwrap();
-    let forced: Vec<_> = lut.iter().copied().chain(["--force"]).collect();
+    let forced: Vec<_> = LUT.iter().copied().chain(["--force"]).collect();
     let said = folder.fails(&forced, 1);
     for words in [
         "green/capture_007: is missing",
@@ -121,9 +135,11 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         1,
         "{said}"
     );
-    assert_eq!(bytes("table.pfp"), bytes("out/table.pfp"));
+    assert_eq!(bytes(folder, "table.pfp"), bytes(folder, "out/table.pfp"));
+}
 
-    // A hologram for the calibrated display, and its view on it.
+/// A hologram for the calibrated display, and its view on it.
+fn holograms_are_for_it(folder: &Folder) {
     let rgb = image::RgbImage::from_fn(96, 48, |x, y| {
         image::Rgb([(x * 2) as u8, (y * 5) as u8, 90])
     });
@@ -147,7 +163,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
     };
     hologram(&["--display", "bare.toml", "-o", "plain.png"]);
     hologram(&["--display", "out/display.toml", "-o", "h.png"]);
-    assert_ne!(bytes("plain.png"), bytes("h.png"));
+    assert_ne!(bytes(folder, "plain.png"), bytes(folder, "h.png"));
     let said = folder.fails(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"], 1);
     assert!(
         said.contains("per_pixel, laser, aberration") && said.contains("--display"),
@@ -178,7 +194,9 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         .unwrap()
         .psnr_overall;
     assert!(alike > 22.0, "{alike}");
-    // On a display of another size it is refused.
+}
+
+fn another_size_is_refused(folder: &Folder) {
     fs::write(
         folder.path("other.toml"),
         "width = 160\nheight = 64\nper_pixel = \"table.pfp\"",

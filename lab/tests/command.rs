@@ -17,24 +17,29 @@ const MODELS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../models");
 impl Folder {
     /// The command fails with `code` and one line that holds each of `words`; it leaves no file behind.
     fn refuses(&self, arguments: &[&str], code: i32, words: &[&str]) {
+        self.refuses_as(&arguments.join(" "), arguments, code, words);
+    }
+
+    /// [`Folder::refuses`] for cases with names, of code 1.
+    fn refuses_each(&self, cases: &[(&str, Vec<&str>, &[&str])]) {
+        for (name, arguments, words) in cases {
+            self.refuses_as(name, arguments, 1, words);
+        }
+    }
+
+    fn refuses_as(&self, name: &str, arguments: &[&str], code: i32, words: &[&str]) {
         let before = self.files();
         let errors = self.fails(arguments, code);
         if code == 1 {
             let last = errors.lines().last().unwrap_or_default();
-            assert!(last.starts_with("error: "), "{arguments:?}: {errors}");
-            assert_eq!(
-                errors.lines().filter(|l| l.starts_with("error")).count(),
-                1,
-                "{errors}"
-            );
+            assert!(last.starts_with("error: "), "{name}: {errors}");
+            let count = errors.lines().filter(|l| l.starts_with("error")).count();
+            assert_eq!(count, 1, "{name}: {errors}");
         }
         for word in words {
-            assert!(
-                errors.contains(word),
-                "{arguments:?}: no {word:?} in {errors}"
-            );
+            assert!(errors.contains(word), "{name}: no {word:?} in {errors}");
         }
-        assert_eq!(self.files(), before, "{arguments:?} left a file behind");
+        assert_eq!(self.files(), before, "{name} left a file behind");
     }
 
     fn files(&self) -> Vec<PathBuf> {
@@ -261,183 +266,208 @@ fn depth_of_another_size_is_resampled_with_a_warning() {
     );
 }
 
+/// Arguments that make a hologram of these files.
+fn hologram<'a>(rgb: &'a str, depth: &'a str) -> Vec<&'a str> {
+    vec!["hologram", "--rgb", rgb, "--depth", depth, "-o", "h.png"]
+}
+
+/// Arguments that make a hologram of the usual frame, and `more`.
+fn made<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    with(&[more, &["-o", "h.png"]].concat())
+}
+
 #[test]
-fn bad_input_is_one_line_and_leaves_nothing_behind() {
+fn pictures_that_cannot_be_used_are_named() {
     let folder = Folder::new().with_frame();
-    let out = ["-o", "h.png"];
-    let hologram = |rgb: &'static str, depth: &'static str| {
-        vec!["hologram", "--rgb", rgb, "--depth", depth, "-o", "h.png"]
-    };
-    folder.refuses(
-        &hologram("none.png", "depth.png"),
-        1,
-        &["none.png", "cannot be read"],
-    );
     let whole = fs::read(folder.path("rgb.png")).unwrap();
     fs::write(folder.path("short.png"), &whole[..whole.len() / 2]).unwrap();
-    folder.refuses(
-        &hologram("short.png", "depth.png"),
-        1,
-        &["short.png", "whole"],
-    );
     fs::write(folder.path("empty.png"), []).unwrap();
-    folder.refuses(&hologram("empty.png", "depth.png"), 1, &["empty.png"]);
-    folder.refuses(&hologram("rgb.png", "rgb.png"), 1, &["rgb.png", "grey"]);
-    image::GrayImage::new(40, 40)
-        .save(folder.path("square.png"))
-        .unwrap();
-    folder.refuses(&hologram("rgb.png", "square.png"), 1, &["aspect"]);
+    let square = image::GrayImage::new(40, 40);
+    square.save(folder.path("square.png")).unwrap();
+    folder.refuses_each(&[
+        (
+            "no file",
+            hologram("none.png", "depth.png"),
+            &["none.png", "cannot be read"],
+        ),
+        (
+            "half a file",
+            hologram("short.png", "depth.png"),
+            &["short.png", "whole"],
+        ),
+        (
+            "an empty file",
+            hologram("empty.png", "depth.png"),
+            &["empty.png"],
+        ),
+        (
+            "colour as depth",
+            hologram("rgb.png", "rgb.png"),
+            &["rgb.png", "grey"],
+        ),
+        (
+            "depth of another shape",
+            hologram("rgb.png", "square.png"),
+            &["aspect"],
+        ),
+        (
+            "pictures of two sizes",
+            vec!["compare", "rgb.png", "square.png"],
+            &["48×32", "40×40"],
+        ),
+        (
+            "a picture as hologram",
+            vec!["refocus", "rgb.png", "--z-mm", "0", "-o", "v.png"],
+            &["rgb.png", "hologram"],
+        ),
+        (
+            "no folder of layers",
+            vec!["hologram", "--ldi", "nowhere", "-o", "h.png"],
+            &["nowhere"],
+        ),
+    ]);
+}
 
+#[test]
+fn depth_that_means_nothing_is_named() {
+    let folder = Folder::new().with_frame();
     let mut depth = Array2::from_elem((32, 48), 0.5f32);
     depth[(3, 4)] = f32::INFINITY;
     folder.depth_npy("infinite.npy", &depth);
-    folder.refuses(
-        &hologram("rgb.png", "infinite.npy"),
-        1,
-        &["infinite.npy", "inf"],
-    );
     folder.depth_npy("nan.npy", &Array2::from_elem((32, 48), f32::NAN));
-    folder.refuses(
-        &hologram("rgb.png", "nan.npy"),
-        1,
-        &["nan.npy", "no reading"],
-    );
     folder.depth_npy("metres.npy", &Array2::from_elem((32, 48), 2.0));
-    folder.refuses(
-        &hologram("rgb.png", "metres.npy"),
-        1,
-        &["metres.npy", "unit"],
-    );
     folder.depth_npy("nothing.npy", &Array2::zeros((0, 0)));
-    folder.refuses(&hologram("rgb.png", "nothing.npy"), 1, &["nothing.npy"]);
+    folder.refuses_each(&[
+        (
+            "infinite",
+            hologram("rgb.png", "infinite.npy"),
+            &["infinite.npy", "inf"],
+        ),
+        (
+            "all holes",
+            hologram("rgb.png", "nan.npy"),
+            &["nan.npy", "no reading"],
+        ),
+        (
+            "metres as parts of the volume",
+            hologram("rgb.png", "metres.npy"),
+            &["metres.npy", "unit"],
+        ),
+        (
+            "no pixel",
+            hologram("rgb.png", "nothing.npy"),
+            &["nothing.npy"],
+        ),
+    ]);
+    // Holes are filled; in metres infinity is one.
     depth[(3, 4)] = f32::NAN;
     folder.depth_npy("hole.npy", &depth);
-    folder.succeeds(&[
-        "hologram", "--rgb", "rgb.png", "--depth", "hole.npy", "-o", "hole.png",
-    ]);
-    depth[(3, 4)] = f32::INFINITY;
-    folder.depth_npy("hole.npy", &depth);
-    folder.succeeds(&[
-        "hologram",
-        "--rgb",
-        "rgb.png",
-        "--depth",
-        "hole.npy",
-        "--depth-unit",
-        "m",
-        "-o",
-        "hole.png",
-    ]);
+    folder.succeeds(&hologram("rgb.png", "hole.npy"));
+    let metres = [
+        &hologram("rgb.png", "infinite.npy")[..],
+        &["--depth-unit", "m"],
+    ]
+    .concat();
+    folder.succeeds(&metres);
+}
 
-    folder.refuses(
-        &with(&["--offset-mm", "9000", out[0], out[1]]),
-        1,
-        &["9000", "smaller"],
-    );
-    folder.refuses(
-        &with(&["--offset-mm", "nan", out[0], out[1]]),
-        1,
-        &["offset_mm"],
-    );
-    folder.refuses(
-        &with(&["--method", "layers", "--planes", "0", out[0], out[1]]),
-        1,
-        &["plane"],
-    );
-    folder.refuses(&with(&["--scale", "0", out[0], out[1]]), 1, &["scale"]);
-    folder.refuses(
-        &with(&[
-            "--near",
-            "2",
-            "--far",
-            "1",
-            "--depth-unit",
-            "mm",
-            out[0],
-            out[1],
-        ]),
-        1,
-        &["range"],
-    );
-    folder.refuses(
-        &with(&["--depth-unit", "raw", out[0], out[1]]),
-        2,
-        &["--depth-scale"],
-    );
-    folder.refuses(
-        &with(&["-o", "missing/h.png"]),
-        1,
-        &["missing/h.png", "written"],
-    );
-    folder.refuses(&with(&["-o", "h.jpg"]), 1, &["h.jpg", ".png"]);
-    folder.refuses(&with(&["--nonsense"]), 2, &["--nonsense"]);
-    folder.refuses(&["hologram", "-o", "h.png"], 2, &["--rgb"]);
+#[test]
+fn options_that_cannot_be_meant_are_named() {
+    let folder = Folder::new().with_frame();
+    folder.refuses_each(&[
+        (
+            "an offset out of reach",
+            made(&["--offset-mm", "9000"]),
+            &["9000", "smaller"],
+        ),
+        (
+            "an offset that is no number",
+            made(&["--offset-mm", "nan"]),
+            &["offset_mm"],
+        ),
+        (
+            "no planes",
+            made(&["--method", "layers", "--planes", "0"]),
+            &["plane"],
+        ),
+        ("no light", made(&["--scale", "0"]), &["scale"]),
+        (
+            "near behind far",
+            made(&["--near", "2", "--far", "1", "--depth-unit", "mm"]),
+            &["range"],
+        ),
+        (
+            "a folder that is not there",
+            with(&["-o", "missing/h.png"]),
+            &["missing/h.png", "written"],
+        ),
+        (
+            "a picture that loses levels",
+            with(&["-o", "h.jpg"]),
+            &["h.jpg", ".png"],
+        ),
+    ]);
+    // What the arguments alone tell is code 2.
+    let raw = made(&["--depth-unit", "raw"]);
+    let cases: [(&str, &[&str], &str); 5] = [
+        ("raw depth without a scale", &raw, "--depth-scale"),
+        ("an unknown option", &with(&["--nonsense"]), "--nonsense"),
+        ("no frame", &["hologram", "-o", "h.png"], "--rgb"),
+        (
+            "no distance",
+            &["refocus", "rgb.png", "-o", "v.png"],
+            "--z-mm",
+        ),
+        (
+            "an empty size",
+            &["scene", "--seed", "1", "--size", "0x5", "-o", "s"],
+            "WxH",
+        ),
+    ];
+    for (name, arguments, word) in cases {
+        folder.refuses_as(name, arguments, 2, &[word]);
+    }
+}
 
-    fs::write(folder.path("display.toml"), "pitch_um = 3.74").unwrap();
-    folder.refuses(
-        &with(&["--display", "display.toml", out[0], out[1]]),
-        1,
-        &["pitch", "3.740"],
-    );
-    fs::write(folder.path("display.toml"), "bits = 12").unwrap();
-    folder.refuses(
-        &with(&["--display", "display.toml", out[0], out[1]]),
-        1,
-        &["display.toml", "bits"],
-    );
-    fs::write(folder.path("display.toml"), "lut = \"lut.txt\"").unwrap();
-    folder.refuses(
-        &with(&["--display", "display.toml", out[0], out[1]]),
-        1,
-        &["lut.txt"],
-    );
+#[test]
+fn displays_that_cannot_be_used_are_named() {
+    let folder = Folder::new().with_frame();
+    let cases: [(&str, &str, &[&str]); 4] = [
+        ("a pitch in µm", "pitch_um = 3.74", &["pitch", "3.740"]),
+        ("12 bits", "bits = 12", &["display.toml", "bits"]),
+        (
+            "a table that is not there",
+            "lut = \"none.txt\"",
+            &["none.txt"],
+        ),
+        ("a table of 3", "lut = \"lut.txt\"", &["lut.txt", "256"]),
+    ];
     fs::write(folder.path("lut.txt"), "1 2 3").unwrap();
-    folder.refuses(
-        &with(&["--display", "display.toml", out[0], out[1]]),
-        1,
-        &["lut.txt", "256"],
-    );
+    for (name, text, words) in cases {
+        fs::write(folder.path("display.toml"), text).unwrap();
+        folder.refuses_as(name, &made(&["--display", "display.toml"]), 1, words);
+    }
+}
 
-    fs::write(folder.path("net.onnx"), b"not a network").unwrap();
-    folder.refuses(
-        &with(&["--network", "net.onnx", out[0], out[1]]),
-        1,
-        &["net.onnx"],
-    );
+#[test]
+fn networks_that_cannot_be_used_are_named() {
+    let folder = Folder::new().with_frame();
     let model = fs::read(format!("{MODELS}/rgbd-8.onnx")).unwrap();
-    fs::write(folder.path("net.onnx"), &model[..model.len() / 2]).unwrap();
-    folder.refuses(
-        &with(&["--network", "net.onnx", out[0], out[1]]),
-        1,
-        &["net.onnx"],
-    );
-    folder.refuses(
-        &with(&["--network", "9", out[0], out[1]]),
-        1,
-        &["9", "comes along"],
-    );
-
-    folder.refuses(
-        &["refocus", "rgb.png", "--z-mm", "0", "-o", "v.png"],
-        1,
-        &["rgb.png", "hologram"],
-    );
-    folder.refuses(&["refocus", "rgb.png", "-o", "v.png"], 2, &["--z-mm"]);
-    folder.refuses(
-        &["compare", "rgb.png", "square.png"],
-        1,
-        &["48×32", "40×40"],
-    );
-    folder.refuses(
-        &["scene", "--seed", "1", "--size", "0x5", "-o", "s"],
-        2,
-        &["WxH"],
-    );
-    folder.refuses(
-        &["hologram", "--ldi", "nowhere", "-o", "h.png"],
-        1,
-        &["nowhere"],
-    );
+    fs::write(folder.path("no.onnx"), b"not a network").unwrap();
+    fs::write(folder.path("half.onnx"), &model[..model.len() / 2]).unwrap();
+    folder.refuses_each(&[
+        ("no network", made(&["--network", "no.onnx"]), &["no.onnx"]),
+        (
+            "half a network",
+            made(&["--network", "half.onnx"]),
+            &["half.onnx"],
+        ),
+        (
+            "none that comes along",
+            made(&["--network", "9"]),
+            &["9", "comes along"],
+        ),
+    ]);
 }
 
 #[test]
@@ -565,61 +595,33 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
     );
 }
 
-#[test]
-fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
-    let folder = Folder::new().with_frame();
-    folder.succeeds(&with(&[
-        "--scale",
-        "1",
-        "--offset-mm",
-        "3",
-        "-o",
-        "cpu.png",
-    ]));
-    // Drivers write to stderr where no desktop runs.
-    let on_gpu = |more: &[&str]| {
-        Command::new(env!("CARGO_BIN_EXE_phasefront"))
-            .args(more)
-            .current_dir(folder.0.path())
-            .env("XDG_CACHE_HOME", folder.path("cache"))
-            .env_remove("RUST_LOG")
-            .output()
-            .unwrap()
-    };
-    let gpu = ["--backend", "gpu", "--gpu"];
-    let missing = on_gpu(&with(
-        &[&gpu[..], &["no such card", "-o", "gpu.png"]].concat(),
-    ));
-    let errors = String::from_utf8(missing.stderr).unwrap();
-    assert_eq!(missing.status.code(), Some(1), "{errors}");
-    assert!(
-        errors.contains("error: no GPU") && errors.contains("--backend cpu"),
-        "{errors}"
-    );
-    assert!(!folder.path("gpu.png").exists());
+/// What the command does on a GPU, its cache in `folder`.
+fn on_gpu(folder: &Folder, arguments: &[&str]) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_phasefront"))
+        .args(arguments)
+        .current_dir(folder.0.path())
+        .env("XDG_CACHE_HOME", folder.path("cache"))
+        .env_remove("RUST_LOG")
+        .output()
+        .unwrap()
+}
 
-    let more = [
-        "llvmpipe",
-        "--scale",
-        "1",
-        "--offset-mm",
-        "3",
-        "-o",
-        "gpu.png",
-        "--json",
-    ];
-    let made = on_gpu(&with(&[&gpu[..], &more].concat()));
+/// The report of a command on the driver in software; none where there is no such driver, which is said.
+fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> Option<serde_json::Value> {
+    let gpu = ["--backend", "gpu", "--gpu", "llvmpipe", "--json"];
+    let made = on_gpu(folder, &[arguments, &gpu].concat());
+    // Drivers write to stderr where no desktop runs.
     let errors = String::from_utf8(made.stderr).unwrap();
     if errors.contains("no GPU") {
         println!("skipped: no driver in software (mesa-vulkan-drivers)");
-        return;
+        return None;
     }
     assert!(made.status.success(), "{errors}");
-    let report: serde_json::Value = serde_json::from_slice(&made.stdout).unwrap();
-    assert!(
-        report["engine"].as_str().unwrap().contains("int8"),
-        "{report}"
-    );
+    Some(serde_json::from_slice(&made.stdout).unwrap())
+}
+
+/// Few levels of two pictures are more than neighbours.
+fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
     let levels = |name| {
         image::open(folder.path(name))
             .unwrap()
@@ -627,78 +629,77 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
             .into_raw()
     };
     let apart = |(a, b): (&u8, &u8)| (a.wrapping_sub(*b) as i8).unsigned_abs() > 1;
-    let (cpu, gpu) = (levels("cpu.png"), levels("gpu.png"));
-    let differing = cpu.iter().zip(&gpu).filter(|pair| apart(*pair)).count();
-    assert!(differing * 100 < cpu.len(), "{differing} of {}", cpu.len());
+    let (a, b) = (levels(a), levels(b));
+    let differing = a.iter().zip(&b).filter(|pair| apart(*pair)).count();
+    assert!(differing * 100 < a.len(), "{differing} of {}", a.len());
+}
 
-    let bench = [
-        "bench",
-        "--backend",
-        "gpu",
-        "--gpu",
-        "llvmpipe",
-        "--seconds",
-        "0",
-        "--json",
-    ];
-    let more = [
-        "--size",
-        "48x32",
-        "--layers",
-        "8",
-        "--precision",
-        "int8",
-        "--fusion",
-        "pairs",
-    ];
-    let measured = on_gpu(&[&bench[..], &more].concat());
-    let errors = String::from_utf8(measured.stderr).unwrap();
-    assert!(measured.status.success(), "{errors}");
-    let report: serde_json::Value = serde_json::from_slice(&measured.stdout).unwrap();
+#[test]
+fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
+    let folder = Folder::new().with_frame();
+    let usual = ["--scale", "1", "--offset-mm", "3"];
+    let swept = [&["--method", "sweep"], &usual[..]].concat();
+    for more in [&usual[..], &swept] {
+        folder.succeeds(&with(&[more, &["-o", "cpu.png"]].concat()));
+        let arguments = with(&[more, &["-o", "gpu.png"]].concat());
+        let Some(report) = report_on_gpu(&folder, &arguments) else {
+            return;
+        };
+        if more.contains(&"sweep") {
+            assert!(report["stage_ms"]["sweep"].is_number(), "{report}");
+        } else {
+            let engine = report["engine"].as_str().unwrap();
+            assert!(engine.contains("int8"), "{report}");
+        }
+        assert_nearly_equal(&folder, "cpu.png", "gpu.png");
+    }
+}
+
+#[test]
+fn a_gpu_is_measured() {
+    let folder = Folder::new();
+    let bench = |more: &[&str]| {
+        let usual = ["bench", "--seconds", "0", "--size", "48x32"];
+        report_on_gpu(&folder, &[&usual, more].concat())
+    };
+    let network = ["--layers", "8", "--precision", "int8", "--fusion", "pairs"];
+    let Some(report) = bench(&network) else {
+        return;
+    };
     let row = &report["rows"][0];
     assert_eq!(row["backend"], "gpu");
     assert!(row["total_ms"].as_f64().unwrap() > 0.0, "{report}");
-    assert!(
-        row["kernels"].as_str().unwrap().contains("Pairs in 5"),
-        "{report}"
-    );
-
-    let sweep = [
-        "--method",
-        "sweep",
-        "--scale",
-        "1",
-        "--offset-mm",
-        "3",
-        "--json",
-    ];
-    folder.succeeds(&with(&[&sweep[..], &["-o", "cpu.png"]].concat()));
-    let more = ["--backend", "gpu", "--gpu", "llvmpipe", "-o", "gpu.png"];
-    let swept = on_gpu(&with(&[&sweep[..], &more].concat()));
-    let errors = String::from_utf8(swept.stderr).unwrap();
-    assert!(swept.status.success(), "{errors}");
-    let report: serde_json::Value = serde_json::from_slice(&swept.stdout).unwrap();
-    assert!(report["stage_ms"]["sweep"].is_number(), "{report}");
-    let (cpu, gpu) = (levels("cpu.png"), levels("gpu.png"));
-    let differing = cpu.iter().zip(&gpu).filter(|pair| apart(*pair)).count();
-    assert!(differing * 100 < cpu.len(), "{differing} of {}", cpu.len());
-    let more = ["--size", "48x32", "--layers", "0"];
-    let measured = on_gpu(&[&bench[..], &more].concat());
-    let errors = String::from_utf8(measured.stderr).unwrap();
-    assert!(measured.status.success(), "{errors}");
-    let report: serde_json::Value = serde_json::from_slice(&measured.stdout).unwrap();
+    let kernels = row["kernels"].as_str().unwrap();
+    assert!(kernels.contains("Pairs in 5"), "{report}");
+    let report = bench(&["--layers", "0"]).unwrap();
     assert_eq!(report["rows"].as_array().unwrap().len(), 1);
     assert_eq!(report["rows"][0]["method"], "sweep");
+}
 
-    for (arguments, word) in [
-        (with(&["--gpu", "x", "-o", "o.png"]), "--backend gpu"),
+#[test]
+fn a_gpu_that_is_not_there_or_not_meant_is_named() {
+    let folder = Folder::new().with_frame();
+    let gpu = ["--backend", "gpu", "--gpu", "no such card", "-o", "gpu.png"];
+    let missing = on_gpu(&folder, &with(&gpu));
+    let errors = String::from_utf8(missing.stderr).unwrap();
+    assert_eq!(missing.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("error: no GPU") && errors.contains("--backend cpu"),
+        "{errors}"
+    );
+    assert!(!folder.path("gpu.png").exists());
+    folder.refuses_each(&[
         (
-            with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]),
-            "--complex",
+            "a card for the CPU",
+            with(&["--gpu", "x", "-o", "o.png"]),
+            &["--backend gpu"],
         ),
-    ] {
-        folder.refuses(&arguments, 1, &[word]);
-    }
+        (
+            "a complex field from the GPU",
+            with(&["--backend", "gpu", "--complex", "c.npy", "-o", "o.png"]),
+            &["--complex"],
+        ),
+    ]);
 }
 
 #[test]

@@ -159,98 +159,133 @@ fn a_display_of_ten_bits_gets_words() {
     assert!(Session::new(options, RunningMode::Image).is_err());
 }
 
-/// Frames that cannot be used: each is named, and the next good frame works.
+/// Hands a session one bad frame after another, and a good one after each.
+struct Trial<'a> {
+    session: Session,
+    scene: &'a Scene,
+    metres: &'a [u8],
+    timestamp: u64,
+}
+
+impl<'a> Trial<'a> {
+    fn new(scene: &'a Scene, metres: &'a [u8]) -> Self {
+        let mut trial = Trial {
+            session: Session::new(options(W, H), RunningMode::Video).unwrap(),
+            scene,
+            metres,
+            timestamp: 0,
+        };
+        trial.good();
+        trial
+    }
+
+    /// A timestamp that is right.
+    fn next(&self) -> u64 {
+        self.timestamp + 50
+    }
+
+    fn good(&mut self) {
+        self.timestamp += 100;
+        let frame = frame(self.timestamp, self.scene, self.metres);
+        self.session.process(&frame).unwrap();
+    }
+
+    /// The frame of that name is refused by one line with `word`, and the next good one works.
+    fn refuses(&mut self, name: &str, word: &str, frame: phasefront::Result<CameraFrame<'_>>) {
+        let made = frame.and_then(|frame| self.session.process(&frame));
+        let message = made.unwrap_err().to_string();
+        assert!(message.contains(word), "{name}: {message}");
+        assert!(!message.contains('\n'), "{name}: {message}");
+        self.good();
+    }
+}
+
 #[test]
-fn bad_frames_are_named_and_harm_nothing() {
-    let session = Session::new(options(W, H), RunningMode::Video).unwrap();
+fn bad_colour_is_named_and_harms_nothing() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    let good = |timestamp| session.process(&frame(timestamp, &scene, &metres));
-    let refused = |made: phasefront::Result<CameraFrame<'_>>| {
-        made.and_then(|frame| session.process(&frame))
-            .unwrap_err()
-            .to_string()
-    };
-    good(10).unwrap();
-    let rgba = Plane::new(&scene.rgba, 4 * W, 4);
-    let colour = |w, h, plane| ColourImage::new(ColourFormat::Rgba, w, h, &[plane]);
+    let mut trial = Trial::new(&scene, &metres);
+    let depth = depth(&metres, DepthFormat::MetresF32, W, H);
+    let short = "12288 bytes are too few";
+    for (name, (w, h), (row, pixel), word) in [
+        ("a row too few", (W, H + 1), (4 * W, 4), short),
+        ("short rows", (W, H), (4 * W - 1, 4), "row stride of 255"),
+        ("short pixels", (W, H), (4 * W, 3), "pixel stride of 3"),
+        ("no pixels", (0, H), (4 * W, 4), "empty"),
+        ("8K", (7680, 4320), (4 * W, 4), "too large"),
+    ] {
+        let plane = Plane::new(&scene.rgba, row, pixel);
+        let colour = ColourImage::new(ColourFormat::Rgba, w, h, &[plane]);
+        let at = trial.next();
+        trial.refuses(name, word, colour.map(|c| CameraFrame::new(at, c, depth)));
+    }
+}
+
+#[test]
+fn bad_depth_is_named_and_harms_nothing() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let mut trial = Trial::new(&scene, &metres);
     let whole = depth(&metres, DepthFormat::MetresF32, W, H);
+    let metres_of = |bytes, h| Ok(depth(bytes, DepthFormat::MetresF32, W, h));
     let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
     let zero = vec![0; 4 * W * H];
     let unsure = vec![10; W * H];
+    for (name, depth, word) in [
+        ("no number", metres_of(&nan, H), "no usable reading"),
+        ("no distance", metres_of(&zero, H), "no usable reading"),
+        ("half", metres_of(&zero, H / 2), "aspect ratios differ"),
+        (
+            "none sure",
+            with_confidence(whole, &unsure, W, H),
+            "confidence 0.25 or more",
+        ),
+        (
+            "confidence of another size",
+            with_confidence(whole, &unsure, W / 2, H),
+            "confidence is 32×48",
+        ),
+    ] {
+        let at = trial.next();
+        let frame = depth.map(|depth| CameraFrame::new(at, scene.colour(), depth));
+        trial.refuses(name, word, frame);
+    }
+}
+
+#[test]
+fn bad_alignment_is_named_and_harms_nothing() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let mut trial = Trial::new(&scene, &metres);
     let flat = vec![0; W * H];
-    let mut timestamp = 20;
-    let mut check = |made: phasefront::Result<CameraFrame<'_>>, word: &str| {
-        let message = refused(made);
-        assert!(message.contains(word), "{word}: {message}");
-        assert!(!message.contains('\n'));
-        timestamp += 100;
-        good(timestamp).unwrap();
-    };
-    let with_colour = |c: phasefront::Result<_>| c.map(|c| CameraFrame::new(11, c, whole));
-    check(
-        with_colour(colour(W, H + 1, rgba)),
-        "12288 bytes are too few",
-    );
-    check(
-        with_colour(colour(W, H, Plane::new(&scene.rgba, 4 * W - 1, 4))),
-        "row stride of 255",
-    );
-    check(
-        with_colour(colour(W, H, Plane::new(&scene.rgba, 4 * W, 3))),
-        "pixel stride of 3",
-    );
-    check(with_colour(colour(0, H, rgba)), "empty");
-    check(with_colour(colour(7680, 4320, rgba)), "too large");
-    let with_depth =
-        |t, d: phasefront::Result<_>| d.map(|d| CameraFrame::new(t, scene.colour(), d));
-    check(
-        with_depth(530, Ok(depth(&nan, DepthFormat::MetresF32, W, H))),
-        "no usable reading",
-    );
-    check(
-        with_depth(630, Ok(depth(&zero, DepthFormat::MetresF32, W, H))),
-        "no usable reading",
-    );
-    check(
-        with_depth(730, with_confidence(whole, &unsure, W, H)),
-        "confidence 0.25 or more",
-    );
-    check(
-        with_depth(830, with_confidence(whole, &unsure, W / 2, H)),
-        "confidence is 32×48",
-    );
-    check(
-        with_depth(930, Ok(depth(&zero, DepthFormat::MetresF32, W, H / 2))),
-        "aspect ratios differ",
-    );
-    let mut cameras = frame(1030, &scene, &metres);
-    let camera = Intrinsics {
-        fx: f64::NAN,
-        fy: 1.0,
-        cx: 0.0,
-        cy: 0.0,
-    };
-    cameras.alignment = Alignment::Cameras(Cameras::concentric(camera, camera));
-    check(Ok(cameras), "intrinsics of colour");
-    let camera = Intrinsics {
-        fx: 60.0,
-        fy: 60.0,
-        ..camera
-    };
-    let mut cameras = CameraFrame::new(
-        1130,
-        scene.colour(),
-        depth(&flat, DepthFormat::NormalizedU8, W, H),
-    );
-    cameras.alignment = Alignment::Cameras(Cameras::concentric(camera, camera));
-    check(Ok(cameras), "has no metres");
-    check(Ok(frame(10, &scene, &metres)), "timestamps must rise");
-    check(
-        Ok(frame(timestamp_of(&session), &scene, &metres)),
-        "timestamps must rise",
-    );
-    let statistics = session.statistics();
+    let flat = depth(&flat, DepthFormat::NormalizedU8, W, H);
+    let whole = depth(&metres, DepthFormat::MetresF32, W, H);
+    for (name, fx, depth, word) in [
+        ("no focal length", f64::NAN, whole, "intrinsics of colour"),
+        ("depth without metres", 60.0, flat, "has no metres"),
+    ] {
+        let camera = Intrinsics {
+            fx,
+            fy: 60.0,
+            cx: 0.0,
+            cy: 0.0,
+        };
+        let mut frame = CameraFrame::new(trial.next(), scene.colour(), depth);
+        frame.alignment = Alignment::Cameras(Cameras::concentric(camera, camera));
+        trial.refuses(name, word, Ok(frame));
+    }
+}
+
+#[test]
+fn late_frames_are_named_and_counted() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let mut trial = Trial::new(&scene, &metres);
+    let late = "timestamps must rise";
+    trial.refuses("an old frame", late, Ok(frame(10, &scene, &metres)));
+    let last = timestamp_of(&trial.session);
+    trial.refuses("the last again", late, Ok(frame(last, &scene, &metres)));
+    let statistics = trial.session.statistics();
     assert_eq!(statistics.pending, 0);
     // Two late frames, and the one that asked for the last timestamp.
     assert_eq!(statistics.refused, 3);
@@ -258,8 +293,9 @@ fn bad_frames_are_named_and_harm_nothing() {
         statistics.submitted,
         statistics.processed + statistics.failed + statistics.refused
     );
-    session.reset();
-    good(1).unwrap();
+    trial.session.reset();
+    let first = frame(1, &scene, &metres);
+    trial.session.process(&first).unwrap();
 }
 
 /// The last timestamp taken, from the refusal of an old one.
