@@ -18,6 +18,7 @@ use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
+use crate::scene::Texture;
 use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::{NpzReader, NpzWriter};
@@ -46,8 +47,11 @@ pub struct Manifest {
     pub planes: usize,
     /// Layers of an LDI.
     pub ldi_layers: usize,
-    /// Scene i is [`scene::random_scene`] of seed·2³² + i.
+    /// Scene i is of seed·2³² + i.
     pub seed: u64,
+    /// What the scenes look like.
+    #[serde(default, skip_serializing_if = "Look::is_objects")]
+    pub look: Look,
     /// The display that the holograms are for.
     pub display: Display,
     /// Which pairs are for what.
@@ -55,6 +59,35 @@ pub struct Manifest {
     /// The display's aberration, which the holograms correct; empty where they correct none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aberration: Vec<Entry>,
+}
+
+/// What the scenes of a data set look like.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", tag = "like")]
+pub enum Look {
+    /// Many objects, mostly in front of nothing: [`scene::random_scene`].
+    #[default]
+    Objects,
+    /// Bright and dark, filling the frame: [`scene::natural_scene`].
+    Photographs {
+        /// The [`scene::fingerprint`] of the photographs on its surfaces, in hexadecimal; none where there are none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        textures: Option<String>,
+    },
+}
+
+impl Look {
+    fn is_objects(&self) -> bool {
+        *self == Self::Objects
+    }
+
+    /// Like photographs, with these on surfaces.
+    pub fn photographs(textures: &[Texture]) -> Self {
+        let fingerprint = || format!("{:016x}", scene::fingerprint(textures));
+        Self::Photographs {
+            textures: (!textures.is_empty()).then(fingerprint),
+        }
+    }
 }
 
 /// Half-open ranges of pair indices.
@@ -105,6 +138,7 @@ impl Manifest {
             planes,
             ldi_layers,
             seed,
+            look: Look::Objects,
             display,
             splits: Splits {
                 train: [0, validation],
@@ -113,6 +147,11 @@ impl Manifest {
             },
             aberration: Vec::new(),
         })
+    }
+
+    /// The same of scenes that look so.
+    pub fn looking(self, look: Look) -> Self {
+        Manifest { look, ..self }
     }
 
     /// The same with holograms that correct `aberration`.
@@ -159,16 +198,24 @@ enum GroundTruth {
 }
 
 /// Makes the pairs of `manifest` that are in `shard` (of all pairs, or i/n of them: those whose index is i
-/// modulo n) and not in `dir` yet. `made` hears of each that is there.
+/// modulo n) and not in `dir` yet. `textures` are the photographs that its look names. `made` hears of each that is
+/// there.
 ///
 /// # Errors
-/// A folder that holds another data set, or that cannot be written.
+/// Other photographs than the manifest's, a folder that holds another data set, or that cannot be written.
 pub fn make(
     manifest: &Manifest,
+    textures: &[Texture],
     dir: &Path,
     (shard, shards): (usize, usize),
     made: &(dyn Fn() + Sync),
 ) -> Result<()> {
+    let plain = manifest.look == Look::Objects && textures.is_empty();
+    if !plain && manifest.look != Look::photographs(textures) {
+        return Err(Error::Input(
+            "the photographs for surfaces are not those of the data set".into(),
+        ));
+    }
     std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
     let place = dir.join("manifest.json");
     if place.exists() {
@@ -201,8 +248,11 @@ pub fn make(
         let index = i * shards + shard;
         let path = Manifest::pair_path(dir, index);
         if !path.exists() {
-            let scene =
-                scene::random_scene(manifest.scene_seed(index), manifest.size, manifest.size);
+            let (seed, size) = (manifest.scene_seed(index), manifest.size);
+            let scene = match manifest.look {
+                Look::Objects => scene::random_scene(seed, size, size),
+                Look::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
+            };
             let ldi = scene::render_ldi_reference(
                 &scene,
                 manifest.size,
@@ -309,4 +359,60 @@ pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> 
         ldi,
         hologram: hologram.as_standard_layout().into_owned(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    fn manifest(look: Look) -> Manifest {
+        let plain = Manifest::new(4, 24, 8, 2, 3, Display::default()).unwrap();
+        plain.looking(look)
+    }
+
+    #[test]
+    fn a_manifest_without_a_look_is_of_objects_and_stays_as_it_is() {
+        let text = serde_json::to_string(&manifest(Look::Objects)).unwrap();
+        assert!(!text.contains("look"), "{text}");
+        let read: Manifest = serde_json::from_str(&text).unwrap();
+        assert_eq!(read, manifest(Look::Objects));
+    }
+
+    #[test]
+    fn a_set_like_photographs_says_so_and_holds_natural_scenes() {
+        let dir = tempfile::tempdir().unwrap();
+        let texture = Texture::plain([0.2, 0.5, 0.9]);
+        let ours = manifest(Look::photographs(std::slice::from_ref(&texture)));
+        make(&ours, &[texture.clone()], dir.path(), (1, 4), &|| {}).unwrap();
+        assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
+        let pair = read_pair(&ours, dir.path(), 1).unwrap();
+        let scene = scene::natural_scene(ours.scene_seed(1), 24, 24, &[texture]);
+        let ldi = scene::render_ldi_reference(&scene, 24, 24, 2).unwrap();
+        assert!(pair.ldi == ldi.quantized());
+        let other = manifest(Look::photographs(&[]));
+        let refused = make(&other, &[], dir.path(), (1, 4), &|| {}).unwrap_err();
+        assert!(
+            refused.to_string().contains("other parameters"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn other_photographs_than_the_manifests_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let [one, other] = [0.2, 0.3].map(|v| vec![Texture::plain([v; 3])]);
+        let looks = [
+            (Look::photographs(&one), other),
+            (Look::photographs(&one), Vec::new()),
+            (Look::photographs(&[]), one.clone()),
+            (Look::Objects, one),
+        ];
+        for (look, textures) in looks {
+            let refused = make(&manifest(look), &textures, dir.path(), (0, 1), &|| {});
+            let told = refused.unwrap_err().to_string();
+            assert!(told.contains("not those of the data set"), "{told}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Scenes of textured triangle meshes, and their rendering to layered depth images.
 //!
 //! * [`Scene`], [`Mesh`] and [`Texture`] describe what is there.
-//! * [`random_scene`] makes the scenes that data sets consist of.
+//! * [`random_scene`] and, like photographs, [`natural_scene`] make the scenes that data sets consist of.
 //! * [`read_model`] reads glTF, GLB and OBJ files.
 //! * [`render_ldi_reference`] renders on the CPU, exactly; [`DepthPeeler`] the same on a GPU.
 //!
@@ -14,9 +14,12 @@
 pub mod dice;
 mod gltf_file;
 mod model;
+mod natural;
 mod obj_file;
+mod parts;
 pub mod pattern;
 mod peel;
+mod photographs;
 mod random;
 mod raster;
 pub mod shapes;
@@ -25,7 +28,9 @@ mod texture;
 use std::sync::Arc;
 
 pub use model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, read_model};
+pub use natural::natural_scene;
 pub use peel::DepthPeeler;
+pub use photographs::{fingerprint, read_photographs};
 pub use random::random_scene;
 pub use raster::render_ldi_reference;
 pub use texture::Texture;

@@ -40,7 +40,7 @@ impl Data {
         let manifest = manifest.correcting(aberration);
         assert_eq!(manifest.splits.test, [78, 80]);
         for shard in [78, 79] {
-            dataset::make(&manifest, dir.path(), (shard, 80), &|| {}).unwrap();
+            dataset::make(&manifest, &[], dir.path(), (shard, 80), &|| {}).unwrap();
         }
         Data { dir, manifest }
     }

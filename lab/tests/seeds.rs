@@ -20,7 +20,7 @@ fn manifest(size: usize) -> Manifest {
 fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
     let (data, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let manifest = manifest(SIZE);
-    dataset::make(&manifest, data.path(), (SCENE, 80), &|| {}).unwrap();
+    dataset::make(&manifest, &[], data.path(), (SCENE, 80), &|| {}).unwrap();
     let pair = dataset::read_pair(&manifest, data.path(), SCENE).unwrap();
     let clean = pair.ldi.layers[0].depth.mapv(|d| {
         let d = if d.is_nan() { 1.0 } else { d };

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards
+from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards, statistics
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -50,6 +50,12 @@ def parser():
     p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --planes 32")
 
+    p = add("statistics", run_statistics, "What scenes look like: brightness, spectrum and depths of data sets beside those of captured frames.")
+    p.add_argument("--data", required=True, nargs="+", help="folders of data sets")
+    p.add_argument("--split", choices=data.SPLITS, default="train")
+    p.add_argument("--scenes", type=int, help="only the first so many of each")
+    p.add_argument("--frames", metavar="DIR", help="captured frames, somewhere below it: colorNAME and depthNAME.png side by side")
+
     p = add("stage1", run_stage1, "Train a hologram network on scenes and their holograms.")
     training_flags(p)
     resume_flag(p)
@@ -58,6 +64,7 @@ def parser():
     p.add_argument("--input", default="rgbd", help="rgbd, rgbdxy (with the place in the frame), seeded, or ldiN, N layers of a layered depth image (default rgbd)")
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
+    p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours are made brighter or darker, each by a factor, and their holograms with them (default 0)")
 
     p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
     training_flags(p, crop=384, rate=2e-4)
@@ -120,8 +127,8 @@ def evaluation_flags(p):
 
 
 def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
-    p.add_argument("--data", required=True, help="folder of the data set")
-    p.add_argument("--seeds", help="folder of its seeds: for seeded networks, and for refined depth among the degraded")
+    p.add_argument("--data", required=True, nargs="+", help="folder of the data set, or of several that are trained on together")
+    p.add_argument("--seeds", nargs="+", help="folder of the seeds of each: for seeded networks, and for refined depth among the degraded")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
@@ -131,7 +138,7 @@ def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e
     p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
     p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
     p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
-    p.add_argument("--scenes", type=int, help="only the first so many training scenes")
+    p.add_argument("--scenes", type=int, help="only the first so many training scenes of each data set")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--f32", action="store_true", help="float32 throughout; bf16 is 3 to 4 times faster where the CPU has it")
     p.add_argument("--loaders", type=int, help="threads that draw samples ahead (default 0 on a CPU, 8 on a GPU)")
@@ -157,6 +164,17 @@ def run_seeds(args):
     seeds.make(data.Manifest.read(args.data), args.output, args.variants, passed_on(args), args.phasefront)
 
 
+def run_statistics(args):
+    named = {str(folder): statistics.of_data(folder, args.split, args.scenes) for folder in args.data}
+    if args.frames:
+        captured = statistics.of_frames(args.frames)
+        if captured:
+            named["captured frames"] = captured
+        else:
+            print(f"{args.frames}: no captured frames there; left out", file=sys.stderr)
+    print(statistics.table(named))
+
+
 def passed_on(args):
     """What stands behind --, for `phasefront dataset`."""
     return args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
@@ -172,7 +190,7 @@ def run_stage1(args):
         wanted = networks.Architecture(args.layers, args.filters, args.input, args.head)
         train, validation = load(args, wanted)
         network = begun(args, wanted, train)
-    task = Stage1(network, train, validation, workers, bf16=not args.f32, **sampling(args))
+    task = Stage1(network, train, validation, workers, bf16=not args.f32, dimmed=args.dimmed, **sampling(args))
     go(task, args, workers, resume)
 
 
@@ -230,19 +248,26 @@ def sampling(args):
 
 def load(args, architecture):
     """The training scenes, and a few for the curve's validation."""
-    train = scenes_for(args, "train", {architecture.input}, args.scenes)
-    return train, scenes_for(args, "validation", {architecture.input}, VALIDATION_SCENES)
+    folders, inputs = args.data, {architecture.input}
+    of_seeds = args.seeds or [None] * len(folders)
+    if len(of_seeds) != len(folders):
+        raise ValueError(f"{len(folders)} data sets and {len(of_seeds)} folders of seeds: --seeds takes one for each, in the same order")
+
+    def all_of(split, limit):
+        return data.Scenes.joined([scenes_for(*each, split, inputs, limit) for each in zip(folders, of_seeds)])
+
+    return all_of("train", args.scenes), all_of("validation", max(1, VALIDATION_SCENES // len(folders)))
 
 
-def scenes_for(args, split, inputs, limit):
+def scenes_for(folder, folder_of_seeds, split, inputs, limit):
     """Scenes with what networks of these inputs read."""
-    if "seeded" in inputs and not args.seeds:
+    if "seeded" in inputs and not folder_of_seeds:
         raise ValueError("a seeded network reads the sweep's fields: --seeds FOLDER")
     layers = {networks.Architecture(3, input=each).ldi_layers for each in inputs}
     if len(layers) > 1:
         raise ValueError("networks for different inputs are evaluated one call each")
-    manifest = data.Manifest.read(args.data)
-    read = seeds.Seeds.read(args.seeds) if args.seeds else None
+    manifest = data.Manifest.read(folder)
+    read = seeds.Seeds.read(folder_of_seeds) if folder_of_seeds else None
     return data.Scenes(manifest, split, layers.pop(), limit, seeds=read)
 
 
@@ -357,7 +382,7 @@ def run_export(args):
 def run_evaluate(args):
     predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
     inputs = {architecture.input for _, architecture in predictors.values()} or {"rgbd"}
-    scenes = scenes_for(args, args.split, inputs, args.scenes)
+    scenes = scenes_for(args.data, args.seeds, args.split, inputs, args.scenes)
     methods = {
         "RGB as the field": evaluate.rgb_as_field,
         "SM-LBM of what is visible": evaluate.visible_layers(scenes.display, scenes.origin["planes"]),
@@ -377,8 +402,9 @@ def run_evaluate(args):
 
 def scenes_of(args, scenes):
     """What figures were measured on."""
-    manifest = data.Manifest.read(args.data).table
-    return {"split": args.split, "scenes": len(scenes)} | {k: manifest[k] for k in ("seed", "size", "planes", "display")}
+    manifest = data.Manifest.read(args.data)
+    known = {k: manifest.table[k] for k in ("seed", "size", "planes", "display")}
+    return {"split": args.split, "scenes": len(scenes), "like": manifest.like} | known
 
 
 def run_evaluate_encoding(args):
@@ -386,7 +412,7 @@ def run_evaluate_encoding(args):
     if args.prefilter:
         del model.prefilter  # a module, which the file is not
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
-    scenes = scenes_for(args, args.split, {model.hologram.architecture.input}, args.scenes)
+    scenes = scenes_for(args.data, args.seeds, args.split, {model.hologram.architecture.input}, args.scenes)
     depth = "degraded" if args.degraded else "clean"
     results = evaluate_encoding.encoding_figures(model, scenes, depth)
     if args.picture:

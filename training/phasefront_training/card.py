@@ -8,17 +8,28 @@ from . import evaluate, evaluate_encoding
 from .files import replacing
 from .networks import multiplies_per_pixel
 
-SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "rate", "seed", "scenes", "f32")
+SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "rate", "seed", "scenes", "f32")
+
+
+def sets(last):
+    """What is known of each data set that was trained on."""
+    return last.extra["data"].get("sets") or [last.extra["data"]]
+
+
+def names(name, last):
+    """A folder's name for each data set: DATA, or DATA1 and DATA2."""
+    count = len(sets(last))
+    return [name] if count == 1 else [f"{name}{k + 1}" for k in range(count)]
 
 
 def command(last, init):
     """The command that makes a checkpoint like `last` again."""
     architecture, _ = last.networks["hologram"]
-    parts = ["python", "-m", "phasefront_training", last.kind, "--data", "DATA", "-o", "OUT"]
+    parts = ["python", "-m", "phasefront_training", last.kind, "--data", *names("DATA", last), "-o", "OUT"]
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
     if architecture.input == "seeded":
-        parts += ["--seeds", "SEEDS"]
+        parts += ["--seeds", *names("SEEDS", last)]
     if last.kind == "stage2":
         parts += ["--offset-mm", f"{last.extra['offset_m'] * 1e3:g}", "--identity-steps", last.options["identity_steps"]]
         prefilter, _ = last.networks["prefilter"]
@@ -34,6 +45,11 @@ def command(last, init):
     return shlex.join(map(str, parts))
 
 
+def like(known):
+    """ like photographs, where they are."""
+    return " like photographs" if known.get("like") == "photographs" else ""
+
+
 def describe(name, last, figures):
     """The card's text. figures: what `evaluate --json` or `evaluate-encoding --json` wrote, a list of them."""
     lines = [f"# {name}", ""]
@@ -47,8 +63,11 @@ def describe(name, last, figures):
     lines.append(f"- Display: pitch {d.pitch_m * 1e6:g} µm, {wavelengths} nm, volume {d.volume_depth_m * 1e3:g} mm.")
     if "offset_m" in last.extra:
         lines.append(f"- Offset of the modulator: {last.extra['offset_m'] * 1e3:g} mm.")
+    trained_on = " and ".join(
+        f"{each['scenes']} scenes{like(each)} of {each['size']}² pixels, {each['planes']} planes, seed {each['seed']}" for each in sets(last)
+    )
     lines.append(
-        f"- Trained ({last.kind}) on {data['scenes']} scenes of {data['size']}² pixels, {data['planes']} planes, seed {data['seed']}: "
+        f"- Trained ({last.kind}) on {trained_on}: "
         f"{last.step:,} steps of {last.options['batch']} crops of {last.options['crop']}² pixels in {last.elapsed_s / 60:.0f} minutes"
         f" on {last.options['device']} with {last.options['threads']} threads; {last.options['degraded']:.0%} of the samples with degraded depth."
     )
@@ -56,22 +75,24 @@ def describe(name, last, figures):
     for each in figures:
         measured = each["data"]
         depth = f", {measured['depth']} depth" if "depth" in measured else ""
-        lines += [f"On {measured['scenes']} scenes of the {measured['split']} split{depth}:", ""]
+        lines += [f"On {measured['scenes']} scenes{like(measured)} of the {measured['split']} split{depth}:", ""]
         methods = {Path(method).name: found for method, found in each["results"].items()}
         if "offset_mm" in each:
             lines.append(evaluate_encoding.table(methods))
         else:
             lines.append(evaluate.table(methods))
         lines.append("")
-    seed = f"--seed {data['seed']} --size {data['size']} --planes {data['planes']}"
-    seeds = ""
-    if any(a.input == "seeded" for a, _ in last.networks.values()):
-        seeds = f" and its seeds: `python -m phasefront_training seeds --data DATA -o SEEDS -- --planes {data['seed_planes']} --refined {data['refined']}`,"
-    lines += [
-        "## To make it again", "",
-        f"The data set: `python -m phasefront_training data -o DATA -- {seed} --scenes …`,{seeds} then", "",
-        f"    {command(last, last.options.get('init'))}", "",
-    ]
+    lines += ["## To make it again", ""]
+    seeded = any(a.input == "seeded" for a, _ in last.networks.values())
+    for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
+        flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
+        flags += " --scenes-like photographs" if like(each) else ""
+        line = f"The data set: `python -m phasefront_training data -o {folder} -- {flags}`"
+        if seeded:
+            refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
+            line += f" and its seeds: `python -m phasefront_training seeds --data {folder} -o {seeds} -- {refined}`"
+        lines.append(f"{line}.")
+    lines += ["", "Then", "", f"    {command(last, last.options.get('init'))}", ""]
     return "\n".join(lines)
 
 

@@ -8,6 +8,7 @@ In memory a scene takes colour as uint8, depth and field as float16. The hologra
 black surroundings, so samples are crops, flips and transposes, never rolls.
 """
 
+import copy
 import io
 import json
 import os
@@ -29,6 +30,7 @@ from .optics import Display
 FORMAT = "phasefront-dataset-1"
 _HEADER = threading.Lock()
 SPLITS = ("train", "validation", "test")
+LARGEST_GAIN = 4  # of dark samples, whose colours stand in few steps
 
 
 class DataError(Exception):
@@ -72,6 +74,11 @@ class Manifest:
     @property
     def display(self):
         return Display.from_manifest(self.table["display"])
+
+    @property
+    def like(self):
+        """What its scenes look like: objects or photographs."""
+        return self.table.get("look", {}).get("like", "objects")
 
     def indices(self, split):
         """The scene numbers of a split."""
@@ -117,7 +124,8 @@ class Scenes:
         self.display = manifest.display
         self.ldi_layers = ldi_layers
         self.damaged = []
-        self.origin = {key: manifest.table[key] for key in ("seed", "planes")}
+        self.sets = []  # what each of several joined data sets is
+        self.origin = {key: manifest.table[key] for key in ("seed", "planes")} | {"like": manifest.like}
         self.corrected = bool(manifest.table.get("aberration"))
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
@@ -146,6 +154,26 @@ class Scenes:
             parts = [tuple(map(torch.from_numpy, seeds.of(number))) for number in self.numbers]
             self.variant_depth, self.variant_seed = (_gather(parts, k, device) for k in range(2))
 
+    @classmethod
+    def joined(cls, parts):
+        """The scenes of several data sets as one; they must be for one display and of one size."""
+        first, *others = parts
+        if not others:
+            return first
+        for other in others:
+            for what in ("display", "shape", "corrected", "refined", "seeded"):
+                mine, its = getattr(first, what), getattr(other, what)
+                if mine != its:
+                    raise DataError(f"data sets that are trained on together must be alike: {what} {mine} and {its}")
+        whole = copy.copy(first)
+        whole.sets = [part.facts for part in parts]
+        whole.numbers = [number for part in parts for number in part.numbers]
+        whole.damaged = [path for part in parts for path in part.damaged]
+        tensors = [name for name, value in vars(first).items() if isinstance(value, torch.Tensor)]
+        for name in tensors:
+            setattr(whole, name, torch.cat([vars(part).pop(name) for part in parts]))
+        return whole
+
     def __len__(self):
         return len(self.numbers)
 
@@ -156,7 +184,8 @@ class Scenes:
     @property
     def facts(self):
         """What a checkpoint keeps about the data it was trained on."""
-        return {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
+        facts = {"scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers} | self.origin
+        return facts | ({"sets": self.sets} if self.sets else {})
 
     def scene(self, i):
         """Colour (3·L, H, W) in [0, 1], normalized depth (L, H, W) and the true field (3, H, W) of scene i."""
@@ -220,6 +249,13 @@ def seed_of_input(x):
     return 2 * x[:, 4:7] + 0.5, 2 * x[:, 7:]
 
 
+def brightness_gains(colour, rng):
+    """A factor a colour (3, 1, 1) that keeps the colours (3·L, H, W) in [0, 1] and brings the brightest to any level."""
+    level = np.exp(rng.uniform(np.log(0.25), 0)) * np.exp(rng.uniform(np.log(0.75), 0, 3))
+    largest = min(1 / max(float(colour.max()), 1e-6), LARGEST_GAIN)
+    return torch.tensor(largest * level, dtype=torch.float32, device=colour.device)[:, None, None]
+
+
 @dataclass(frozen=True)
 class Batch:
     """Samples for one step.
@@ -238,14 +274,16 @@ class Sampler:
     """Draws batches for networks of one `kind`; batch `step` of a seed is always the same, whatever was drawn before.
 
     Samples of holograms that correct an aberration are
-    neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates.
+    neither flipped nor transposed, as the aberration does not flip with the scene; nor are coordinates. A share `dimmed`
+    of the samples has the brightness of each colour changed: optics are linear, and colours do not meet, so the hologram
+    of a scene whose red is halved is the hologram with its red halved, exactly. (More contrast is no such change.)
     """
 
-    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, kind="rgbd"):
+    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, kind="rgbd", dimmed=0.0):
         if degraded and scenes.ldi_layers > 1:
             raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
         height, width = scenes.shape
-        self.scenes, self.batch, self.degraded = scenes, batch, degraded
+        self.scenes, self.batch, self.degraded, self.dimmed = scenes, batch, degraded, dimmed
         self.crop = (min(crop, height), min(crop, width))
         if self.crop[0] != self.crop[1]:
             raise ValueError(f"scenes of {width}x{height} hold no square crop of {crop}")
@@ -272,6 +310,11 @@ class Sampler:
         colour = scenes.colour[i][window].float() / 255
         depth = scenes.depth[i][window].float()
         target = scenes.target[i][window].float()
+        gains = torch.ones(3, 1, 1, device=depth.device)
+        if self.dimmed and rng.random() < self.dimmed:
+            gains = brightness_gains(colour, rng)
+            colour = colour * gains.repeat(scenes.ldi_layers, 1, 1)
+            target = target * gains.repeat(2, 1, 1)
         valid = torch.zeros(1, h, w, device=depth.device)
         # At the frame's border the network sees zeros in use as well; only cut sides are left out of the loss.
         valid[
@@ -284,7 +327,7 @@ class Sampler:
         if scenes.seeded:
             v = int(rng.integers(1, scenes.variant_depth.shape[1])) if degraded else 0
             measured = scenes.variant_depth[i, v][window][None].float()
-            field = scenes.variant_seed[i, v][window].float()
+            field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
         else:
             measured = degrade_depth(colour, depth[0], rng)[None] if degraded else depth
         if self.place is None:

@@ -11,7 +11,7 @@ Two heads turn the last layer's six channels into a field :
   layer's image (imaginary part 0) or, for the pre-filter, the field that came in.
 
 Inputs: ``rgbd`` (4 channels: R, G, B, depth, each minus 0.5), ``rgbdxy`` (the same, then x and y over the frame from
--0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (4·N channels: rgb0,
+-0.5 to 0.5, for holograms that correct an aberration which differs over the frame), ``ldiN`` (N from 2 to 9; 4·N channels: rgb0,
 depth0, rgb1, ..., each minus 0.5; a pixel without a hit has colour 0 and depth 1), ``seeded`` (10 channels: those of
 rgbd, then the plane sweep's field as data.network_input lays it; the field is the base), ``field`` (6 channels: the
 real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method),
@@ -29,6 +29,7 @@ from torch.nn import functional as F
 from .data import seed_of_input
 
 HEADS = ("real-imaginary", "amplitude-phase")
+LDI_COUNTS = tuple("23456789")  # as the core takes them; of one layer it is rgbd
 SPLIT_STEP = 1 / 64  # of the first part of a split field
 REMAINDER_GAIN = 16  # of the second
 
@@ -59,9 +60,9 @@ class Architecture:
         if self.input in ("rgbd", "rgbdxy", "seeded"):
             return 1
         count = self.input.removeprefix("ldi")
-        if self.input.startswith("ldi") and count.isdigit() and int(count) > 0:
+        if self.input.startswith("ldi") and count in LDI_COUNTS:
             return int(count)
-        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldiN (N = 1, 2, ...), field, blurred-field or split-blurred-field, not '{self.input}'")
+        raise ValueError(f"the input is rgbd, rgbdxy, seeded, ldi2 to ldi9, field, blurred-field or split-blurred-field, not '{self.input}'")
 
     @property
     def of_fields(self):

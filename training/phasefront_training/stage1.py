@@ -35,7 +35,7 @@ class Stage1(Task):
 
     kind = "stage1"
 
-    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, degraded=0.0, bf16=True, seed=0):
+    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, degraded=0.0, bf16=True, seed=0, dimmed=0.0):
         self.network = network.to(workers.device, memory_format=torch.channels_last)
         self.networks = {"hologram": network}
         self.display = scenes.display
@@ -47,8 +47,8 @@ class Stage1(Task):
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.facts = scenes.facts
         cut, kind = margin(network.architecture.layers), network.architecture.input
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind)
-        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind)
+        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind, dimmed)
+        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind, dimmed)
 
     def module(self):
         return self.network

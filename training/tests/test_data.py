@@ -1,3 +1,4 @@
+import json
 import shutil
 
 import numpy as np
@@ -5,8 +6,9 @@ import pytest
 import torch
 
 from phasefront_training import data
-from phasefront_training.data import Manifest, Sampler, Scenes, network_input, read_pair
+from phasefront_training.data import DataError, Manifest, Sampler, Scenes, network_input, read_pair
 from phasefront_training.degrade import degrade_depth, fill_nearest
+from phasefront_training.evaluate import visible_layers
 
 
 def test_reading_follows_the_contract(data_folder):
@@ -92,6 +94,56 @@ def test_degradations_keep_shape_and_range_and_change_depth(data_folder):
     assert changed > 50
     again = [degrade_depth(colour, depth[0], np.random.default_rng(9)) for _ in range(2)]
     assert torch.equal(*again)
+
+
+def test_dimmed_samples_are_a_scene_and_its_hologram_by_the_same_gains(data_folder):
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    sampler = Sampler(scenes, 1, 64, 8, seed=5, dimmed=1.0)
+
+    def dimmed(k, batch):
+        """The gains that make scene k the sample, if there are any."""
+        colour, _, field = scenes.scene(k)
+        for turn in range(8):
+            seen, target = batch.input[0, :3] + 0.5, batch.target[0]
+            if turn & 4:
+                seen, target = seen.transpose(-1, -2), target.transpose(-1, -2)
+            axes = [axis for axis, bit in ((-2, 1), (-1, 2)) if turn & bit]
+            seen, target = seen.flip(axes), target.flip(axes)
+            gains = (seen.sum((1, 2)) / colour.sum((1, 2)))[:, None, None]
+            if torch.allclose(seen, gains * colour, atol=1e-5) and torch.allclose(target, gains * field, atol=1e-5):
+                return gains
+        return None
+
+    for step in range(6):
+        batch = sampler.draw(step)
+        gains = next(found for k in range(len(scenes)) if (found := dimmed(k, batch)) is not None)
+        assert batch.input[:, :3].max() <= 0.5 + 1e-5 and gains.min() > 0 and (gains - 1).abs().max() > 1e-3
+        # What the samples rest on: waves through a scene with occlusion are linear in each of its colours.
+        colour, depth, _ = scenes.scene(0)
+        by_waves = visible_layers(scenes.display, 16)
+        assert torch.allclose(by_waves(gains * colour, depth), gains * by_waves(colour, depth), atol=1e-5)
+
+
+def test_data_sets_are_joined(data_folder, tmp_path):
+    manifest = Manifest.read(data_folder)
+    sets = [Scenes(manifest, "train"), Scenes(manifest, "validation")]
+    want = [scenes.scene(i) for scenes in sets for i in range(len(scenes))]
+    whole = Scenes.joined(sets)
+    assert len(whole) == 7 and [each["scenes"] for each in whole.facts["sets"]] == [5, 2]
+    for i, members in enumerate(want):
+        assert all(map(torch.equal, whole.scene(i), members))
+    alone = Scenes(manifest, "train")
+    assert Scenes.joined([alone]) is alone and "sets" not in alone.facts
+
+
+def test_data_sets_for_other_displays_are_not_joined(data_folder, tmp_path):
+    other = tmp_path / "other"
+    shutil.copytree(data_folder, other)
+    table = json.loads((other / "manifest.json").read_text())
+    table["display"]["volume_depth_mm"] = 3.0
+    (other / "manifest.json").write_text(json.dumps(table))
+    with pytest.raises(DataError, match="display"):
+        Scenes.joined([Scenes(Manifest.read(folder), "train") for folder in (data_folder, other)])
 
 
 def test_holes_take_the_nearest_valid_depth():

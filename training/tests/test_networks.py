@@ -80,3 +80,14 @@ def test_heads_mean_what_the_contract_says():
 def test_wrong_architectures_are_refused(wrong):
     with pytest.raises(ValueError):
         Architecture(**wrong)
+
+
+@pytest.mark.parametrize("name", ["ldi0", "ldi1", "ldi10", "ldi12", "ldi23", "ldi²", "ldi"])
+def test_inputs_that_the_core_refuses_are_refused(name):
+    with pytest.raises(ValueError, match="ldi2 to ldi9"):
+        Architecture(8, input=name)
+
+
+@pytest.mark.parametrize("count", range(2, 10))
+def test_layered_inputs_that_the_core_takes_are_taken(count):
+    assert Architecture(8, input=f"ldi{count}").input_channels == 4 * count

@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -113,6 +114,30 @@ def test_commands_train_resume_export_and_evaluate(data_folder, tmp_path, capsys
     told = text.read_text()
     assert "4 layers of 8 filters" in told and "| n.onnx | degraded |" in told and "--layers 4" in told and "50%" in told
     assert main(["plot", str(out), "-o", str(tmp_path / "curves.png")]) == 0 and (tmp_path / "curves.png").stat().st_size > 5000
+
+
+def test_a_training_on_two_data_sets_says_so(data_folder, tmp_path, capsys):
+    other = tmp_path / "other"
+    shutil.copytree(data_folder, other)
+    table = json.loads((other / "manifest.json").read_text()) | {"look": {"like": "photographs"}, "seed": 9}
+    (other / "manifest.json").write_text(json.dumps(table))
+    out, text = tmp_path / "run", tmp_path / "both.md"
+    call = ["stage1", "--data", str(data_folder), str(other), "-o", str(out), "--layers", "4", "--filters", "8", "--crop", "48"]
+    assert main([*call, "--steps", "2", "--dimmed", "0.5"]) == 0
+    assert Checkpoint.load(out / "checkpoint.pt").extra["data"]["scenes"] == 10
+    assert main(["card", str(out / "checkpoint.pt"), "-o", str(text), *figures_of(other, out, tmp_path)]) == 0
+    told = text.read_text()
+    assert "on 5 scenes of 64² pixels, 3 planes, seed 3 and 5 scenes like photographs of 64² pixels, 3 planes, seed 9:" in told
+    assert "--scenes-like photographs" in told and "--data DATA1 DATA2" in told and "--dimmed 0.5" in told
+    assert "On 1 scenes like photographs of the test split" in told
+    assert main([*call, "--steps", "2", "--seeds", str(tmp_path)]) == 1
+    assert "2 data sets and 1 folders of seeds" in capsys.readouterr().err
+
+
+def figures_of(data, run, folder):
+    figures = folder / "figures.json"
+    assert main(["evaluate", str(run / "checkpoint.pt"), "--data", str(data), "--json", str(figures)]) == 0
+    return [str(figures)]
 
 
 def test_wrong_use_is_one_line(data_folder, tmp_path, capsys):

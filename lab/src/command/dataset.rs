@@ -1,9 +1,9 @@
 //! `phasefront dataset`: LDI and hologram pairs, resumable, shardable.
 
 use super::flags::{DisplayFlags, progress_bar};
-use clap::Args;
-use phasefront_lab::dataset::{self, Manifest};
-use phasefront_lab::{Error, Result};
+use clap::{Args, ValueEnum};
+use phasefront_lab::dataset::{self, Look, Manifest};
+use phasefront_lab::{Error, Result, scene};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -28,6 +28,12 @@ pub(crate) struct Dataset {
     /// The same seed gives the same data set
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
+    /// What the scenes look like
+    #[arg(long, value_enum, default_value_t = Like::Objects)]
+    scenes_like: Like,
+    /// Pictures (.jpg, .png) for the surfaces of scenes like photographs; the manifest knows them again
+    #[arg(long, value_name = "DIR")]
+    textures: Option<PathBuf>,
     /// Make every nth pair only, from the ith of 0..n
     #[arg(long, value_name = "I/N", value_parser = parse_shard)]
     shard: Option<(usize, usize)>,
@@ -36,6 +42,14 @@ pub(crate) struct Dataset {
     /// Folder of the data set
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Like {
+    /// Many objects, mostly in front of nothing; dark
+    Objects,
+    /// Bright and dark scenes that fill the frame, with textures, steps of depth and thin things as photographs have
+    Photographs,
 }
 
 fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
@@ -57,6 +71,19 @@ impl Dataset {
                 "a data set holds midpoint holograms; the display's offset must be 0".into(),
             ));
         }
+        let textures = match &self.textures {
+            Some(_) if self.scenes_like == Like::Objects => {
+                return Err(Error::Input(
+                    "--textures is for --scenes-like photographs".into(),
+                ));
+            }
+            Some(folder) => scene::read_photographs(folder)?,
+            None => Vec::new(),
+        };
+        let look = match self.scenes_like {
+            Like::Objects => Look::Objects,
+            Like::Photographs => Look::photographs(&textures),
+        };
         let manifest = Manifest::new(
             self.scenes,
             self.size,
@@ -65,11 +92,12 @@ impl Dataset {
             self.seed,
             display,
         )?
+        .looking(look)
         .correcting(file.aberration.as_ref());
         let shard = self.shard.unwrap_or((0, 1));
         let mine = self.scenes.saturating_sub(shard.0).div_ceil(shard.1);
         let bar = progress_bar(mine as u64, "pairs");
-        dataset::make(&manifest, &self.output, shard, &|| bar.inc(1))?;
+        dataset::make(&manifest, &textures, &self.output, shard, &|| bar.inc(1))?;
         bar.finish_and_clear();
         super::print(
             json,

@@ -1,0 +1,82 @@
+//! Pictures that the surfaces of random scenes show: a folder of the user's own.
+
+use std::path::Path;
+
+use super::Texture;
+use crate::error::{Error, Result};
+use crate::files;
+
+/// What the names of pictures end in.
+const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
+
+/// The pictures (.jpg, .jpeg, .png) in `folder`, in the order of their names.
+///
+/// # Errors
+/// A folder without pictures, or a picture that cannot be read.
+pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<std::io::Result<Vec<_>>>()
+        .map_err(|e| Error::file(folder, e))?;
+    paths.retain(|path| EXTENSIONS.iter().any(|e| files::has_extension(path, e)));
+    paths.sort();
+    if paths.is_empty() {
+        return Err(Error::file(folder, "holds no .jpg, .jpeg or .png file"));
+    }
+    let read = |path: &std::path::PathBuf| {
+        let ((height, width), rgb) = files::read_rgb_bytes(path)?;
+        let texels = rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]);
+        Texture::new(width, height, texels.collect())
+    };
+    paths.iter().map(read).collect()
+}
+
+/// FNV-1a over sizes and texels, by which a data set knows its photographs again.
+pub fn fingerprint(photographs: &[Texture]) -> u64 {
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    let mut take = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    for photograph in photographs {
+        for size in [photograph.width(), photograph.height()] {
+            (size as u64).to_le_bytes().into_iter().for_each(&mut take);
+        }
+        let texels = photograph.texels().iter().flatten();
+        texels.copied().for_each(&mut take);
+    }
+    hash
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn pictures_are_read_by_name_and_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, grey) in [("b.png", 9), ("a.PNG", 200)] {
+            files::write_rgba(&folder.path().join(name), 3, 2, &[grey; 24]).unwrap();
+        }
+        std::fs::write(folder.path().join("LICENCE.txt"), "free").unwrap();
+        let photographs = read_photographs(folder.path()).unwrap();
+        assert_eq!(photographs.len(), 2);
+        assert_eq!(photographs[0].texels()[5][..3], [200; 3]);
+        assert_eq!((photographs[1].width(), photographs[1].height()), (3, 2));
+        let turned = [photographs[1].clone(), photographs[0].clone()];
+        assert_ne!(fingerprint(&photographs), fingerprint(&turned));
+        assert_eq!(fingerprint(&photographs), fingerprint(&photographs.clone()));
+    }
+
+    #[test]
+    fn a_folder_without_whole_pictures_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let refusal = |text: &str| {
+            let error = read_photographs(folder.path()).unwrap_err().to_string();
+            assert!(error.contains(text), "{error}");
+        };
+        refusal("holds no .jpg");
+        std::fs::write(folder.path().join("cut.jpg"), "no picture").unwrap();
+        refusal("cut.jpg");
+    }
+}
