@@ -1,13 +1,12 @@
 import numpy as np
 import onnx
-import onnxruntime
 import pytest
 import torch
 
 from phasefront_training.__main__ import main
 from phasefront_training.checkpoint import load_network
 from phasefront_training.data import Manifest, Scenes
-from phasefront_training.evaluate import evaluate, onnx_predictor, torch_predictor
+from phasefront_training.evaluate import evaluate, onnx_predictor, onnx_session, torch_predictor
 from phasefront_training.export import write
 from phasefront_training.export_int8 import int8_model
 from phasefront_training.networks import Architecture, Chain
@@ -33,7 +32,7 @@ def test_the_int8_file_is_the_rounded_network(architecture, tmp_path):
     quantized = Quantized(chain, calibrate(chain, seen))
     path = tmp_path / "n.onnx"
     write(int8_model(quantized, Display()), path)
-    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    session = onnx_session(path)
     x = torch.rand(1, architecture.input_channels, 21, 34) - 0.5
     with torch.no_grad():
         ours, exact = quantized(x).numpy(), chain(x).numpy()
