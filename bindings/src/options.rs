@@ -224,7 +224,7 @@ impl Method {
 /// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
 /// pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near and
 /// far by percentiles.
-#[uniffi::export]
+#[uniffi::export(default(method = None))]
 pub fn session_options(
     target: Arc<Target>,
     method: Option<Method>,

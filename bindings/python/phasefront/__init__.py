@@ -2,7 +2,7 @@
 
 >>> import numpy, phasefront
 >>> display = phasefront.Display(width=64, height=48)
->>> session = phasefront.Session(phasefront.session_options(display=display))
+>>> session = phasefront.Session(phasefront.session_options(target=display))
 >>> colour = numpy.full((48, 64, 3), 128, numpy.uint8)
 >>> metres = numpy.full((24, 32), 0.5, numpy.float32)
 >>> session.process(phasefront.Frame(colour, metres)).levels.shape
@@ -23,7 +23,6 @@ from .ffi import phasefront_ffi as _ffi
 from .ffi.phasefront_ffi import (
     Backend,
     Brightness,
-    CalibratedDisplay,
     Cameras,
     ColourFormat,
     ConfidenceFormat,
@@ -49,12 +48,12 @@ from .ffi.phasefront_ffi import (
     Quality,
     QualityChange,
     QualityReason,
-    Response,
     Rotation,
     Rung,
     RunningMode,
     SessionOptions,
     Statistics,
+    Target,
     Thermal,
     YuvMatrix,
     built_in_pair,
@@ -63,10 +62,10 @@ from .ffi.phasefront_ffi import (
 )
 
 __all__ = [
-    "Backend", "Brightness", "CalibratedDisplay", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display", "DropReason",
-    "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
+    "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display",
+    "DropReason", "Dropped", "Drops", "Encoding", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo", "Intrinsics", "Layout", "LogLevel",
     "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement", "Pose", "Quality", "QualityChange", "QualityChanged",
-    "QualityReason", "Response", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Thermal",
+    "QualityReason", "Rotation", "Rung", "RunningMode", "Session", "SessionOptions", "Statistics", "Target", "Thermal",
     "YuvMatrix", "built_in_pair", "display_from_toml", "send_log", "session_options", "version",
 ]  # fmt: skip
 
@@ -307,28 +306,19 @@ class _Listener(_ffi.SessionListener):
         self._tell(QualityChanged(timestamp_ns, change))
 
 
-def session_options(method: Network | Method | None = None, display: Display | None = None, **changes) -> SessionOptions:
-    """What is usual: holograms of the display's resolution by the pair of networks that is built in for its offset, or by a
-    network or another method and AA-DPM; levels in equal steps, steady brightness, near and far by percentiles. `changes` are
-    fields of `SessionOptions`."""
-    display = display or Display()
-    if method is None:
-        pair = built_in_pair(display.offset_mm)
-        return session_options(pair.hologram, display, **({"encoding": Encoding.DEEP(prefilter=pair.prefilter)} | changes))
-    method = Method.TRAINED(network=method) if isinstance(method, Network) else method
-    usual = {
-        "display": display,
-        "ladder": [Rung(method=method, width=display.width, height=display.height)],
-        "quality": Quality.ADAPTIVE(),
-        "target_rate_hz": None,
-        "encoding": Encoding.ANTI_ALIAS(sigma=0.7, width=3),
-        "response": Response.LINEAR(),
-        "brightness": Brightness.STEADY(),
-        "depth_range": DepthRange.PERCENTILES(),
-        "least_confidence": 0.25,
-        "threads": None,
-    }
-    return SessionOptions(**(usual | changes))
+def session_options(
+    method: Network | Method | None = None, target: Display | Target | None = None, **changes
+) -> SessionOptions:
+    """What is usual for `target`, a display or a calibrated one: holograms of its resolution by a network or another method
+    and AA-DPM, or, without one, by the pair of networks that is built in for the display, by the plane sweep where there is
+    none. `changes` are fields of `SessionOptions`.
+
+    Raises `PhasefrontError.Display` for a display that cannot be."""
+    if not isinstance(target, Target):
+        target = Target.of_display(Display() if target is None else target)
+    if isinstance(method, Network):
+        method = Method.TRAINED(network=method)
+    return SessionOptions(**(vars(_ffi.session_options(target, method)) | changes))
 
 
 class Session:

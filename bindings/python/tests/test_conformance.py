@@ -8,7 +8,6 @@ from conftest import SUITE
 
 from phasefront import (
     Brightness,
-    CalibratedDisplay,
     ColourFormat,
     ConfidenceFormat,
     DepthFormat,
@@ -18,10 +17,10 @@ from phasefront import (
     Method,
     Network,
     Orientation,
-    Response,
     Rotation,
     RunningMode,
     Session,
+    Target,
     YuvMatrix,
     display_from_toml,
     session_options,
@@ -88,20 +87,23 @@ def model(file):
     return Network.from_file(str(SUITE / "../../models" / file))
 
 
+def target_of(case):
+    if case["calibration"] is not None:
+        return Target.from_file(str(SUITE / case["calibration"]))
+    display = display_from_toml(case["display"])
+    return display if case["lut"] is None else Target.with_look_up_table(display, bytes(case["lut"]))
+
+
 def levels_of(case, memory, network):
     encoding = case["encoding"]
     changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
-    if case["calibration"] is not None:
-        changes["calibration"] = CalibratedDisplay.from_file(str(SUITE / case["calibration"]))
-    if case["lut"] is not None:
-        changes["response"] = Response.LUT(levels=bytes(case["lut"]))
     if case["brightness"] is not None:
         changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
     methods = {"network": network, "sweep": Method.SWEEP(), "by-sharpness": Method.BY_SHARPNESS(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
-    options = session_options(method, display_from_toml(case["display"]), **changes)
+    options = session_options(method, target_of(case), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]
     with Session(options, mode) as session:
         return b"".join(session.process(frame_of(frame, memory)).levels.tobytes() for frame in case["frames"])

@@ -17,11 +17,13 @@ from phasefront import (
     Frame,
     LogLevel,
     Made,
+    Method,
     Network,
     PhasefrontError,
     Quality,
     RunningMode,
     Session,
+    Target,
     session_options,
 )
 
@@ -250,13 +252,39 @@ def test_networks_that_are_none_are_named(tmp_path):
 def test_the_pair_that_is_built_in_is_usual():
     for offset_mm in (0, 6, 12):
         display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
-        options = session_options(display=display)
+        options = session_options(target=display)
         assert isinstance(options.encoding, Encoding.DEEP)
         with Session(options) as session:
             frame = Frame(numpy.full((48, 64, 3), 200, numpy.uint8), numpy.ones((48, 64), numpy.float32))
             assert session.process(frame).levels.shape == (3, 48, 64)
+
+
+def test_without_a_pair_the_sweep_is_usual():
+    options = session_options(target=phasefront.Display(width=64, height=48, offset_mm=3))
+    assert isinstance(options.ladder[0].method, Method.SWEEP)
+    with Session(options) as session:
+        assert session.process(still()).levels.shape == (3, 48, 64)
     with pytest.raises(PhasefrontError.Network, match="pairs for 0, 6 and 12"):
-        session_options(display=phasefront.Display(offset_mm=3))
+        phasefront.built_in_pair(3)
+
+
+def test_targets_that_cannot_be_are_named(display, tmp_path):
+    with pytest.raises(PhasefrontError.Display, match="pitch_um"):
+        session_options(target=phasefront.Display(pitch_um=-1.0))
+    with pytest.raises(PhasefrontError.Setting, match="3 levels"):
+        Target.with_look_up_table(display, b"abc")
+    with pytest.raises(PhasefrontError.File, match="nowhere.pfc"):
+        Target.from_file(str(tmp_path / "nowhere.pfc"))
+    with pytest.raises(PhasefrontError.Setting, match="calibration"):
+        Target.from_bytes(b"not a calibration")
+
+
+def test_a_target_is_taken_as_its_display_is(display):
+    options = session_options(target=Target.with_look_up_table(display, bytes(range(256))))
+    assert options.target.display() == display
+    # The table is that of equal steps.
+    with Session(options) as by_table, Session(session_options(target=display)) as linear:
+        numpy.testing.assert_array_equal(by_table.process(still()).levels, linear.process(still()).levels)
 
 
 def test_settings_that_cannot_be_meant_are_named(network, display):
@@ -265,12 +293,10 @@ def test_settings_that_cannot_be_meant_are_named(network, display):
         ({"threads": 0}, "0 threads"),
         ({"target_rate_hz": float("nan")}, "target rate"),
         ({"quality": Quality.FIXED(rung=3)}, "no rung 3"),
-        ({"response": phasefront.Response.LUT(levels=b"abc")}, "3 levels"),
+        ({"target": Target.of_display(phasefront.Display(width=32, height=24))}, "the modulator's 32×24"),
     ]:
         with pytest.raises(PhasefrontError.Setting, match=words):
             Session(session_options(network, display, **changes))
-    with pytest.raises(PhasefrontError.Display, match="pitch_um"):
-        Session(session_options(network, phasefront.Display(pitch_um=-1.0)))
     with pytest.raises(PhasefrontError.Network, match="pitch"):
         Session(session_options(network, phasefront.Display(width=64, height=48, pitch_um=3.74)))
 

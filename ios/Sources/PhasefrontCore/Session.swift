@@ -90,32 +90,27 @@ public final class Session: Sendable {
 }
 
 extension SessionOptions {
-    /// What is usual: holograms of `display`'s resolution by the pair of networks that is built in for its offset; levels in
-    /// equal steps, steady brightness, near and far by percentiles. Change what is not.
-    public init(display: Display = Display()) throws {
-        let pair = try builtInPair(offsetMm: display.offsetMm)
-        self.init(display: display, network: pair.hologram)
-        encoding = .deep(prefilter: pair.prefilter)
+    /// What is usual for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the pair of
+    /// networks that is built in for it, by the plane sweep where there is none. Change what is not.
+    ///
+    /// - Throws: ``PhasefrontError/Display(message:)`` for a display that cannot be.
+    public init(display: Display = Display(), method: Method? = nil) throws {
+        try self.init(target: Target.ofDisplay(display: display), method: method)
     }
 
-    /// The same by `network` alone, and AA-DPM.
-    public init(display: Display = Display(), network: Network) {
-        self.init(display: display, method: .trained(network: network))
+    /// The same by `network`.
+    public init(display: Display = Display(), network: Network) throws {
+        try self.init(display: display, method: .trained(network: network))
     }
 
-    /// The same by `method`, and AA-DPM.
-    public init(display: Display = Display(), method: Method) {
-        self.init(
-            display: display,
-            ladder: [Rung(method: method, width: display.width, height: display.height)],
-            quality: .adaptive,
-            targetRateHz: nil,
-            encoding: .antiAlias(sigma: 0.7, width: 3),
-            response: .linear,
-            brightness: .steady,
-            depthRange: .percentiles,
-            leastConfidence: 0.25,
-            threads: nil)
+    /// The same for `target`, a display that is calibrated.
+    public init(target: Target, method: Method? = nil) throws {
+        self = try sessionOptions(target: target, method: method)
+    }
+
+    /// The same for `target` by `network`.
+    public init(target: Target, network: Network) throws {
+        try self.init(target: target, method: .trained(network: network))
     }
 }
 

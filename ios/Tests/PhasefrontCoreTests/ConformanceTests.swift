@@ -106,13 +106,18 @@ final class ConformanceTests: XCTestCase {
         }
     }
 
-    private func levels(_ one: Case, _ frames: Data) throws -> Data {
-        var options = SessionOptions(display: try displayFromToml(text: one.display), method: try method(one.method))
-        options.encoding = try encoding(one.encoding)
-        options.calibration = try one.calibration.map {
-            try CalibratedDisplay.fromFile(path: Self.root.appendingPathComponent("tests/conformance/\($0)").path)
+    private func target(_ one: Case) throws -> Target {
+        if let file = one.calibration {
+            return try Target.fromFile(path: Self.root.appendingPathComponent("tests/conformance/\(file)").path)
         }
-        if let lut = one.lut { options.response = .lut(levels: Data(lut)) }
+        let display = try displayFromToml(text: one.display)
+        guard let levels = one.lut else { return try Target.ofDisplay(display: display) }
+        return try Target.withLookUpTable(display: display, levels: Data(levels))
+    }
+
+    private func levels(_ one: Case, _ frames: Data) throws -> Data {
+        var options = try SessionOptions(target: target(one), method: method(one.method))
+        options.encoding = try encoding(one.encoding)
         if let scale = one.brightness { options.brightness = .fixed(scale: scale) }
         if let range = one.range { options.depthRange = .fixed(nearM: range[0], farM: range[1]) }
         let session = try Session(options, mode: try XCTUnwrap(Self.modes[one.mode]))

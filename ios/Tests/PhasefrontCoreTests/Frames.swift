@@ -5,7 +5,7 @@ import Foundation
 let network = Result { try Network.builtIn() }
 let smallDisplay = Display(width: 64, height: 48)
 
-func options() throws -> SessionOptions { SessionOptions(display: smallDisplay, network: try network.get()) }
+func options() throws -> SessionOptions { try SessionOptions(display: smallDisplay, network: network.get()) }
 
 /// RGBA of 64×48 with something in it.
 func colourBytes() -> Data {

@@ -251,10 +251,27 @@ final class SessionTests: XCTestCase {
         assertRefused("0 threads", make { $0.threads = 0 })
         assertRefused("target rate", make { $0.targetRateHz = .nan })
         assertRefused("no rung 3", make { $0.quality = .fixed(rung: 3) })
-        assertRefused("3 levels", make { $0.response = .lut(levels: Data([1, 2, 3])) })
-        assertRefused("pitch_um", make { $0.display = Display(pitchUm: -1) })
-        assertRefused("pitch", make { $0.display = Display(width: 64, height: 48, pitchUm: 3.74) })
+        let fine = try Target.ofDisplay(display: Display(width: 64, height: 48, pitchUm: 3.74))
+        assertRefused("pitch") { try Session(SessionOptions(target: fine, network: network.get()), mode: .image) }
+        let tiny = try Target.ofDisplay(display: Display(width: 32, height: 24))
+        assertRefused("the modulator's 32×24", make { $0.target = tiny })
         assertRefused("line 1") { try displayFromToml(text: "width = ") }
+    }
+
+    func testTargetsThatCannotBeAreNamed() throws {
+        assertRefused("pitch_um") { try SessionOptions(display: Display(pitchUm: -1)) }
+        assertRefused("3 levels") { try Target.withLookUpTable(display: smallDisplay, levels: Data([1, 2, 3])) }
+        assertRefused("nowhere.pfc") { try Target.fromFile(path: "/nowhere.pfc") }
+        assertRefused("calibration") { try Target.fromBytes(file: Data("not a calibration".utf8)) }
+    }
+
+    func testATargetIsTakenAsItsDisplayIs() throws {
+        let target = try Target.withLookUpTable(display: smallDisplay, levels: Data(0...255))
+        let options = try SessionOptions(target: target)
+        XCTAssertEqual(try options.target.display(), smallDisplay)
+        let levels = try Session(options, mode: .image).process(still()).levels()
+        // The table is that of equal steps.
+        XCTAssertEqual(try Session(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
     }
 
     func testThePairThatIsBuiltInIsUsual() throws {
@@ -263,7 +280,13 @@ final class SessionTests: XCTestCase {
             guard case .deep = usual.encoding else { return XCTFail("\(usual.encoding)") }
             _ = try Session(usual, mode: .image).process(still())
         }
-        assertRefused("pairs for 0, 6 and 12") { try SessionOptions(display: Display(offsetMm: 3)) }
+    }
+
+    func testWithoutAPairTheSweepIsUsual() throws {
+        let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: 3))
+        guard case .sweep = usual.ladder[0].method else { return XCTFail("\(usual.ladder)") }
+        _ = try Session(usual, mode: .image).process(still())
+        assertRefused("pairs for 0, 6 and 12") { try builtInPair(offsetMm: 3) }
     }
 
     func testMessagesReachTheLog() throws {

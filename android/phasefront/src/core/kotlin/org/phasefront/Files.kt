@@ -12,11 +12,11 @@ public fun Network.Companion.fromBytes(onnx: ByteBuffer): Network = fromMemory(
 )
 
 /**
- * Reads the calibration of a display from the bytes of a file of `phasefront calibrate pack`: those of [file], a direct
- * buffer, from its position to its limit.
+ * Reads a calibrated display from the bytes of a file of `phasefront calibrate pack`: those of [file], a direct buffer, from
+ * its position to its limit.
  *
  * @throws PhasefrontException.Setting for what is not such a file, with what is not so.
  */
-public fun CalibratedDisplay.Companion.fromBytes(file: ByteBuffer): CalibratedDisplay = fromMemory(
+public fun Target.Companion.fromBytes(file: ByteBuffer): Target = fromMemory(
     file.direct { PhasefrontException.Setting("calibration file: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
 )

@@ -126,31 +126,20 @@ public sealed interface SessionEvent {
 }
 
 /**
- * What is usual: holograms of [display]'s resolution by the pair of networks that is built in for its offset; levels in
- * equal steps, steady brightness, near and far by percentiles. Change what is not with `copy`.
+ * What is usual for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the pair of networks
+ * that is built in for it, by the plane sweep where there is none. Change what is not with `copy`.
+ *
+ * @throws PhasefrontException.Display for a display that cannot be.
  */
-public fun sessionOptions(display: Display = Display()): SessionOptions {
-    val pair = builtInPair(display.offsetMm)
-    return sessionOptions(pair.hologram, display).copy(encoding = Encoding.Deep(pair.prefilter))
-}
+public fun sessionOptions(display: Display = Display(), method: Method? = null): SessionOptions =
+    Target.ofDisplay(display).use { sessionOptions(it, method) }
 
-/** The same by [network] alone, and AA-DPM. */
-public fun sessionOptions(network: Network, display: Display = Display()): SessionOptions =
-    sessionOptions(Method.Trained(network), display)
+/** The same by [network]. */
+public fun sessionOptions(display: Display = Display(), network: Network): SessionOptions =
+    sessionOptions(display, Method.Trained(network))
 
-/** The same by [method], and AA-DPM. */
-public fun sessionOptions(method: Method, display: Display = Display()): SessionOptions = SessionOptions(
-    display = display,
-    ladder = listOf(Rung(method, display.width, display.height)),
-    quality = Quality.Adaptive,
-    targetRateHz = null,
-    encoding = Encoding.AntiAlias(0.7f, 3u),
-    response = Response.Linear,
-    brightness = Brightness.Steady,
-    depthRange = DepthRange.Percentiles,
-    leastConfidence = 0.25f,
-    threads = null,
-)
+/** The same for [target], a display that is calibrated, by [network]. */
+public fun sessionOptions(target: Target, network: Network): SessionOptions = sessionOptions(target, Method.Trained(network))
 
 /** Passes the library's calls on. */
 private class Listener(private val tell: (SessionEvent) -> Unit) : SessionListener {

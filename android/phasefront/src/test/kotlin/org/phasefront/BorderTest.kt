@@ -22,7 +22,7 @@ class BorderTest {
                 direct(4 * 256 * 192).apply { while (hasRemaining()) putFloat(0.5f + position() * 1e-6f) }.flip(),
             ),
         )
-        Session(sessionOptions(network), RunningMode.IMAGE).use { session ->
+        Session(sessionOptions(network = network), RunningMode.IMAGE).use { session ->
             val levels = ByteArray(1920 * 1080)
             val added = MutableList(System.getenv("PHASEFRONT_BORDER").toInt() + 5) {
                 val start = System.nanoTime()

@@ -85,23 +85,23 @@ class ConformanceTest {
 
     private fun model(file: String): Network = Network.fromFile(folder.resolve("../../models/$file").path)
 
-    private fun options(case: JSONObject): SessionOptions = sessionOptions(method(case), displayFromToml(case.getString("display"))).copy(
+    private fun target(case: JSONObject): Target {
+        if (!case.isNull("calibration")) return Target.fromFile(folder.resolve(case.getString("calibration")).path)
+        val display = displayFromToml(case.getString("display"))
+        val levels = case.optJSONArray("lut") ?: return Target.ofDisplay(display)
+        return Target.withLookUpTable(display, ByteArray(levels.length()) { levels.getInt(it).toByte() })
+    }
+
+    private fun options(case: JSONObject): SessionOptions = sessionOptions(target(case), method(case)).copy(
         encoding = when (val name = case.getString("encoding")) {
             "double-phase" -> Encoding.DoublePhase
             "anti-alias" -> Encoding.AntiAlias(0.7f, 3u)
             "band-limit" -> Encoding.BandLimit(1.0f)
             else -> Encoding.Deep(model(name))
         },
-        response = case.optJSONArray("lut")?.let { lut -> Response.Lut(ByteArray(lut.length()) { lut.getInt(it).toByte() }) }
-            ?: Response.Linear,
         brightness = if (case.isNull("brightness")) Brightness.Steady else Brightness.Fixed(case.getDouble("brightness").toFloat()),
         depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
             ?: DepthRange.Percentiles,
-        calibration = if (case.isNull("calibration")) {
-            null
-        } else {
-            CalibratedDisplay.fromFile(folder.resolve(case.getString("calibration")).path)
-        },
     )
 
     private fun levels(case: JSONObject): ByteArray =

@@ -9,7 +9,7 @@ internal fun direct(size: Int): ByteBuffer = ByteBuffer.allocateDirect(size).ord
 internal val network: Network by lazy { Network.builtIn() }
 internal val display: Display = Display(width = 64u, height = 48u)
 
-internal fun options(): SessionOptions = sessionOptions(network, display)
+internal fun options(): SessionOptions = sessionOptions(display, network)
 
 /** RGBA of 64×48 with something in it. */
 internal fun colourBytes(): ByteBuffer {

@@ -289,7 +289,33 @@ class SessionTest {
             assertTrue(usual.encoding is Encoding.Deep)
             Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         }
-        assertRefused<PhasefrontException.Network>("pairs for 0, 6 and 12") { sessionOptions(display.copy(offsetMm = 3.0)) }
+    }
+
+    @Test
+    fun withoutAPairTheSweepIsUsual() {
+        val usual = sessionOptions(display.copy(offsetMm = 3.0))
+        assertIs<Method.Sweep>(usual.ladder[0].method)
+        Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+        assertRefused<PhasefrontException.Network>("pairs for 0, 6 and 12") { builtInPair(3.0) }
+    }
+
+    @Test
+    fun targetsThatCannotBeAreNamed() {
+        assertRefused<PhasefrontException.Display>("pitch_um") { sessionOptions(display.copy(pitchUm = -1.0)) }
+        assertRefused<PhasefrontException.Setting>("3 levels") { Target.withLookUpTable(display, ByteArray(3)) }
+        assertRefused<PhasefrontException.File>("nowhere.pfc") { Target.fromFile("/nowhere.pfc") }
+        assertRefused<PhasefrontException.Setting>("calibration") { Target.fromBytes(direct(8)) }
+        assertRefused<PhasefrontException.Setting>("allocateDirect") { Target.fromBytes(ByteBuffer.allocate(8)) }
+    }
+
+    @Test
+    fun aTargetIsTakenAsItsDisplayIs() {
+        val target = Target.withLookUpTable(display, ByteArray(256) { it.toByte() })
+        val options = sessionOptions(target)
+        assertEquals(display, options.target.display())
+        fun levels(options: SessionOptions) = Session(options, RunningMode.IMAGE).use { it.process(still()).use { made -> made.levels() } }
+        // The table is that of equal steps.
+        assertContentEquals(levels(sessionOptions(display)), levels(options))
     }
 
     @Test
@@ -299,9 +325,10 @@ class SessionTest {
         assertRefused<PhasefrontException.Setting>("0 threads", make { copy(threads = 0u) })
         assertRefused<PhasefrontException.Setting>("target rate", make { copy(targetRateHz = Double.NaN) })
         assertRefused<PhasefrontException.Setting>("no rung 3", make { copy(quality = Quality.Fixed(3u)) })
-        assertRefused<PhasefrontException.Setting>("3 levels", make { copy(response = Response.Lut(ByteArray(3))) })
-        assertRefused<PhasefrontException.Display>("pitch_um", make { copy(display = display.copy(pitchUm = -1.0)) })
-        assertRefused<PhasefrontException.Network>("pitch", make { copy(display = display.copy(pitchUm = 3.74)) })
+        val fine = Target.ofDisplay(display.copy(pitchUm = 3.74))
+        assertRefused<PhasefrontException.Network>("pitch") { Session(sessionOptions(fine, network), RunningMode.IMAGE) }
+        val tiny = Target.ofDisplay(Display(width = 32u, height = 24u))
+        assertRefused<PhasefrontException.Setting>("the modulator's 32×24", make { copy(target = tiny) })
         assertRefused<PhasefrontException.Display>("line 1") { displayFromToml("width = ") }
     }
 

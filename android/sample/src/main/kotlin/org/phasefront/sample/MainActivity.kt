@@ -20,7 +20,6 @@ import android.widget.Toast
 import org.phasefront.Display
 import org.phasefront.Hologram
 import org.phasefront.Log
-import org.phasefront.Network
 import org.phasefront.PhasefrontException
 import org.phasefront.RunningMode
 import org.phasefront.Session
