@@ -26,7 +26,7 @@ install() {
     as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1
 }
 
-# Builds the whole workspace, for a part of it alone has other features and builds tract anew (10 minutes; never use -p).
+# Builds the whole workspace, for a part of it alone has other features and builds tract anew (never use -p).
 # Runs the conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`.
 build_library() {
     [ -e tests/conformance/cases.json ] && [ -e ios/Generated/PhasefrontFFI.h ] ||

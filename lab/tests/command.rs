@@ -1,6 +1,8 @@
 //! The command as a user runs it: what it makes, and one line for each thing that is wrong.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../tests/driver.rs"]
+mod driver;
 mod folder;
 
 use folder::Folder;
@@ -613,7 +615,7 @@ fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> Option<serde_json::Valu
     // Drivers write to stderr where no desktop runs.
     let errors = String::from_utf8(made.stderr).unwrap();
     if errors.contains("no GPU") {
-        println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        driver::or_skip::<(), _>(Err(errors.trim_end()));
         return None;
     }
     assert!(made.status.success(), "{errors}");

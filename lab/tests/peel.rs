@@ -1,6 +1,9 @@
 //! Depth peeling on a GPU, or on a software driver, against the renderer on the CPU.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../tests/driver.rs"]
+mod driver;
+
 use std::sync::Arc;
 
 use phasefront_lab::ldi::Ldi;
@@ -10,13 +13,7 @@ use phasefront_lab::scene::{
 
 /// A peeler, or none where there is no GPU and no software driver.
 fn peeler() -> Option<DepthPeeler> {
-    match DepthPeeler::new() {
-        Ok(peeler) => Some(peeler),
-        Err(why) => {
-            println!("skipped: {why}");
-            None
-        }
-    }
+    driver::or_skip(DepthPeeler::new())
 }
 
 /// Depth and colour.

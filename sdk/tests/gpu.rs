@@ -2,6 +2,8 @@
 #![cfg(feature = "gpu")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../tests/driver.rs"]
+mod driver;
 mod network_models;
 
 use ndarray::{Array2, Array3};
@@ -23,19 +25,16 @@ use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
 fn device() -> Option<Arc<Device>> {
-    static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
+    static DEVICE: OnceLock<Result<Arc<Device>, gpu::GpuError>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
         let software = DeviceOptions {
             name: Some("llvmpipe".into()),
             ..Default::default()
         };
         let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
-        opened.ok().map(Arc::new)
+        opened.map(Arc::new)
     });
-    if opened.is_none() {
-        println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
-    }
-    opened.clone()
+    driver::or_skip(opened.as_ref()).cloned()
 }
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {

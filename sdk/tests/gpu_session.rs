@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
+#[path = "../../tests/driver.rs"]
+mod driver;
 
 use camera::{Scene, colour_formats, depth, frame, options};
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
@@ -20,20 +22,18 @@ const H: usize = 48;
 
 /// The options of the tests on the GPU; none where there is no driver, which is said.
 fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
-    for name in [None, Some("llvmpipe".to_owned())] {
+    let open = |name| {
         let device = DeviceOptions {
             name,
             programs: None,
         };
-        if phasefront::unstable::gpu::Device::open(&device).is_ok() {
-            let mut options = options;
-            options.backend = Backend::Gpu;
-            options.gpu.device = device;
-            return Some(options);
-        }
-    }
-    println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
-    None
+        phasefront::unstable::gpu::Device::open(&device).map(|_| device)
+    };
+    let device = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into()))))?;
+    let mut options = options;
+    options.backend = Backend::Gpu;
+    options.gpu.device = device;
+    Some(options)
 }
 
 /// Compares levels around the circle of `steps`: gives the share that differs, and asserts that none does by over one
