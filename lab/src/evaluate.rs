@@ -20,7 +20,7 @@ use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
 use phasefront::unstable::modulator::{Modulator, remove_mean_phase};
 use phasefront::unstable::network::InputKind;
-use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::seeded::SeededPlan;
 use phasefront::unstable::sweep::{
     SweepPlan,
@@ -28,7 +28,7 @@ use phasefront::unstable::sweep::{
     hidden_reach,
 };
 use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Network, Refocus, RgbdFrame, Sweep, Target,
+    Brightness, Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target,
 };
 use rayon::prelude::*;
 use serde::Serialize;

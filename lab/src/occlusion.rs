@@ -19,8 +19,9 @@ use crate::point_based::{self, Occlusion};
 use crate::sm_lbm::{self, plane_of_depth, plane_z_m};
 use ndarray::{Array2, Array3, Axis, Zip, s};
 use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::unstable::refocus::Refocus;
 use phasefront::unstable::wave::asm;
-use phasefront::{Display, Refocus};
 use serde::Serialize;
 
 /// How light is kept from where it should not go.

@@ -5,10 +5,10 @@ use crate::error::{Error, Result};
 use crate::files::{DisplayFile, Hologram, HologramInfo};
 use ndarray::Array3;
 use num_complex::Complex32;
+use phasefront::Display;
 use phasefront::target::Aberration;
-use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::wave::asm::Propagator;
-use phasefront::{Display, Refocus};
 
 /// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
 pub const APERTURE_RADIUS: f64 = 1.0;

@@ -167,6 +167,11 @@ pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     }
 }
 
+/// The README's code compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]

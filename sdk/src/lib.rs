@@ -40,7 +40,6 @@
 //! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
 //! | [`Pipeline`] | one frame through all stages, by hand |
 //! | [`output`] | levels to the images that a modulator takes |
-//! | [`Refocus`] | what an eye focused at z sees |
 //! | [`unstable`] | what the laboratory and the tests need; it changes without notice |
 //!
 //! The networks that come along are in the crate `phasefront-models`.
@@ -102,12 +101,6 @@ pub use frame::RgbdFrame;
 pub use method::Method;
 pub use network::Network;
 pub use pipeline::{FrameReport, Pipeline, PipelineScratch, StageTimes};
-pub use refocus::Refocus;
 pub use session::{Hologram, Session, SessionOptions};
 pub use sweep::Sweep;
 pub use target::Target;
-
-/// The README's code compiles.
-#[cfg(doctest)]
-#[doc = include_str!("../../README.md")]
-struct Readme;

@@ -10,7 +10,7 @@ use network_models::Model;
 use phasefront::target::{Aberration, Illumination, PerPixel, Response};
 use phasefront::unstable::encode::{Encoder, anti_alias::AntiAlias, double_phase};
 use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::refocus::phase_only_field;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::slm::per_pixel;
 use phasefront::unstable::wave;
 use phasefront::unstable::wave::{
@@ -18,8 +18,7 @@ use phasefront::unstable::wave::{
     asm::{self, Padding, Propagator},
 };
 use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, Refocus, RgbdFrame,
-    Target,
+    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target,
 };
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};

@@ -41,7 +41,6 @@ const FRONT: &[(&str, &str)] = &[
     ("Method", "method"),
     ("Network", "network"),
     ("Pipeline", "pipeline"),
-    ("Refocus", "refocus"),
     ("Session", "session"),
     ("SessionOptions", "session"),
     ("Sweep", "sweep"),
