@@ -640,167 +640,6 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
- * A display as it was calibrated: its modulator, its laser, its optics. Immutable; one serves many sessions.
- */
-public protocol CalibratedDisplayProtocol: AnyObject, Sendable {
-    
-    /**
-     * The display itself.
-     */
-    func display() throws  -> Display
-    
-}
-/**
- * A display as it was calibrated: its modulator, its laser, its optics. Immutable; one serves many sessions.
- */
-open class CalibratedDisplay: CalibratedDisplayProtocol, @unchecked Sendable {
-    fileprivate let handle: UInt64
-
-    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public struct NoHandle {
-        public init() {}
-    }
-
-    // TODO: We'd like this to be `private` but for Swifty reasons,
-    // we can't implement `FfiConverter` without making this `required` and we can't
-    // make it `required` without making it `public`.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    required public init(unsafeFromHandle handle: UInt64) {
-        self.handle = handle
-    }
-
-    // This constructor can be used to instantiate a fake object.
-    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
-    //
-    // - Warning:
-    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public init(noHandle: NoHandle) {
-        self.handle = 0
-    }
-
-#if swift(>=5.8)
-    @_documentation(visibility: private)
-#endif
-    public func uniffiCloneHandle() -> UInt64 {
-        return try! rustCall { uniffi_phasefront_ffi_fn_clone_calibrateddisplay(self.handle, $0) }
-    }
-    // No primary constructor declared for this class.
-
-    deinit {
-        if handle == 0 {
-            // Mock objects have handle=0 don't try to free them
-            return
-        }
-
-        try! rustCall { uniffi_phasefront_ffi_fn_free_calibrateddisplay(handle, $0) }
-    }
-
-    
-    /**
-     * Reads the file's bytes.
-     *
-     * # Errors
-     * What is not such a file, with what is not so.
-     */
-public static func fromBytes(file: Data)throws  -> CalibratedDisplay  {
-    return try  FfiConverterTypeCalibratedDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-        FfiConverterByRefBytes.lower(file) { fileFb in
-    uniffi_phasefront_ffi_fn_constructor_calibrateddisplay_from_bytes(
-        fileFb,uniffiCallStatus
-    )
-        }
-})
-}
-    
-    /**
-     * Reads the file.
-     *
-     * # Errors
-     * A file that cannot be read; as [`Self::from_bytes`].
-     */
-public static func fromFile(path: String)throws  -> CalibratedDisplay  {
-    return try  FfiConverterTypeCalibratedDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_calibrateddisplay_from_file(
-        FfiConverterString.lower(path),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-    /**
-     * The display itself.
-     */
-open func display()throws  -> Display  {
-    return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
-        uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_calibrateddisplay_display(
-            self.uniffiCloneHandle(),uniffiCallStatus
-    )
-})
-}
-    
-
-    
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypeCalibratedDisplay: FfiConverter {
-    typealias FfiType = UInt64
-    typealias SwiftType = CalibratedDisplay
-
-    public static func lift(_ handle: UInt64) throws -> CalibratedDisplay {
-        return CalibratedDisplay(unsafeFromHandle: handle)
-    }
-
-    public static func lower(_ value: CalibratedDisplay) -> UInt64 {
-        return value.uniffiCloneHandle()
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> CalibratedDisplay {
-        let handle: UInt64 = try readInt(&buf)
-        return try lift(handle)
-    }
-
-    public static func write(_ value: CalibratedDisplay, into buf: inout [UInt8]) {
-        writeInt(&buf, lower(value))
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeCalibratedDisplay_lift(_ handle: UInt64) throws -> CalibratedDisplay {
-    return try FfiConverterTypeCalibratedDisplay.lift(handle)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeCalibratedDisplay_lower(_ value: CalibratedDisplay) -> UInt64 {
-    return FfiConverterTypeCalibratedDisplay.lower(value)
-}
-
-
-
-
-
-
-/**
  * Hears log messages, on any thread.
  */
 public protocol LogListener: AnyObject, Sendable {
@@ -2364,6 +2203,200 @@ public func FfiConverterTypeSessionListener_lift(_ handle: UInt64) throws -> Ses
 #endif
 public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> UInt64 {
     return FfiConverterTypeSessionListener.lower(value)
+}
+
+
+
+
+
+
+/**
+ * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its lasers'
+ * light, what corrects its optics. Immutable; one serves many sessions.
+ */
+public protocol TargetProtocol: AnyObject, Sendable {
+    
+    /**
+     * The display itself.
+     */
+    func display() throws  -> Display
+    
+}
+/**
+ * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its lasers'
+ * light, what corrects its optics. Immutable; one serves many sessions.
+ */
+open class Target: TargetProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_target(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_target(handle, $0) }
+    }
+
+    
+    /**
+     * Reads the bytes of a calibration's file, as `phasefront calibrate pack` writes it.
+     *
+     * # Errors
+     * What is not such a file, with what is not so.
+     */
+public static func fromBytes(file: Data)throws  -> Target  {
+    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+        FfiConverterByRefBytes.lower(file) { fileFb in
+    uniffi_phasefront_ffi_fn_constructor_target_from_bytes(
+        fileFb,uniffiCallStatus
+    )
+        }
+})
+}
+    
+    /**
+     * Reads a calibration's file.
+     *
+     * # Errors
+     * A file that cannot be read; as [`Self::from_bytes`].
+     */
+public static func fromFile(path: String)throws  -> Target  {
+    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_target_from_file(
+        FfiConverterString.lower(path),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * A display with levels in equal steps of phase, as many as its bits have.
+     *
+     * # Errors
+     * A display that cannot be.
+     */
+public static func ofDisplay(display: Display)throws  -> Target  {
+    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_target_of_display(
+        FfiConverterTypeDisplay_lower(display),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+     *
+     * # Errors
+     * A display that cannot be, or another number of levels.
+     */
+public static func withLookUpTable(display: Display, levels: Data)throws  -> Target  {
+    return try  FfiConverterTypeTarget_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_constructor_target_with_look_up_table(
+        FfiConverterTypeDisplay_lower(display),
+        FfiConverterData.lower(levels),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+    /**
+     * The display itself.
+     */
+open func display()throws  -> Display  {
+    return try  FfiConverterTypeDisplay_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_target_display(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeTarget: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = Target
+
+    public static func lift(_ handle: UInt64) throws -> Target {
+        return Target(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: Target) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Target {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: Target, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeTarget_lift(_ handle: UInt64) throws -> Target {
+    return try FfiConverterTypeTarget.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeTarget_lower(_ value: Target) -> UInt64 {
+    return FfiConverterTypeTarget.lower(value)
 }
 
 
@@ -4063,13 +4096,13 @@ public func FfiConverterTypeRung_lower(_ value: Rung) -> RustBuffer {
 
 
 /**
- * What a session makes, and how.
+ * What a session makes, and how. [`session_options`] has what is usual; change what is not.
  */
 public struct SessionOptions {
     /**
-     * The display.
+     * What holograms are for.
      */
-    public var display: Display
+    public var target: Target
     /**
      * Qualities, the best first; at least one.
      */
@@ -4087,10 +4120,6 @@ public struct SessionOptions {
      */
     public var encoding: Encoding
     /**
-     * What the modulator answers to a phase.
-     */
-    public var response: Response
-    /**
      * Which amplitude full light stands for.
      */
     public var brightness: Brightness
@@ -4107,20 +4136,16 @@ public struct SessionOptions {
      */
     public var threads: UInt32?
     /**
-     * The display's calibration, which brings its own response.
+     * Where frames are computed.
      */
-    public var calibration: CalibratedDisplay?
-    /**
-     * Where frames are computed; none for the CPU.
-     */
-    public var backend: Backend?
+    public var backend: Backend
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
     public init(
         /**
-         * The display.
-         */display: Display, 
+         * What holograms are for.
+         */target: Target, 
         /**
          * Qualities, the best first; at least one.
          */ladder: [Rung], 
@@ -4134,9 +4159,6 @@ public struct SessionOptions {
          * How the field becomes phases.
          */encoding: Encoding, 
         /**
-         * What the modulator answers to a phase.
-         */response: Response, 
-        /**
          * Which amplitude full light stands for.
          */brightness: Brightness, 
         /**
@@ -4149,22 +4171,17 @@ public struct SessionOptions {
          * Threads to compute with; none for as many as the device has.
          */threads: UInt32?, 
         /**
-         * The display's calibration, which brings its own response.
-         */calibration: CalibratedDisplay? = nil, 
-        /**
-         * Where frames are computed; none for the CPU.
-         */backend: Backend? = nil) {
-        self.display = display
+         * Where frames are computed.
+         */backend: Backend) {
+        self.target = target
         self.ladder = ladder
         self.quality = quality
         self.targetRateHz = targetRateHz
         self.encoding = encoding
-        self.response = response
         self.brightness = brightness
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
         self.threads = threads
-        self.calibration = calibration
         self.backend = backend
     }
 
@@ -4184,34 +4201,30 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SessionOptions {
         return
             try SessionOptions(
-                display: FfiConverterTypeDisplay.read(from: &buf), 
+                target: FfiConverterTypeTarget.read(from: &buf), 
                 ladder: FfiConverterSequenceTypeRung.read(from: &buf), 
                 quality: FfiConverterTypeQuality.read(from: &buf), 
                 targetRateHz: FfiConverterOptionDouble.read(from: &buf), 
                 encoding: FfiConverterTypeEncoding.read(from: &buf), 
-                response: FfiConverterTypeResponse.read(from: &buf), 
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
                 threads: FfiConverterOptionUInt32.read(from: &buf), 
-                calibration: FfiConverterOptionTypeCalibratedDisplay.read(from: &buf), 
-                backend: FfiConverterOptionTypeBackend.read(from: &buf)
+                backend: FfiConverterTypeBackend.read(from: &buf)
         )
     }
 
     public static func write(_ value: SessionOptions, into buf: inout [UInt8]) {
-        FfiConverterTypeDisplay.write(value.display, into: &buf)
+        FfiConverterTypeTarget.write(value.target, into: &buf)
         FfiConverterSequenceTypeRung.write(value.ladder, into: &buf)
         FfiConverterTypeQuality.write(value.quality, into: &buf)
         FfiConverterOptionDouble.write(value.targetRateHz, into: &buf)
         FfiConverterTypeEncoding.write(value.encoding, into: &buf)
-        FfiConverterTypeResponse.write(value.response, into: &buf)
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
         FfiConverterOptionUInt32.write(value.threads, into: &buf)
-        FfiConverterOptionTypeCalibratedDisplay.write(value.calibration, into: &buf)
-        FfiConverterOptionTypeBackend.write(value.backend, into: &buf)
+        FfiConverterTypeBackend.write(value.backend, into: &buf)
     }
 }
 
@@ -5842,87 +5855,6 @@ public func FfiConverterTypeQualityReason_lower(_ value: QualityReason) -> RustB
 
 
 /**
- * What the modulator answers to a phase.
- */
-
-public enum Response: Equatable, Hashable {
-    
-    /**
-     * Levels in equal steps of phase, as many as the display's bits have.
-     */
-    case linear
-    /**
-     * Of a calibrated modulator: 256 levels, the one at i shows the phase 2πi/256.
-     */
-    case lut(
-        /**
-         * The levels.
-         */levels: Data
-    )
-
-
-
-
-
-}
-
-#if compiler(>=6)
-extension Response: Sendable {}
-#endif
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public struct FfiConverterTypeResponse: FfiConverterRustBuffer {
-    typealias SwiftType = Response
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Response {
-        let variant: Int32 = try readInt(&buf)
-        switch variant {
-        
-        case 1: return .linear
-        
-        case 2: return .lut(levels: try FfiConverterData.read(from: &buf)
-        )
-        
-        default: throw UniffiInternalError.unexpectedEnumCase
-        }
-    }
-
-    public static func write(_ value: Response, into buf: inout [UInt8]) {
-        switch value {
-        
-        
-        case .linear:
-            writeInt(&buf, Int32(1))
-        
-        
-        case let .lut(levels):
-            writeInt(&buf, Int32(2))
-            FfiConverterData.write(levels, into: &buf)
-            
-        }
-    }
-}
-
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeResponse_lift(_ buf: RustBuffer) throws -> Response {
-    return try FfiConverterTypeResponse.lift(buf)
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
-public func FfiConverterTypeResponse_lower(_ value: Response) -> RustBuffer {
-    return FfiConverterTypeResponse.lower(value)
-}
-
-
-
-/**
  * How far a sensor's picture must be turned clockwise to stand upright.
  */
 
@@ -6346,30 +6278,6 @@ fileprivate struct FfiConverterOptionDouble: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterOptionTypeCalibratedDisplay: FfiConverterRustBuffer {
-    typealias SwiftType = CalibratedDisplay?
-
-    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
-        guard let value = value else {
-            writeInt(&buf, Int8(0))
-            return
-        }
-        writeInt(&buf, Int8(1))
-        FfiConverterTypeCalibratedDisplay.write(value, into: &buf)
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
-        switch try readInt(&buf) as Int8 {
-        case 0: return nil
-        case 1: return try FfiConverterTypeCalibratedDisplay.read(from: &buf)
-        default: throw UniffiInternalError.unexpectedOptionalTag
-        }
-    }
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
 fileprivate struct FfiConverterOptionTypeLogListener: FfiConverterRustBuffer {
     typealias SwiftType = LogListener?
 
@@ -6490,30 +6398,6 @@ fileprivate struct FfiConverterOptionTypePose: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterOptionTypeBackend: FfiConverterRustBuffer {
-    typealias SwiftType = Backend?
-
-    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
-        guard let value = value else {
-            writeInt(&buf, Int8(0))
-            return
-        }
-        writeInt(&buf, Int8(1))
-        FfiConverterTypeBackend.write(value, into: &buf)
-    }
-
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
-        switch try readInt(&buf) as Int8 {
-        case 0: return nil
-        case 1: return try FfiConverterTypeBackend.read(from: &buf)
-        default: throw UniffiInternalError.unexpectedOptionalTag
-        }
-    }
-}
-
-#if swift(>=5.8)
-@_documentation(visibility: private)
-#endif
 fileprivate struct FfiConverterOptionTypeDropReason: FfiConverterRustBuffer {
     typealias SwiftType = DropReason?
 
@@ -6530,6 +6414,30 @@ fileprivate struct FfiConverterOptionTypeDropReason: FfiConverterRustBuffer {
         switch try readInt(&buf) as Int8 {
         case 0: return nil
         case 1: return try FfiConverterTypeDropReason.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+fileprivate struct FfiConverterOptionTypeMethod: FfiConverterRustBuffer {
+    typealias SwiftType = Method?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeMethod.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeMethod.read(from: &buf)
         default: throw UniffiInternalError.unexpectedOptionalTag
         }
     }
@@ -6663,6 +6571,20 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
     )
 })
 }
+/**
+ * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
+ * pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near and
+ * far by percentiles.
+ */
+public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
+    return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_session_options(
+        FfiConverterTypeTarget_lower(target),
+        FfiConverterOptionTypeMethod.lower(method),uniffiCallStatus
+    )
+})
+}
 
 private enum InitializationResult {
     case ok
@@ -6691,7 +6613,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 8380) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_calibrateddisplay_display() != 31939) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 17526) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
@@ -6781,10 +6703,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 37847) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_calibrateddisplay_from_bytes() != 32039) {
-        return InitializationResult.apiChecksumMismatch
-    }
-    if (uniffi_phasefront_ffi_checksum_constructor_calibrateddisplay_from_file() != 39488) {
+    if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 58428) {
@@ -6797,6 +6716,18 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_rawsession_new() != 11751) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_target_from_bytes() != 3215) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_target_from_file() != 12085) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_target_of_display() != 26487) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_constructor_target_with_look_up_table() != 26530) {
         return InitializationResult.apiChecksumMismatch
     }
 
