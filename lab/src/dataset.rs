@@ -385,7 +385,14 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let texture = Texture::plain([0.2, 0.5, 0.9]);
         let ours = manifest(Look::photographs(std::slice::from_ref(&texture)));
-        make(&ours, &[texture.clone()], dir.path(), (1, 4), &|| {}).unwrap();
+        make(
+            &ours,
+            std::slice::from_ref(&texture),
+            dir.path(),
+            (1, 4),
+            &|| {},
+        )
+        .unwrap();
         assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
         let pair = read_pair(&ours, dir.path(), 1).unwrap();
         let scene = scene::natural_scene(ours.scene_seed(1), 24, 24, &[texture]);

@@ -27,7 +27,7 @@
 //! that it blocks, in whole numbers: plane centres are odd multiples of half a plane, so a ray's
 //! position is a fraction.
 //!
-//! [`reference`] is the same without tables, in f64.
+//! [`mod@reference`] is the same without tables, in f64.
 
 pub mod reference;
 

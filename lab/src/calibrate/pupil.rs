@@ -2,7 +2,7 @@
 //!
 //! The light in the focus is the Fourier transform of the pupil, exp(i·terms) over ρ ≤ 1, and sharpness is ΣI² over
 //! (ΣI)². From one photograph alone no sign can be told; but those of a search differ by steps that are known, focus among
-//! them, so that one aberration explains them all. [`explain`] finds it by Levenberg and
+//! them, so that one aberration explains them all. [`explain`](Pupil::explain) finds it by Levenberg and
 //! Marquardt's method, the scale of sharpness with it, which pixels and stray light decide.
 
 use ndarray::Array2;

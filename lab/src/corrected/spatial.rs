@@ -4,7 +4,7 @@
 //! # The convolution
 //! Each pixel's light spreads by the point spread function of its place. Point spread functions are those of nodes
 //! every [`NODE`] pixels, linear between them in x and y: the field times each node's hat, convolved with the node's
-//! function, sums to that exactly. They end where no ray of the correction goes, and [`RIM`] pixels further; what is
+//! function, sums to that exactly. They end where no ray of the correction goes, and `RIM` pixels further; what is
 //! beyond them is left out, not wrapped around. [`convolve_reference`] is the sum over all pairs of pixels.
 //!
 //! # Cost

@@ -260,7 +260,7 @@ impl Pattern {
         })
     }
 
-    /// The picture whose colour, RGB in [0, 1], is `ramp`[0] at value 0, `ramp`[1] at one half and `ramp`[2] at 1.
+    /// The picture whose colour, RGB in [0, 1], is `ramp[0]` at value 0, `ramp[1]` at one half and `ramp[2]` at 1.
     pub fn texture(&self, ramp: [[f32; 3]; 3]) -> Texture {
         let texel = |&value: &f32| {
             let upper = value >= 0.5;

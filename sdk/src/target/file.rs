@@ -204,7 +204,16 @@ mod tests {
             display: Display::default(),
             ..calibration()
         };
-        let error = Target::from_bytes(&other.to_bytes().unwrap()).unwrap_err();
-        assert!(error.to_string().contains("40×24"), "{error}");
+        let error = other.to_bytes().unwrap_err().to_string();
+        assert!(error.contains("40×24"), "{error}");
+        // The same of a file whose display was changed by hand.
+        let at = bytes
+            .windows(10)
+            .position(|part| part == b"width = 40")
+            .unwrap();
+        let mut changed = bytes.clone();
+        changed[at..at + 10].copy_from_slice(b"width = 48");
+        let error = Target::from_bytes(&changed).unwrap_err().to_string();
+        assert!(error.contains("40×24"), "{error}");
     }
 }

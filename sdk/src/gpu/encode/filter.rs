@@ -21,7 +21,7 @@ pub(super) enum Filter {
     None,
     Blur([Dispatch; 2]),
     Aperture(Convolution),
-    Network(Prefilter),
+    Network(Box<Prefilter>),
 }
 
 /// A field on its way to double phase, and what the sweep there still has to do to it.
@@ -77,7 +77,7 @@ impl Filter {
             Encoding::Deep(network) => {
                 let made = Prefilter::new(device, network, job, frame)?;
                 rest.field = made.chain.field.clone();
-                Filter::Network(made)
+                Filter::Network(Box::new(made))
             }
         };
         Ok((filter, rest))
