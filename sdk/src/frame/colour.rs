@@ -81,7 +81,7 @@ impl<'a> ColourImage<'a> {
     /// An image of `width` × `height` pixels in `planes`.
     ///
     /// ```
-    /// use phasefront::frame::{ColourFormat, ColourImage, Plane, YuvEncoding};
+    /// use phasefront::input::{ColourFormat, ColourImage, Plane, YuvEncoding};
     ///
     /// let (luma, chroma) = ([0; 640 * 480], [128; 640 * 240]);
     /// let format = ColourFormat::Nv12(YuvEncoding::default());

@@ -1,5 +1,5 @@
 //! The conversion of camera images, naively: every output pixel by itself, in f64, from the definition. The oracle of
-//! [`super::convert`].
+//! `convert`.
 
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
 use super::plane::Orientation;

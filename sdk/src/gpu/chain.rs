@@ -600,7 +600,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
     Ok(all)
 }
 
-/// A network on the GPU for one frame size: the twin of [`crate::GpuNetworkPlan`].
+/// A network on the GPU for one frame size: the twin of [`crate::network::NetworkPlan`].
 pub struct GpuNetworkPlan {
     device: Arc<Device>,
     size: (usize, usize),
@@ -657,7 +657,7 @@ impl GpuNetworkPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::GpuNetworkPlan::run`] takes it, `output`
+    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::network::NetworkPlan::run`] takes it, `output`
     /// (6, H, W).
     ///
     /// # Errors

@@ -20,7 +20,7 @@ pub enum InputKind {
         /// How many layers.
         layers: usize,
     },
-    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see [`crate::seeded`].
+    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see `seeded.rs`.
     Seeded,
     /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,

@@ -3,8 +3,8 @@
 use super::Source;
 use crate::frame::RgbdFrame;
 
-/// The planes of [`InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
-/// [`InputKind::RgbdXy`], the place in the frame.
+/// The planes of [`super::InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
+/// [`super::InputKind::RgbdXy`], the place in the frame.
 impl Source for RgbdFrame {
     #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {

@@ -7,7 +7,7 @@
 //!   jump deeper, as it is where an edge is blurred, and
 //! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
 //!
-//! by a rule from pixel to pixel ([`Found::next`]), so that the search costs the same for any reach. The nearest source
+//! by a rule from pixel to pixel (`Found::next`), so that the search costs the same for any reach. The nearest source
 //! of the four sides is the first hidden layer, the nearest that lies deeper than it the second.
 
 use super::workers::Workers;

@@ -244,7 +244,7 @@ fn band_limit(
 ///
 /// ```
 /// use num_complex::Complex32;
-/// use phasefront::wave::asm::{Padding, Propagator};
+/// use phasefront::unstable::wave::asm::{Padding, Propagator};
 ///
 /// let plan = Propagator::new(64, 48, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
 /// let mut scratch = plan.scratch();
@@ -288,7 +288,7 @@ impl Propagator {
     }
 
     /// Three plans, one for each wavelength, that share one padded shape (red's, the widest) and so
-    /// one [`Scratch`].
+    /// one [`ConvolveScratch`].
     ///
     /// # Errors
     /// As [`padded_shape`].
