@@ -142,8 +142,6 @@ impl Response {
     }
 }
 
-/// The linear response of a modulator of `bits`, 1 to 16, whose levels do not fit bytes. Allocates nothing.
-///
 /// `phase` brought to \[0, 2π).
 pub fn wrap(phase: f32) -> f32 {
     let wrapped = phase.rem_euclid(TAU);
@@ -151,6 +149,8 @@ pub fn wrap(phase: f32) -> f32 {
     if wrapped < TAU { wrapped } else { 0.0 }
 }
 
+/// The linear response of a modulator of `bits`, 1 to 16, whose levels do not fit bytes. Allocates nothing.
+///
 /// # Panics
 /// If the lengths differ.
 pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {

@@ -4,7 +4,7 @@
 //! rows flow through all layers at once, three rows of each layer's input being kept ([`wavefront`](self)). So the
 //! working memory is small and independent of the frame's height, and a result does not depend on how a frame was cut.
 //!
-//! [`int8`] defines the quantised chain's arithmetic so that every instruction set gives the same bits; [`f32`](mod@f32)
+//! `int8` defines the quantised chain's arithmetic so that every instruction set gives the same bits; `f32`
 //! chains agree to rounding. Each instruction set is one file: `portable` is the plain Rust that the others are tested
 //! against. `unsafe` lives in those files, and in two that serve the optics: [`wide!`] runs plain loops in the widest
 //! vectors, [`each_tile_rows`] lets threads fill a plane whose tiles lie column by column.
