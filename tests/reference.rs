@@ -38,13 +38,7 @@ pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
 /// Eq. 2 on a periodic plane: F⁻¹(F(u)·exp(i2πs√(λ⁻² − µ² − ν²))), the carrier in.
 pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> Array2<Complex64> {
     let (h, w) = u.dim();
-    let bin = |k: usize, n: usize| {
-        (if 2 * k < n {
-            k as f64
-        } else {
-            k as f64 - n as f64
-        }) / n as f64
-    };
+    let bin = |k: usize, n: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
     let mut spectrum = fft2(u, false);
     for ((ky, kx), value) in spectrum.indexed_iter_mut() {
         let (mu, nu) = (bin(kx, w) / pitch, bin(ky, h) / pitch);
@@ -58,13 +52,7 @@ pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> A
 }
 
 /// Eq. 2 as a linear convolution: in a plane padded with zeros to `padded`, cropped.
-pub fn asm(
-    u: &Array2<Complex64>,
-    pitch: f64,
-    lambda: f64,
-    distance: f64,
-    padded: (usize, usize),
-) -> Array2<Complex64> {
+pub fn asm(u: &Array2<Complex64>, pitch: f64, lambda: f64, distance: f64, padded: (usize, usize)) -> Array2<Complex64> {
     let (h, w) = u.dim();
     let mut plane = Array2::zeros(padded);
     plane.slice_mut(s![..h, ..w]).assign(u);
@@ -97,8 +85,7 @@ pub fn sm_lbm(
                     !d.is_nan() && ((d * planes as f64) as usize).min(planes - 1) == k
                 });
                 if let Some((amplitude, _)) = hit {
-                    field[(y, x)] =
-                        Complex64::from_polar(amplitude[(y, x)], 2.0 * PI * z(k) / lambda);
+                    field[(y, x)] = Complex64::from_polar(amplitude[(y, x)], 2.0 * PI * z(k) / lambda);
                 }
             }
         }
@@ -127,10 +114,7 @@ pub fn relative_error(a: &Array2<Complex64>, b: &Array2<Complex64>) -> f64 {
 
 /// A plane of the library in f64.
 pub fn widen(plane: &[Complex32], (h, w): (usize, usize)) -> Array2<Complex64> {
-    let values = plane
-        .iter()
-        .map(|v| Complex64::new(v.re.into(), v.im.into()))
-        .collect();
+    let values = plane.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect();
     Array2::from_shape_vec((h, w), values).unwrap()
 }
 
@@ -145,10 +129,7 @@ pub fn test_plane((h, w): (usize, usize), seed: u32) -> Vec<Complex32> {
         .map(|i| {
             let (y, x) = ((i / w) as f32, (i % w) as f32);
             let smooth = 0.5 + 0.3 * (x * 0.11 + y * 0.05).sin() + 0.1 * (y * 0.4).cos();
-            Complex32::from_polar(
-                smooth + 0.2 * random(),
-                0.5 * (x * 0.07).sin() + 0.3 * random(),
-            )
+            Complex32::from_polar(smooth + 0.2 * random(), 0.5 * (x * 0.07).sin() + 0.3 * random())
         })
         .collect()
 }

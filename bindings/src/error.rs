@@ -55,9 +55,7 @@ impl From<uniffi::UnexpectedUniFFICallbackError> for PhasefrontError {
 }
 
 /// What `call` gives, a panic in it made an error.
-pub(crate) fn guard<T>(
-    call: impl FnOnce() -> Result<T, PhasefrontError>,
-) -> Result<T, PhasefrontError> {
+pub(crate) fn guard<T>(call: impl FnOnce() -> Result<T, PhasefrontError>) -> Result<T, PhasefrontError> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
         let message = (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
             .or_else(|| payload.downcast_ref::<String>().cloned())
@@ -96,9 +94,6 @@ mod tests {
             PhasefrontError::Timestamp(late.to_string())
         );
         let plan = phasefront::Error::Plan("no z".into());
-        assert_eq!(
-            PhasefrontError::from(plan),
-            PhasefrontError::Setting("no z".into())
-        );
+        assert_eq!(PhasefrontError::from(plan), PhasefrontError::Setting("no z".into()));
     }
 }

@@ -104,7 +104,8 @@ pub struct ColourInfo {
     pub planes: Vec<PlaneInfo>,
     /// The matrix of luma and chroma; other formats do not look at it.
     pub matrix: YuvMatrix,
-    /// Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at it.
+    /// Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
+    /// it.
     pub video_range: bool,
 }
 
@@ -200,10 +201,7 @@ impl FrameInfo {
     ///
     /// # Errors
     /// [`PhasefrontError::Frame`]: what [`ColourImage::new`] or [`DepthImage::new`] refuses.
-    pub(crate) fn frame<'a>(
-        &self,
-        memory: FrameMemory<'a>,
-    ) -> Result<CameraFrame<'a>, PhasefrontError> {
+    pub(crate) fn frame<'a>(&self, memory: FrameMemory<'a>) -> Result<CameraFrame<'a>, PhasefrontError> {
         let encoding = input::YuvEncoding {
             matrix: match self.colour.matrix {
                 YuvMatrix::Bt601 => input::YuvMatrix::Bt601,
@@ -243,8 +241,7 @@ impl FrameInfo {
             DepthFormat::NormalizedU16 => input::DepthFormat::NormalizedU16,
         };
         let (width, height) = size(self.depth.width, self.depth.height);
-        let mut depth =
-            DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
+        let mut depth = DepthImage::new(format, width, height, self.depth.plane.plane(memory.depth))?;
         if let Some(info) = &self.confidence {
             let format = match info.format {
                 ConfidenceFormat::LowMediumHigh => input::ConfidenceFormat::LowMediumHigh,
@@ -295,9 +292,7 @@ impl TryFrom<&Cameras> for input::Cameras {
         }) = &cameras.pose
         {
             let (rows, rest) = rotation.as_chunks::<3>();
-            let rows = <[[f64; 3]; 3]>::try_from(rows)
-                .ok()
-                .filter(|_| rest.is_empty());
+            let rows = <[[f64; 3]; 3]>::try_from(rows).ok().filter(|_| rest.is_empty());
             let translation = <[f64; 3]>::try_from(translation_m.as_slice()).ok();
             let (Some(rows), Some(translation)) = (rows, translation) else {
                 return Err(PhasefrontError::Frame(format!(

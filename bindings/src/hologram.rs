@@ -93,12 +93,7 @@ impl RawHologram {
     ///
     /// # Errors
     /// An empty image, or a z too far away.
-    pub fn preview(
-        &self,
-        z_mm: f64,
-        width: u32,
-        height: u32,
-    ) -> Result<Arc<RawImage>, PhasefrontError> {
+    pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let (w, h) = (width as usize, height as usize);
             if w.saturating_mul(h) > MOST_PIXELS {
@@ -122,11 +117,7 @@ impl RawHologram {
     ///
     /// # Errors
     /// An image that the layout has not.
-    pub fn output(
-        &self,
-        placement: Placement,
-        image: u32,
-    ) -> Result<Arc<RawImage>, PhasefrontError> {
+    pub fn output(&self, placement: Placement, image: u32) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let placement: phasefront::output::Placement = placement.into();
             let plan = Output::new(self.core.target(), self.core.shape(), placement)?;

@@ -3,8 +3,8 @@
 //! The packages in `ios/`, `android/` and `bindings/python/` put a layer by hand over what is generated from here, so
 //! that it feels native there; the objects named `Raw…` are for them alone. Rules of this border:
 //!
-//! - Images come in as `&[u8]`, which UniFFI passes without a copy; results are objects whose memory is read in place, at
-//!   an address that is valid as long as the object. Nothing is passed pixel by pixel.
+//! - Images come in as `&[u8]`, which UniFFI passes without a copy; results are objects whose memory is read in place,
+//!   at an address that is valid as long as the object. Nothing is passed pixel by pixel.
 //! - Every call gives a result; a panic becomes [`PhasefrontError::Internal`].
 //! - Listeners are called on the session's own thread.
 
@@ -22,15 +22,15 @@ mod target;
 pub use display::{Display, display_from_toml};
 pub use error::PhasefrontError;
 pub use frame::{
-    Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
-    FrameInfo, Intrinsics, Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
+    Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
+    Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
 };
 pub use hologram::{HologramInfo, RawHologram, RawImage};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
-    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Rung,
-    RunningMode, SessionOptions, Thermal, session_options,
+    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Rung, RunningMode, SessionOptions,
+    Thermal, session_options,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};

@@ -40,10 +40,7 @@ thread_local! {
 /// # Errors
 /// A process that already logs elsewhere.
 #[uniffi::export]
-pub fn set_log_listener(
-    level: LogLevel,
-    listener: Option<Arc<dyn LogListener>>,
-) -> Result<(), PhasefrontError> {
+pub fn set_log_listener(level: LogLevel, listener: Option<Arc<dyn LogListener>>) -> Result<(), PhasefrontError> {
     guard(|| {
         let filter = match (&listener, level) {
             (None, _) => LevelFilter::Off,
@@ -53,8 +50,8 @@ pub fn set_log_listener(
             (_, LogLevel::Debug) => LevelFilter::Debug,
         };
         *FORWARD.0.write().unwrap_or_else(PoisonError::into_inner) = listener;
-        let other = log::set_logger(&FORWARD).is_err()
-            && !std::ptr::addr_eq(log::logger(), std::ptr::from_ref(&FORWARD));
+        let other =
+            log::set_logger(&FORWARD).is_err() && !std::ptr::addr_eq(log::logger(), std::ptr::from_ref(&FORWARD));
         if other {
             return Err(PhasefrontError::Setting(
                 "this process already has a logger of Rust's `log`; messages go there".into(),
@@ -74,11 +71,7 @@ impl Log for Forward {
         if !self.enabled(record.metadata()) || TELLING.replace(true) {
             return;
         }
-        let listener = self
-            .0
-            .read()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone();
+        let listener = self.0.read().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some(listener) = listener {
             let level = match record.level() {
                 Level::Error => LogLevel::Error,

@@ -33,8 +33,8 @@ pub struct DeepPair {
     pub prefilter: Arc<Network>,
 }
 
-/// The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default display's
-/// pitch, colours and volume.
+/// The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default
+/// display's pitch, colours and volume.
 ///
 /// # Errors
 /// Another offset, or a library that was built without them.
@@ -106,9 +106,8 @@ impl Network {
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let onnx = std::fs::read(&path).map_err(|e| {
-                PhasefrontError::File(format!("the network {path} cannot be read: {e}"))
-            })?;
+            let onnx = std::fs::read(&path)
+                .map_err(|e| PhasefrontError::File(format!("the network {path} cannot be read: {e}")))?;
             Self::from_bytes(&onnx)
         })
     }
@@ -119,14 +118,11 @@ impl Network {
     /// A library that was built without it.
     #[uniffi::constructor]
     pub fn built_in() -> Result<Arc<Self>, PhasefrontError> {
-        guard(|| {
-            match built_in::network() {
+        guard(|| match built_in::network() {
             Some(core) => Ok(Arc::new(Network { core })),
             None => Err(PhasefrontError::Network(
-                "network: none is built in; load one from a file, or build with the feature built-in-network"
-                    .into(),
+                "network: none is built in; load one from a file, or build with the feature built-in-network".into(),
             )),
-        }
         })
     }
 

@@ -222,13 +222,10 @@ impl Method {
 }
 
 /// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
-/// pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near and
-/// far by percentiles.
+/// pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near
+/// and far by percentiles.
 #[uniffi::export(default(method = None))]
-pub fn session_options(
-    target: Arc<Target>,
-    method: Option<Method>,
-) -> Result<SessionOptions, PhasefrontError> {
+pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
         let usual = match &method {
             Some(method) => {
@@ -258,13 +255,9 @@ impl SessionOptions {
         let network = |core: &Arc<phasefront::Network>| Arc::new(Network { core: core.clone() });
         let method = |method: &phasefront::Method| match method {
             phasefront::Method::Network(core) | phasefront::Method::Seeded(core) => {
-                Method::Trained {
-                    network: network(core),
-                }
+                Method::Trained { network: network(core) }
             }
-            phasefront::Method::BySharpness(_, core) => Method::BySharpness {
-                network: network(core),
-            },
+            phasefront::Method::BySharpness(_, core) => Method::BySharpness { network: network(core) },
             _ => Method::Sweep,
         };
         SessionOptions {
@@ -359,9 +352,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         to.threads = match options.threads {
             None => None,
             Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {
-                PhasefrontError::Setting(
-                    "0 threads compute nothing; give at least 1, or none for all".into(),
-                )
+                PhasefrontError::Setting("0 threads compute nothing; give at least 1, or none for all".into())
             })?),
         };
         Ok(to)

@@ -82,11 +82,7 @@ pub trait SessionListener: Send + Sync {
     fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), PhasefrontError>;
 
     /// The frames after this one are made on another rung of the ladder.
-    fn on_quality_changed(
-        &self,
-        timestamp_ns: u64,
-        change: QualityChange,
-    ) -> Result<(), PhasefrontError>;
+    fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), PhasefrontError>;
 }
 
 /// A session. Every call may come from any thread, at any moment.
@@ -137,18 +133,13 @@ impl RawSession {
                 }
                 (_, Some(_)) => {
                     return Err(PhasefrontError::Session(
-                        "session: only a live one has a listener; process gives the results of the others"
-                            .into(),
+                        "session: only a live one has a listener; process gives the results of the others".into(),
                     ));
                 }
             };
             let session = Session::new(options, running)?;
             let backend = session.statistics().backend;
-            log::info!(
-                "a session in mode {mode:?} on {}: {}",
-                backend.name,
-                backend.why
-            );
+            log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
             Ok(Arc::new(RawSession {
                 state: RwLock::new(State::Open(Arc::new(session))),
                 listener_failures,
@@ -293,9 +284,7 @@ impl RawSession {
     fn session(&self) -> Result<Arc<Session>, PhasefrontError> {
         match &*self.read() {
             State::Open(session) => Ok(session.clone()),
-            State::Closed(_) => Err(PhasefrontError::Session(
-                "session: it is closed; make a new one".into(),
-            )),
+            State::Closed(_) => Err(PhasefrontError::Session("session: it is closed; make a new one".into())),
         }
     }
 
@@ -309,21 +298,12 @@ impl RawSession {
 fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), PhasefrontError> {
     match event {
         Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram)),
-        Event::Dropped {
-            timestamp_ns,
-            reason,
-        } => listener.on_dropped(timestamp_ns, reason.into()),
-        Event::Failed {
-            timestamp_ns,
-            error,
-        } => {
+        Event::Dropped { timestamp_ns, reason } => listener.on_dropped(timestamp_ns, reason.into()),
+        Event::Failed { timestamp_ns, error } => {
             log::warn!("the frame of {timestamp_ns} ns failed: {error}");
             listener.on_failed(timestamp_ns, error.to_string())
         }
-        Event::QualityChanged {
-            timestamp_ns,
-            change,
-        } => {
+        Event::QualityChanged { timestamp_ns, change } => {
             let reason = match change.reason {
                 session::QualityReason::TooSlow => QualityReason::TooSlow,
                 session::QualityReason::Room => QualityReason::Room,

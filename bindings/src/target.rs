@@ -5,8 +5,8 @@ use crate::error::{PhasefrontError, guard};
 use phasefront::target::Response;
 use std::sync::Arc;
 
-/// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its lasers'
-/// light, what corrects its optics. Immutable; one serves many sessions.
+/// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
+/// lasers' light, what corrects its optics. Immutable; one serves many sessions.
 #[derive(Debug, uniffi::Object)]
 pub struct Target {
     pub(crate) core: phasefront::Target,
@@ -31,10 +31,7 @@ impl Target {
     /// # Errors
     /// A display that cannot be, or another number of levels.
     #[uniffi::constructor]
-    pub fn with_look_up_table(
-        display: Display,
-        levels: Vec<u8>,
-    ) -> Result<Arc<Self>, PhasefrontError> {
+    pub fn with_look_up_table(display: Display, levels: Vec<u8>) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
             let display = phasefront::Display::try_from(&display)?;
             let levels = <[u8; 256]>::try_from(levels.as_slice()).map_err(|_| {
@@ -70,9 +67,8 @@ impl Target {
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let file = std::fs::read(&path).map_err(|e| {
-                PhasefrontError::File(format!("the calibration {path} cannot be read: {e}"))
-            })?;
+            let file = std::fs::read(&path)
+                .map_err(|e| PhasefrontError::File(format!("the calibration {path} cannot be read: {e}")))?;
             Self::from_bytes(&file)
         })
     }

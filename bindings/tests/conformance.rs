@@ -1,15 +1,14 @@
-//! The conformance suite, run from Rust: frames in every format, and the levels that they must become. Swift, Kotlin and
-//! Python run the same from `tests/conformance/`; the bits of all four must be equal.
+//! The conformance suite, run from Rust: frames in every format, and the levels that they must become. Swift, Kotlin
+//! and Python run the same from `tests/conformance/`; the bits of all four must be equal.
 //!
-//! `PHASEFRONT_BLESS=1` writes the suite anew. Where `PHASEFRONT_CONFORMANCE` names a folder, the levels are left in its
-//! `levels.bin`, for the other languages to compare with.
+//! `PHASEFRONT_BLESS=1` writes the suite anew. Where `PHASEFRONT_CONFORMANCE` names a folder, the levels are left in
+//! its `levels.bin`, for the other languages to compare with.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
-    Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo,
-    DepthRange, Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram,
-    RawSession, Rotation, RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml,
-    session_options,
+    Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, DepthRange,
+    Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawSession, Rotation, RunningMode,
+    SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -34,9 +33,7 @@ fn levels(hologram: &RawHologram) -> Vec<u8> {
 
 /// A network of `models/`.
 fn model(name: &str) -> Arc<Network> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-        .join("../models")
-        .join(name);
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../models").join(name);
     Network::from_file(path.to_str().unwrap().into()).unwrap()
 }
 
@@ -77,21 +74,14 @@ fn options(case: &Value) -> SessionOptions {
         "by-sharpness" => Method::BySharpness {
             network: Network::built_in().unwrap(),
         },
-        file => Method::Trained {
-            network: model(file),
-        },
+        file => Method::Trained { network: model(file) },
     };
     SessionOptions {
         encoding: match case["encoding"].as_str().unwrap() {
             "double-phase" => Encoding::DoublePhase,
-            "anti-alias" => Encoding::AntiAlias {
-                sigma: 0.7,
-                width: 3,
-            },
+            "anti-alias" => Encoding::AntiAlias { sigma: 0.7, width: 3 },
             "band-limit" => Encoding::BandLimit { k: 1.0 },
-            file => Encoding::Deep {
-                prefilter: model(file),
-            },
+            file => Encoding::Deep { prefilter: model(file) },
         },
         brightness: match &case["brightness"] {
             Value::Null => Brightness::Steady,
@@ -125,12 +115,7 @@ fn info(frame: &Value) -> FrameInfo {
             },
             width: int(&colour["width"]),
             height: int(&colour["height"]),
-            planes: colour["planes"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .map(plane)
-                .collect(),
+            planes: colour["planes"].as_array().unwrap().iter().map(plane).collect(),
             matrix: match colour["matrix"].as_str().unwrap() {
                 "bt601" => YuvMatrix::Bt601,
                 "bt709" => YuvMatrix::Bt709,
@@ -264,10 +249,7 @@ mod write {
         let r = (dx * dx + dy * dy).sqrt() / 0.22;
         if r < 1.0 {
             let light = 0.35 + 0.6 * (1.0 - r * r).sqrt();
-            return (
-                [light, 0.55 * light, 0.2 + 0.1 * y],
-                0.6 - 0.15 * (1.0 - r * r).sqrt(),
-            );
+            return ([light, 0.55 * light, 0.2 + 0.1 * y], 0.6 - 0.15 * (1.0 - r * r).sqrt());
         }
         let stripe = if (x * 9.0 + y * 4.0).floor() as i64 % 2 == 0 {
             0.8
@@ -275,11 +257,7 @@ mod write {
             0.25
         };
         (
-            [
-                0.3 * stripe,
-                0.3 + 0.5 * stripe * y,
-                stripe * (1.0 - 0.4 * x),
-            ],
+            [0.3 * stripe, 0.3 + 0.5 * stripe * y, stripe * (1.0 - 0.4 * x)],
             1.2 + 0.5 * x,
         )
     }
@@ -404,9 +382,7 @@ mod write {
                     "millimetres-u16" => ((measured * 1000.0) as u16).to_le_bytes().to_vec(),
                     "android-depth16" => {
                         let code = if hole(x, y) { 1 } else { (x as u16 % 3) * 3 };
-                        ((metres * 1000.0) as u16 | code << 13)
-                            .to_le_bytes()
-                            .to_vec()
+                        ((metres * 1000.0) as u16 | code << 13).to_le_bytes().to_vec()
                     }
                     "normalized-u8" => vec![byte(normalized)],
                     "normalized-u16" => ((normalized * 65535.0) as u16).to_le_bytes().to_vec(),
@@ -438,7 +414,8 @@ mod write {
         ((exponent as i32 + 15) as u16) << 10 | ((value / exponent.exp2() - 1.0) * 1024.0) as u16
     }
 
-    /// A display whose pixels turn the phase otherwise than they are told, lit unevenly, through a lens that is not round.
+    /// A display whose pixels turn the phase otherwise than they are told, lit unevenly, through a lens that is not
+    /// round.
     fn calibration(display: &str) -> Vec<u8> {
         use phasefront::target::{Aberration, PerPixel};
         use phasefront::unstable::slm::per_pixel::nodes;
@@ -496,20 +473,14 @@ mod write {
             frames.depth("disparity-f32", 31, 24, 0.0),
         );
         frame["rotation"] = json!(180);
-        cases.push(case(
-            "RGB of odd size and disparity, upside down",
-            vec![frame],
-        ));
+        cases.push(case("RGB of odd size and disparity, upside down", vec![frame]));
 
         let mut frame = still(
             frames.colour("nv12", 64, 48, "bt709", true, 0.0),
             frames.depth("disparity-f16", 32, 24, 0.0),
         );
         frame["confidence"] = frames.confidence("low-medium-high", 32, 24);
-        cases.push(case(
-            "420v of BT.709 and 16-bit disparity with confidence",
-            vec![frame],
-        ));
+        cases.push(case("420v of BT.709 and 16-bit disparity with confidence", vec![frame]));
 
         let mut frame = still(
             frames.colour("yuv420", 63, 47, "bt601", false, 0.0),
@@ -582,10 +553,7 @@ mod write {
         one["method"] = json!("by-sharpness");
         cases.push(one);
 
-        let mut one = case(
-            "the plane sweep, for a display that no network is for",
-            vec![plain],
-        );
+        let mut one = case("the plane sweep, for a display that no network is for", vec![plain]);
         one["method"] = json!("sweep");
         one["display"] = json!(format!(
             "{display}pitch_um = 4.5\nwavelengths_nm = [650, 530, 440]\nvolume_depth_mm = 2.0\n"

@@ -54,10 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene {
         meshes: room.iter().map(|item| item.mesh.clone()).collect(),
     };
-    let depth = render_ldi_reference(&scene, HEIGHT, WIDTH, 1)?
-        .layers
-        .remove(0)
-        .depth;
+    let depth = render_ldi_reference(&scene, HEIGHT, WIDTH, 1)?.layers.remove(0).depth;
     if depth.iter().any(|d| d.is_nan()) {
         return Err("the room has a hole".into());
     }
@@ -70,8 +67,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let codes = depth.iter().map(|d| (d * 65535.0).round() as u16);
     let bytes: Vec<u8> = codes.flat_map(u16::to_ne_bytes).collect();
     let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive)
-        .write_image(&bytes, WIDTH as u32, HEIGHT as u32, ExtendedColorType::L16)?;
+    PngEncoder::new_with_quality(&mut png, CompressionType::Best, FilterType::Adaptive).write_image(
+        &bytes,
+        WIDTH as u32,
+        HEIGHT as u32,
+        ExtendedColorType::L16,
+    )?;
     std::fs::write(folder.join("scene_depth.png"), &png)?;
     println!(
         "scene_rgb.jpg {} bytes, scene_depth.png {} bytes",
@@ -203,24 +204,15 @@ fn painting(room: &mut Vec<Item>, dice: &mut Dice) {
     let (half_w, half_h) = (215.0, 150.0);
     let size = (860, 600);
     let sky = Pattern::noise(size, (3, 9), 5, 0.55, dice);
-    let ridges = [0.52, 0.63, 0.75, 0.88]
-        .map(|base: f32| (base, Pattern::noise((size.0, 1), (5, 1), 6, 0.45, dice)));
+    let ridges = [0.52, 0.63, 0.75, 0.88].map(|base: f32| (base, Pattern::noise((size.0, 1), (5, 1), 6, 0.45, dice)));
     let mut canvas = Canvas::new(size, [0.0; 3]);
     let brush = Pattern::noise(size, (120, 60), 2, 0.7, dice);
     canvas.paint(|px, py| {
         let (u, v) = (px as f32 / size.0 as f32, py as f32 / size.1 as f32);
         let mut colour = mix([0.20, 0.30, 0.55], [0.99, 0.72, 0.42], (v / 0.6).min(1.0));
-        colour = mix(
-            colour,
-            [0.98, 0.82, 0.66],
-            0.7 * (sky.at(px, py) - 0.5).max(0.0),
-        );
+        colour = mix(colour, [0.98, 0.82, 0.66], 0.7 * (sky.at(px, py) - 0.5).max(0.0));
         let sun = ((u - 0.66) * 1.43).hypot(v - 0.36);
-        colour = mix(
-            colour,
-            [1.0, 0.95, 0.78],
-            ((0.085 - sun) * 200.0).clamp(0.0, 1.0),
-        );
+        colour = mix(colour, [1.0, 0.95, 0.78], ((0.085 - sun) * 200.0).clamp(0.0, 1.0));
         colour = mix(colour, [1.0, 0.85, 0.55], (0.5 - 2.0 * sun).clamp(0.0, 0.5));
         for (index, (base, ridge)) in ridges.iter().enumerate() {
             if v > base + 0.26 * (0.5 - ridge.at(px, 0)) {
@@ -279,11 +271,7 @@ fn clock(room: &mut Vec<Item>) {
         [middle + r * middle * sin, middle - r * middle * cos]
     };
     for minute in 0..60 {
-        let (from, pen) = if minute % 5 == 0 {
-            (0.80, 4.0)
-        } else {
-            (0.88, 1.5)
-        };
+        let (from, pen) = if minute % 5 == 0 { (0.80, 4.0) } else { (0.88, 1.5) };
         canvas.stroke(
             toward(minute as f32 / 60.0, from),
             toward(minute as f32 / 60.0, 0.94),
@@ -327,11 +315,7 @@ fn bunting(room: &mut Vec<Item>) {
     let (from, to, d) = (-40.0, 1960.0, 0.88);
     let flags = 17;
     let string = Shape::grid(160, 1, |u, v| {
-        [
-            from + (to - from) * u,
-            -(sag(u) + 2.5 * (1.0 - 2.0 * v)),
-            0.0,
-        ]
+        [from + (to - from) * u, -(sag(u) + 2.5 * (1.0 - 2.0 * v)), 0.0]
     });
     put(
         room,
@@ -356,14 +340,8 @@ fn bunting(room: &mut Vec<Item>) {
                 );
                 canvas.stroke([cx, cy], [cx, cy], 5.0, pale);
             }),
-            1 => (0..5).for_each(|i| {
-                canvas.stroke(
-                    [0.0, i as f32 * 24.0 + 8.0],
-                    [96.0, i as f32 * 24.0 + 8.0],
-                    4.0,
-                    pale,
-                )
-            }),
+            1 => (0..5)
+                .for_each(|i| canvas.stroke([0.0, i as f32 * 24.0 + 8.0], [96.0, i as f32 * 24.0 + 8.0], 4.0, pale)),
             _ => {}
         }
         // A flag bellies toward the viewer.
@@ -398,11 +376,7 @@ fn plant(room: &mut Vec<Item>, dice: &mut Dice) {
         [0.86, 0.54, 0.40],
     ]);
     let profile = |v: f64| {
-        if v < 0.78 {
-            52.0 + 22.0 * v / 0.78
-        } else {
-            82.0
-        }
+        if v < 0.78 { 52.0 + 22.0 * v / 0.78 } else { 82.0 }
     };
     let pot = Shape::grid(64, 60, |u, v| {
         let (sin, cos) = (TAU * (u + 0.5)).sin_cos();
@@ -497,13 +471,7 @@ fn blocks(room: &mut Vec<Item>, dice: &mut Dice) {
         let side = 384;
         let grain = Pattern::noise((side, side), (4, 40), 4, 0.6, dice);
         let mut canvas = Canvas::new((side, side), [0.0; 3]);
-        canvas.paint(|px, py| {
-            Some(mix(
-                [0.86, 0.70, 0.48],
-                [0.96, 0.84, 0.64],
-                grain.at(px, py),
-            ))
-        });
+        canvas.paint(|px, py| Some(mix([0.86, 0.70, 0.48], [0.96, 0.84, 0.64], grain.at(px, py))));
         let (low, high) = (26.0, side as f32 - 26.0);
         for (from, to) in [
             ([low, low], [high, low]),
@@ -533,13 +501,7 @@ fn ruler(room: &mut Vec<Item>, dice: &mut Dice) {
     let size = (120, 2400);
     let grain = Pattern::noise(size, (30, 6), 4, 0.6, dice);
     let mut canvas = Canvas::new(size, [0.0; 3]);
-    canvas.paint(|px, py| {
-        Some(mix(
-            [0.93, 0.76, 0.40],
-            [0.99, 0.88, 0.58],
-            grain.at(px, py),
-        ))
-    });
+    canvas.paint(|px, py| Some(mix([0.93, 0.76, 0.40], [0.99, 0.88, 0.58], grain.at(px, py))));
     for tick in 0..=120 {
         let y = 2380.0 - tick as f32 * 19.5;
         let length = if tick % 10 == 0 {
@@ -620,28 +582,10 @@ fn duck(room: &mut Vec<Item>) {
     };
     part([0.0, 118.0, 0.0], [205.0, 122.0, 140.0], 0.06, YELLOW, 0.8);
     part([172.0, 168.0, 0.0], [74.0, 46.0, 50.0], 0.75, YELLOW, 0.8);
-    part(
-        [20.0, 130.0, 96.0],
-        [112.0, 66.0, 58.0],
-        0.22,
-        [0.96, 0.72, 0.14],
-        0.8,
-    );
-    part(
-        [-96.0, 282.0, 10.0],
-        [112.0, 106.0, 104.0],
-        0.0,
-        YELLOW,
-        0.8,
-    );
+    part([20.0, 130.0, 96.0], [112.0, 66.0, 58.0], 0.22, [0.96, 0.72, 0.14], 0.8);
+    part([-96.0, 282.0, 10.0], [112.0, 106.0, 104.0], 0.0, YELLOW, 0.8);
     part([-206.0, 262.0, 24.0], [62.0, 20.0, 52.0], 0.10, ORANGE, 0.8);
-    part(
-        [-200.0, 246.0, 24.0],
-        [50.0, 16.0, 44.0],
-        0.28,
-        [0.88, 0.42, 0.10],
-        0.8,
-    );
+    part([-200.0, 246.0, 24.0], [50.0, 16.0, 44.0], 0.28, [0.88, 0.42, 0.10], 0.8);
     part([-132.0, 312.0, 92.0], [24.0, 28.0, 16.0], 0.0, PAPER, 0.8);
     part([-138.0, 312.0, 104.0], [14.0, 17.0, 12.0], 0.0, INK, 1.0);
 }
@@ -725,14 +669,9 @@ fn chart_picture() -> Canvas {
         });
         left += 88.0;
     }
-    for (index, colour) in [RED, ORANGE, YELLOW, GREEN, TEAL, BLUE, INK]
-        .into_iter()
-        .enumerate()
-    {
+    for (index, colour) in [RED, ORANGE, YELLOW, GREEN, TEAL, BLUE, INK].into_iter().enumerate() {
         let from = 480 + index * 74;
-        canvas.paint(|px, py| {
-            ((from..from + 66).contains(&px) && (578..612).contains(&py)).then_some(colour)
-        });
+        canvas.paint(|px, py| ((from..from + 66).contains(&px) && (578..612).contains(&py)).then_some(colour));
     }
     let lines = [
         "LIGHT IS A WAVE: EVERY POINT OF THIS ROOM",
@@ -774,11 +713,7 @@ impl Canvas {
 
     fn wood(dice: &mut Dice, colour: Colour) -> Texture {
         let grain = Pattern::noise((128, 256), (16, 3), 4, 0.6, dice);
-        grain.texture([
-            mix(colour, [0.0; 3], 0.35),
-            colour,
-            mix(colour, [1.0; 3], 0.25),
-        ])
+        grain.texture([mix(colour, [0.0; 3], 0.35), colour, mix(colour, [1.0; 3], 0.25)])
     }
 
     fn leaf(dice: &mut Dice, index: usize) -> Texture {
@@ -830,9 +765,7 @@ impl Canvas {
                     [left + x as f32 * unit * 0.85, at[1] + y as f32 * unit]
                 };
                 let points: Vec<_> = path.split_whitespace().map(place).collect();
-                points
-                    .windows(2)
-                    .for_each(|pair| ink.stroke(pair[0], pair[1], pen));
+                points.windows(2).for_each(|pair| ink.stroke(pair[0], pair[1], pen));
                 if let [dot] = points[..] {
                     ink.stroke(dot, dot, pen * 1.3);
                 }
@@ -844,11 +777,7 @@ impl Canvas {
 
     fn ink(&mut self, ink: &Pattern, colour: Colour) {
         for (index, pixel) in self.pixels.iter_mut().enumerate() {
-            *pixel = mix(
-                *pixel,
-                colour,
-                ink.at(index % self.size.0, index / self.size.0),
-            );
+            *pixel = mix(*pixel, colour, ink.at(index % self.size.0, index / self.size.0));
         }
     }
 
@@ -989,9 +918,7 @@ fn shaded(room: &[Item]) -> phasefront_lab::Result<RgbImage> {
             .map(|n| n.map(|v| (0.5 + 0.5 * v) as f32))
             .collect()
     })?;
-    let gloss = pass(false, &|item| {
-        vec![[item.gloss, 0.0, 0.0]; item.mesh.positions.len()]
-    })?;
+    let gloss = pass(false, &|item| vec![[item.gloss, 0.0, 0.0]; item.mesh.positions.len()])?;
     let depth = albedo.depth;
 
     let light = light(room, &normals.rgb, &depth)?;
@@ -1010,11 +937,7 @@ fn shaded(room: &[Item]) -> phasefront_lab::Result<RgbImage> {
 }
 
 /// Red, green and blue light of each fine pixel, and the lamp's highlight.
-fn light(
-    room: &[Item],
-    normals: &Array3<f32>,
-    depth: &Array2<f32>,
-) -> phasefront_lab::Result<Vec<[f32; 4]>> {
+fn light(room: &[Item], normals: &Array3<f32>, depth: &Array2<f32>) -> phasefront_lab::Result<Vec<[f32; 4]>> {
     let (height, width) = depth.dim();
     let mut light = vec![[0.0f32; 4]; height * width];
     let scene = Scene {
@@ -1027,35 +950,27 @@ fn light(
             let length = (x * x + y * y + (z + 1.0) * (z + 1.0)).sqrt();
             [x / length, y / length, (z + 1.0) / length]
         };
-        light
-            .par_chunks_mut(width)
-            .enumerate()
-            .for_each(|(y, row)| {
-                for (x, light) in row.iter_mut().enumerate() {
-                    let n: [f64; 3] =
-                        std::array::from_fn(|c| 2.0 * f64::from(normals[[c, y, x]]) - 1.0);
-                    let cosine: f64 = (0..3).map(|i| n[i] * sun.direction[i]).sum();
-                    let place = [
-                        (x as f64 + 0.5) / FINE as f64,
-                        (y as f64 + 0.5) / FINE as f64,
-                        f64::from(depth[[y, x]]),
-                    ];
-                    if cosine <= 0.0 || shadow.covers(place, cosine) {
-                        continue;
-                    }
-                    // A sky's suns are spread by the cosine already; but toward the viewer, not along the surface's normal.
-                    let weight = if sun.lamp {
-                        cosine
-                    } else {
-                        cosine / sun.direction[2]
-                    } as f32;
-                    (0..3).for_each(|c| light[c] += weight * sun.colour[c]);
-                    if sun.lamp {
-                        let facing: f64 = (0..3).map(|i| n[i] * half[i]).sum();
-                        light[3] += sun.colour[0] * facing.max(0.0).powi(90) as f32;
-                    }
+        light.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, light) in row.iter_mut().enumerate() {
+                let n: [f64; 3] = std::array::from_fn(|c| 2.0 * f64::from(normals[[c, y, x]]) - 1.0);
+                let cosine: f64 = (0..3).map(|i| n[i] * sun.direction[i]).sum();
+                let place = [
+                    (x as f64 + 0.5) / FINE as f64,
+                    (y as f64 + 0.5) / FINE as f64,
+                    f64::from(depth[[y, x]]),
+                ];
+                if cosine <= 0.0 || shadow.covers(place, cosine) {
+                    continue;
                 }
-            });
+                // A sky's suns are spread by the cosine already; but toward the viewer, not along the surface's normal.
+                let weight = if sun.lamp { cosine } else { cosine / sun.direction[2] } as f32;
+                (0..3).for_each(|c| light[c] += weight * sun.colour[c]);
+                if sun.lamp {
+                    let facing: f64 = (0..3).map(|i| n[i] * half[i]).sum();
+                    light[3] += sun.colour[0] * facing.max(0.0).powi(90) as f32;
+                }
+            }
+        });
     }
     Ok(light)
 }
@@ -1117,8 +1032,7 @@ impl Shadow {
         for p in scene.meshes.iter_mut().flat_map(|mesh| &mut mesh.positions) {
             (0..2).for_each(|i| p[i] += (f64::from(p[2]) * shear[i] + margin[i] as f64) as f32);
         }
-        let mut ldi =
-            render_ldi_reference(&scene, HEIGHT + 2 * margin[1], WIDTH + 2 * margin[0], 1)?;
+        let mut ldi = render_ldi_reference(&scene, HEIGHT + 2 * margin[1], WIDTH + 2 * margin[0], 1)?;
         Ok(Self {
             depth: ldi.layers.remove(0).depth,
             shear,
@@ -1126,7 +1040,8 @@ impl Shadow {
         })
     }
 
-    /// Whether something lies between the sun and the surface at pixel (x, y) and depth d, which it meets with `cosine`.
+    /// Whether something lies between the sun and the surface at pixel (x, y) and depth d, which it meets with
+    /// `cosine`.
     fn covers(&self, [x, y, d]: [f64; 3], cosine: f64) -> bool {
         let [u, v] = [0, 1].map(|i| [x, y][i] + (0.5 - d) * self.shear[i] + self.margin[i] as f64);
         let (rows, columns) = self.depth.dim();

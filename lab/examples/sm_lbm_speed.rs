@@ -2,8 +2,8 @@
 //! on the same threads, in the same run. `cargo run --release --example sm_lbm_speed`
 //!
 //! The scenes are as dense as can be: every plane has points in every row, so that no row is left out. A 2D transform
-//! by rustfft, which is 1D, is its rows, a transposition (the crate that rustfft itself uses) and its columns, and stays
-//! transposed. Beside it stand the 1D transforms alone, as if columns could be transformed where they lie.
+//! by rustfft, which is 1D, is its rows, a transposition (the crate that rustfft itself uses) and its columns, and
+//! stays transposed. Beside it stand the 1D transforms alone, as if columns could be transformed where they lie.
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
@@ -108,14 +108,7 @@ fn main() -> Result<()> {
         }])?;
         let red = display.wavelengths_m()[0];
         let volume_m = display.volume_depth_m();
-        let padded = asm::padded_shape(
-            height,
-            width,
-            display.pitch_m(),
-            red,
-            volume_m,
-            Padding::Reach,
-        )?;
+        let padded = asm::padded_shape(height, width, display.pitch_m(), red, volume_m, Padding::Reach)?;
         let mut bare = Bare::new(padded);
         let [mut lines_ms, mut bare_ms, mut ours_ms] = [f64::INFINITY; 3];
         let a_plane = |start: Instant| start.elapsed().as_secs_f64() * 1e3 / (3 * planes) as f64;

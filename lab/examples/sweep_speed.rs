@@ -1,8 +1,9 @@
-//! How fast the plane sweep is on a frame, for several planes, tiles and hidden layers: medians of frames after one that
-//! is not counted. Then the usual sweep of frames of that size that are all of one depth, and as bad as can be: another
-//! depth at each pixel, and near and far in turn.
+//! How fast the plane sweep is on a frame, for several planes, tiles and hidden layers: medians of frames after one
+//! that is not counted. Then the usual sweep of frames of that size that are all of one depth, and as bad as can be:
+//! another depth at each pixel, and near and far in turn.
 //!
-//!     cargo run --release --example sweep_speed -- samples/scene_rgb.jpg samples/scene_depth.png [THREADS] [PLANES TAPS LAYERS TILE]
+//!     cargo run --release --example sweep_speed -- samples/scene_rgb.jpg samples/scene_depth.png \
+//!         [THREADS] [PLANES TAPS LAYERS TILE]
 
 use ndarray::Array2;
 use num_complex::Complex32;
@@ -49,10 +50,7 @@ fn main() -> Result<()> {
     let made = [
         ("one depth", of_depth(&|_, _| 0.5)?),
         ("a depth a pixel", of_depth(&noise)?),
-        (
-            "near and far in turn",
-            of_depth(&|y, x| ((y + x) % 2) as f32)?,
-        ),
+        ("near and far in turn", of_depth(&|y, x| ((y + x) % 2) as f32)?),
     ];
     let mut cases: Vec<_> = (cases.into_iter())
         .map(|sweep| ("the files'", &frame, sweep, true))
@@ -113,10 +111,7 @@ fn sweeps(display: &Display, numbers: &[usize]) -> Vec<Sweep> {
     }
     let mut all = vec![usual];
     all.extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep::of_planes(display, planes)));
-    all.extend([0, 1].map(|hidden_layers| Sweep {
-        hidden_layers,
-        ..usual
-    }));
+    all.extend([0, 1].map(|hidden_layers| Sweep { hidden_layers, ..usual }));
     all.extend([64, 128, 192, 384].map(|tile| Sweep { tile, ..usual }));
     all
 }

@@ -9,9 +9,7 @@ use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::network::{Precision, f32_peak, int8_peak};
-use phasefront::{
-    Brightness, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target,
-};
+use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -62,7 +60,8 @@ pub struct Row {
     pub total_ms: f64,
     /// The fastest and the slowest frame.
     pub spread_ms: [f64; 2],
-    /// What encoding through the per-pixel table takes longer than through none, of the whole frame, where there is one.
+    /// What encoding through the per-pixel table takes longer than through none, of the whole frame, where there is
+    /// one.
     pub table_percent: Option<f64>,
     /// Frames that were measured.
     pub frames: usize,
@@ -101,8 +100,8 @@ impl Machine {
     }
 }
 
-/// Measures one case on `target`: frames until `budget` is spent, five at least, after one that is not counted. Where its
-/// modulator has a table for each pixel, each frame is encoded once more, through it.
+/// Measures one case on `target`: frames until `budget` is spent, five at least, after one that is not counted. Where
+/// its modulator has a table for each pixel, each frame is encoded once more, through it.
 ///
 /// # Errors
 /// A case that cannot be planned.
@@ -133,10 +132,7 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         None => Encoding::ANTI_ALIAS,
     };
     let plain = Target::from(&target.display);
-    let options = EncoderOptions {
-        encoding,
-        brightness,
-    };
+    let options = EncoderOptions { encoding, brightness };
     let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
     let Times {
         stages,
@@ -163,9 +159,7 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         layers: network.map_or(0, |network| network.layers()),
         precision: precision.to_string(),
         backend: "cpu",
-        kernels: (pipeline.method().engine())
-            .map_or("", |engine| engine.name)
-            .to_owned(),
+        kernels: (pipeline.method().engine()).map_or("", |engine| engine.name).to_owned(),
         width,
         height,
         threads: case.threads,
@@ -198,12 +192,7 @@ struct Times {
 }
 
 /// Frames until `budget` is spent, five at least, after one that is not counted.
-fn time_frames(
-    case: &Case<'_>,
-    target: &Target,
-    pipeline: &Pipeline,
-    budget: Duration,
-) -> Result<Times> {
+fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Duration) -> Result<Times> {
     let (width, height) = case.size;
     let (name, _) = named(case.method);
     let options = EncoderOptions {
@@ -230,9 +219,7 @@ fn time_frames(
             let modulation = plan.modulate(&mut field, &mut levels, scratch);
             times.table_encode.push(ms(modulation.encode));
         }
-        let encode = pipeline
-            .modulate(&mut field, &mut levels, &mut scratch)
-            .encode;
+        let encode = pipeline.modulate(&mut field, &mut levels, &mut scratch).encode;
         for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
             times.stages.entry(stage).or_default().push(ms(time));
         }
@@ -241,8 +228,8 @@ fn time_frames(
     Ok(times)
 }
 
-/// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it. What
-/// is in it does not change what a network costs; a sweep costs more the more depths are near each other.
+/// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it.
+/// What is in it does not change what a network costs; a sweep costs more the more depths are near each other.
 fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
     let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
     let depth = |y: usize, x: usize| {
@@ -252,9 +239,7 @@ fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
             let (at, radius) = (0.2 + 0.27 * ball as f32, 0.1 + 0.02 * (ball % 3) as f32);
             let inside = radius.powi(2) - (u - at).powi(2) - (v - 0.6).powi(2);
             match inside > 0.0 {
-                true => depth
-                    .min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0)
-                    .max(0.0),
+                true => depth.min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0).max(0.0),
                 false => depth,
             }
         })

@@ -3,7 +3,8 @@
 //! * [`lut`] finds each pixel's phase curve from photographs of the patterns of [`pattern`], which [`marks`]
 //!   registers and [`curve`] fits, and makes the per-pixel table that a phone holds by a [`surface`] through them.
 //! * [`laser`] makes the map of the laser's amplitude.
-//! * [`spot`] finds the coefficients of an aberration from photographs of a focused spot, by what [`pupil`] says of them.
+//! * [`spot`] finds the coefficients of an aberration from photographs of a focused spot, by what [`pupil`] says of
+//!   them.
 //! * [`rehearse`] does all three on a simulated display.
 //!
 //! What files of a calibration look like is in [`table`]; its figures and drawings are [`report`]'s and [`chart`]'s.

@@ -75,9 +75,7 @@ impl Correction {
                 ));
             }
             if !kernel.iter().all(|v| v.is_finite()) {
-                return refuse(format!(
-                    "the kernel of z = {z} m has values that are no numbers"
-                ));
+                return refuse(format!("the kernel of z = {z} m has values that are no numbers"));
             }
         }
         let transposed = |kernel: Array3<Complex32>| {
@@ -102,11 +100,7 @@ impl Correction {
         kernel: impl Fn(f64, f64, f64, f64) -> Complex64,
     ) -> Result<Self> {
         let frequency = |k: usize, n: usize| {
-            let signed = if 2 * k < n {
-                k as f64
-            } else {
-                k as f64 - n as f64
-            };
+            let signed = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
             signed / (n as f64 * display.pitch_m())
         };
         let kernels = (z_m.iter())
@@ -121,10 +115,10 @@ impl Correction {
         Self::new(z_m, kernels)
     }
 
-    /// The kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) cut into `planes`. Coefficients run
-    /// piecewise linearly over z, kernels between neighbours here; so where coefficients change, distances are put
-    /// between the calibrated ones until neighbours differ by at most [`BLEND`] rad, which costs 1 % of the light
-    /// at most.
+    /// The kernels Φ = exp(i·terms) of `aberrations` for frames of (`height`, `width`) cut into `planes`. Coefficients
+    /// run piecewise linearly over z, kernels between neighbours here; so where coefficients change, distances are put
+    /// between the calibrated ones until neighbours differ by at most [`BLEND`] rad, which costs 1 % of the light at
+    /// most.
     ///
     /// # Errors
     /// A volume whose reach, or light that the correction moves so far that it, cannot be padded.
@@ -153,21 +147,14 @@ impl Correction {
         }
         if z_m.len() > planes {
             // Every plane has its own kernel then.
-            z_m = (0..planes)
-                .rev()
-                .map(|k| plane_z_m(k, planes, display))
-                .collect();
+            z_m = (0..planes).rev().map(|k| plane_z_m(k, planes, display)).collect();
         }
         let reach_m = (aberrations.calibrated().iter())
             .map(|(_, a)| a.reach_m(pitch_m))
             .fold(0.0, f64::max);
         let shape = padded_shape_with(height, width, display, reach_m)?;
         let frequency = |k: usize, n: usize| {
-            let k = if 2 * k < n {
-                k as f64
-            } else {
-                k as f64 - n as f64
-            };
+            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
             k / (n as f64 * pitch_m)
         };
         let kernels = (z_m.iter())
@@ -212,12 +199,7 @@ pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(u
 }
 
 /// [`padded_shape`] with room for light that a correction moves by up to `reach_m`.
-fn padded_shape_with(
-    height: usize,
-    width: usize,
-    display: &Display,
-    reach_m: f64,
-) -> Result<(usize, usize)> {
+fn padded_shape_with(height: usize, width: usize, display: &Display, reach_m: f64) -> Result<(usize, usize)> {
     let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
     let more = (reach_m / display.pitch_m()).ceil() as usize;
     Ok(asm::padded_shape(
@@ -284,15 +266,7 @@ pub fn hologram(
     let mut hologram = Array3::zeros((3, height, width));
     let done = Cell::new(0);
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer = |distance_m| {
-            Transfer::new(
-                shape,
-                display.pitch_m(),
-                wavelength_m,
-                distance_m,
-                |_, _| true,
-            )
-        };
+        let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
         let step_m = display.volume_depth_m() / planes as f64;
         let wave = Wave {
             fft: &fft,
@@ -308,9 +282,7 @@ pub fn hologram(
         };
         sum.fill(Complex32::ZERO);
         for (i, swept) in &sweeps {
-            let content = |k: usize, rgb: &[f32; 3]| {
-                Complex32::from(correction.weight(*i, z(k)) * rgb[colour])
-            };
+            let content = |k: usize, rgb: &[f32; 3]| Complex32::from(correction.weight(*i, z(k)) * rgb[colour]);
             wave.sweep(swept, &content, &mut plane, &mut scratch);
             // Φ on the way.
             let kernel = correction.kernels[*i].index_axis(Axis(0), colour);
@@ -352,8 +324,8 @@ struct Wave<'a> {
 }
 
 impl Wave<'_> {
-    /// The spectrum at z = 0, in the scratch's columns, of what `content` gives for the points of the planes `swept`, back
-    /// first; `plane` is room for one plane.
+    /// The spectrum at z = 0, in the scratch's columns, of what `content` gives for the points of the planes `swept`,
+    /// back first; `plane` is room for one plane.
     fn sweep(
         &self,
         swept: &[(usize, Range<usize>)],
@@ -379,9 +351,7 @@ impl Wave<'_> {
                 }
             };
             // Content that this kernel does not correct is weighted 0: its silhouette still blocks.
-            cross(fft, scratch, transfer, points, |point| {
-                content(*k, &point.rgb)
-            });
+            cross(fft, scratch, transfer, points, |point| content(*k, &point.rgb));
             at = *k;
             (self.done)();
         }

@@ -253,22 +253,13 @@ pub fn make(
                 Look::Objects => scene::random_scene(seed, size, size),
                 Look::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
             };
-            let ldi = scene::render_ldi_reference(
-                &scene,
-                manifest.size,
-                manifest.size,
-                manifest.ldi_layers,
-            )?
-            .quantized();
+            let ldi =
+                scene::render_ldi_reference(&scene, manifest.size, manifest.size, manifest.ldi_layers)?.quantized();
             let quiet = |_: usize, _: usize| {};
             let hologram = match &ground_truth {
                 GroundTruth::Plain => sm_lbm::hologram(&ldi, display, planes, &quiet)?,
-                GroundTruth::Corrected(correction) => {
-                    corrected::hologram(&ldi, display, planes, correction, &quiet)?
-                }
-                GroundTruth::Spatial(all) => {
-                    corrected::spatial::hologram(&ldi, display, planes, all, &quiet)?
-                }
+                GroundTruth::Corrected(correction) => corrected::hologram(&ldi, display, planes, correction, &quiet)?,
+                GroundTruth::Spatial(all) => corrected::spatial::hologram(&ldi, display, planes, all, &quiet)?,
             };
             write_pair(&path, &ldi, &hologram)?;
         }
@@ -334,9 +325,7 @@ pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> 
     let depth: Array3<u16> = npz.by_name("depth").map_err(|e| damaged(&e))?;
     let hologram: Array3<Complex32> = npz.by_name("hologram").map_err(|e| damaged(&e))?;
     let (layers, size) = (manifest.ldi_layers, manifest.size);
-    if rgb.dim() != (layers, size, size, 4)
-        || depth.dim() != (layers, size, size)
-        || hologram.dim() != (3, size, size)
+    if rgb.dim() != (layers, size, size, 4) || depth.dim() != (layers, size, size) || hologram.dim() != (3, size, size)
     {
         return Err(damaged(&format!(
             "shapes {:?}, {:?} and {:?} are not those of {layers} layers of {size}×{size} pixels",
@@ -346,9 +335,7 @@ pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> 
         )));
     }
     let layers = (0..layers).map(|l| LdiLayer {
-        rgb: Array3::from_shape_fn((3, size, size), |(c, y, x)| {
-            f32::from(rgb[(l, y, x, c)]) / 255.0
-        }),
+        rgb: Array3::from_shape_fn((3, size, size), |(c, y, x)| f32::from(rgb[(l, y, x, c)]) / 255.0),
         depth: Array2::from_shape_fn((size, size), |(y, x)| match rgb[(l, y, x, 3)] {
             0 => f32::NAN,
             _ => f32::from(depth[(l, y, x)]) / 65535.0,
@@ -385,14 +372,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let texture = Texture::plain([0.2, 0.5, 0.9]);
         let ours = manifest(Look::photographs(std::slice::from_ref(&texture)));
-        make(
-            &ours,
-            std::slice::from_ref(&texture),
-            dir.path(),
-            (1, 4),
-            &|| {},
-        )
-        .unwrap();
+        make(&ours, std::slice::from_ref(&texture), dir.path(), (1, 4), &|| {}).unwrap();
         assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
         let pair = read_pair(&ours, dir.path(), 1).unwrap();
         let scene = scene::natural_scene(ours.scene_seed(1), 24, 24, &[texture]);
@@ -400,10 +380,7 @@ mod tests {
         assert!(pair.ldi == ldi.quantized());
         let other = manifest(Look::photographs(&[]));
         let refused = make(&other, &[], dir.path(), (1, 4), &|| {}).unwrap_err();
-        assert!(
-            refused.to_string().contains("other parameters"),
-            "{refused}"
-        );
+        assert!(refused.to_string().contains("other parameters"), "{refused}");
     }
 
     #[test]

@@ -98,11 +98,9 @@ pub fn degrade(depth: ArrayView2<'_, f32>, how: &Degradation, seed: u64) -> Arra
         for y in 0..h {
             for x in 0..w {
                 let rows = y.saturating_sub(1)..(y + 2).min(h);
-                let around =
-                    rows.flat_map(|y| (x.saturating_sub(1)..(x + 2).min(w)).map(move |x| (y, x)));
-                let (least, most) = around.fold((f32::MAX, f32::MIN), |(a, b), at| {
-                    (a.min(clean[at]), b.max(clean[at]))
-                });
+                let around = rows.flat_map(|y| (x.saturating_sub(1)..(x + 2).min(w)).map(move |x| (y, x)));
+                let (least, most) =
+                    around.fold((f32::MAX, f32::MIN), |(a, b), at| (a.min(clean[at]), b.max(clean[at])));
                 if most - least > EDGE && dice.chance(EDGE_HOLES) {
                     readings[(y, x)] = f32::NAN;
                 }
@@ -192,12 +190,7 @@ pub fn study(
     }
     let shape = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
     let plans = (methods.iter())
-        .map(|(name, method)| {
-            Ok((
-                name,
-                MethodPlan::new(shape.0, shape.1, method.clone(), display)?,
-            ))
-        })
+        .map(|(name, method)| Ok((name, MethodPlan::new(shape.0, shape.1, method.clone(), display)?)))
         .collect::<Result<Vec<_>>>()?;
     let mut rows: Vec<Row> = Vec::new();
     for scene in 0..scenes as u64 {
@@ -287,9 +280,7 @@ mod tests {
         assert!((plain[(5, 5)] - 0.7).abs() < 1e-6);
         assert!((plain[(20, 22)] - 0.3).abs() < 1e-6);
         let noisy = degrade(depth.view(), &DEGRADATIONS[1], 1);
-        let spread = (noisy.iter().zip(&plain))
-            .map(|(a, b)| (a - b).powi(2))
-            .sum::<f32>();
+        let spread = (noisy.iter().zip(&plain)).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
         assert!(((spread / 2000.0).sqrt() - 0.005).abs() < 5e-4);
         let holes = degrade(depth.view(), &DEGRADATIONS[2], 1);
         let missing = holes.iter().filter(|d| d.is_nan()).count();

@@ -27,9 +27,7 @@ use phasefront::unstable::sweep::{
     hidden::{Hidden, NOTHING},
     hidden_reach,
 };
-use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target,
-};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cmp::Reverse;
@@ -55,10 +53,7 @@ pub struct Method<'a> {
 
 impl<'a> Method<'a> {
     /// Any function from a scene to its midpoint hologram, (3, H, W), carrier left out.
-    pub fn new(
-        name: impl Into<String>,
-        field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a,
-    ) -> Self {
+    pub fn new(name: impl Into<String>, field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a) -> Self {
         Method {
             name: name.into(),
             field: Box::new(field),
@@ -87,9 +82,7 @@ impl<'a> Method<'a> {
 
     /// SM-LBM with `planes` planes on all layers.
     pub fn layers(display: &'a Display, planes: usize) -> Self {
-        Self::new("layers", move |ldi| {
-            sm_lbm::hologram(ldi, display, planes, &|_, _| {})
-        })
+        Self::new("layers", move |ldi| sm_lbm::hologram(ldi, display, planes, &|_, _| {}))
     }
 
     /// SM-LBM with `planes` planes on what is visible and the hidden surfaces that the sweep adds to it: the sweep by
@@ -130,12 +123,7 @@ impl<'a> Method<'a> {
     ///
     /// # Errors
     /// A pre-filter, or a network for another display.
-    pub fn network(
-        name: impl Into<String>,
-        network: &Network,
-        size: usize,
-        display: &Display,
-    ) -> Result<Self> {
+    pub fn network(name: impl Into<String>, network: &Network, size: usize, display: &Display) -> Result<Self> {
         let name = name.into();
         if network.input() == InputKind::Seeded {
             return Self::seeded(name, network, size, display);
@@ -166,19 +154,15 @@ impl<'a> Method<'a> {
 /// The front layer's amplitudes, black where nothing is.
 pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     let front = &ldi.layers[0];
-    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| {
-        match front.depth[(y, x)].is_nan() {
-            true => 0.0,
-            false => front.rgb[(c, y, x)],
-        }
+    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| match front.depth[(y, x)].is_nan() {
+        true => 0.0,
+        false => front.rgb[(c, y, x)],
     })
 }
 
 /// The front layer as a frame: black and farthest where nothing is.
 fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
-    let depth = ldi.layers[0]
-        .depth
-        .mapv(|d| if d.is_nan() { 1.0 } else { d });
+    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     Ok(RgbdFrame::new(visible_rgb(ldi), depth)?)
 }
 
@@ -203,9 +187,7 @@ pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
             rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
                 of(y, x).map_or(0.0, |(y, x)| frame.rgb()[(c, y, x)])
             }),
-            depth: Array2::from_shape_fn((height, width), |(y, x)| {
-                of(y, x).map_or(f32::NAN, |at| depth[at])
-            }),
+            depth: Array2::from_shape_fn((height, width), |(y, x)| of(y, x).map_or(f32::NAN, |at| depth[at])),
         }
     });
     let front = LdiLayer {
@@ -283,13 +265,11 @@ pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
         bins.swap(i, dice.integer(i, DEPTH_BINS - 1));
     }
     bins.truncate(FREQUENT_DEPTHS + RANDOM_DEPTHS);
-    bins.iter()
-        .map(|bin| (*bin as f64 + 0.5) / DEPTH_BINS as f64)
-        .collect()
+    bins.iter().map(|bin| (*bin as f64 + 0.5) / DEPTH_BINS as f64).collect()
 }
 
-/// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration that is
-/// one for all depths, it looks through that (the paper's Fig. 8).
+/// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration
+/// that is one for all depths, it looks through that (the paper's Fig. 8).
 pub struct Viewer {
     display: Display,
     size: usize,
@@ -330,12 +310,7 @@ impl Viewer {
     ///
     /// # Errors
     /// A z outside of the volume, or an encoding that cannot be planned.
-    pub fn views(
-        &self,
-        field: &Array3<Complex32>,
-        shown: &Shown,
-        z_m: &[f64],
-    ) -> Result<Vec<Array3<f32>>> {
+    pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
         let refocus = match shown.encoding.clone() {
@@ -348,8 +323,7 @@ impl Viewer {
                 };
                 let modulator = Modulator::new((size, size), &target, &options)?;
                 let mut levels = vec![0; values.len()];
-                let modulation =
-                    modulator.modulate(&mut values, &mut levels, &mut modulator.scratch());
+                let modulation = modulator.modulate(&mut values, &mut levels, &mut modulator.scratch());
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
                 &self.apertured
             }
@@ -405,15 +379,12 @@ pub fn evaluate(
             Ok(figures)
         })
         .collect::<Result<Vec<_>>>()?;
-    let ways = methods
-        .iter()
-        .flat_map(|m| shown.iter().map(move |s| (m, s)));
+    let ways = methods.iter().flat_map(|m| shown.iter().map(move |s| (m, s)));
     Ok(ways
         .enumerate()
         .map(|(way, (method, shown))| {
             let each = || of_scenes.iter().map(|figures| figures[way]);
-            let mean =
-                |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
+            let mean = |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
             Row {
                 method: method.name.clone(),
                 shown: shown.name.clone(),
@@ -435,9 +406,7 @@ fn judge(views: &[Array3<f32>], truth: &[Array3<f32>]) -> Result<Figures> {
         .map(|(view, truth)| metrics::compare(view.view(), truth.view()))
         .collect::<Result<Vec<_>>>()?;
     let (midpoint, stack) = (&each[0], &each[1..]);
-    let mean = |figure: fn(&metrics::Comparison) -> f64| {
-        stack.iter().map(figure).sum::<f64>() / stack.len() as f64
-    };
+    let mean = |figure: fn(&metrics::Comparison) -> f64| stack.iter().map(figure).sum::<f64>() / stack.len() as f64;
     Ok(Figures {
         amplitude_psnr: midpoint.psnr_overall,
         amplitude_ssim: midpoint.ssim_overall,
@@ -461,12 +430,8 @@ pub fn write_picture(
 ) -> Result<()> {
     let viewer = Viewer::new(manifest)?;
     let pair = dataset::read_pair(manifest, dir, index)?;
-    let ours = viewer
-        .views(&(method.field)(&pair.ldi)?, shown, &[0.0])?
-        .remove(0);
-    let truth = viewer
-        .views(&pair.hologram, &Shown::complex(), &[0.0])?
-        .remove(0);
+    let ours = viewer.views(&(method.field)(&pair.ldi)?, shown, &[0.0])?.remove(0);
+    let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.remove(0);
     let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
     let gap = Array3::from_elem((3, manifest.size, 4), 1.0);
     let input = visible_rgb(&pair.ldi);

@@ -97,9 +97,7 @@ pub fn write_atomically(
         .tempfile_in(folder)
         .map_err(refuse)?;
     let mut buffer = BufWriter::new(temporary.as_file_mut());
-    write(&mut buffer)
-        .and_then(|()| buffer.flush())
-        .map_err(refuse)?;
+    write(&mut buffer).and_then(|()| buffer.flush()).map_err(refuse)?;
     drop(buffer);
     #[cfg(unix)]
     {
@@ -158,17 +156,11 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
     let values: Vec<f32> = match image {
         DynamicImage::ImageLuma8(grey) => {
             let over = over(255.0);
-            grey.into_raw()
-                .into_iter()
-                .map(|v| f32::from(v) / over)
-                .collect()
+            grey.into_raw().into_iter().map(|v| f32::from(v) / over).collect()
         }
         DynamicImage::ImageLuma16(grey) => {
             let over = over(65535.0);
-            grey.into_raw()
-                .into_iter()
-                .map(|v| f32::from(v) / over)
-                .collect()
+            grey.into_raw().into_iter().map(|v| f32::from(v) / over).collect()
         }
         other => {
             return Err(Error::file(
@@ -185,8 +177,7 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 
 fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
     let read = |_: ()| -> Result<BufReader<File>> {
-        let file =
-            File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
         Ok(BufReader::new(file))
     };
     let over = |most: f32| if normalized { most } else { 1.0 };
@@ -245,13 +236,7 @@ pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Resu
     })
 }
 
-fn write_png(
-    path: &Path,
-    width: usize,
-    height: usize,
-    rgb: &[u8],
-    info: Option<&HologramInfo>,
-) -> Result<()> {
+fn write_png(path: &Path, width: usize, height: usize, rgb: &[u8], info: Option<&HologramInfo>) -> Result<()> {
     let text = info
         .map(serde_json::to_string)
         .transpose()
@@ -262,9 +247,7 @@ fn write_png(
         encoder.set_depth(png::BitDepth::Eight);
         let other = std::io::Error::other;
         if let Some(text) = text {
-            encoder
-                .add_text_chunk(PNG_CHUNK.into(), text)
-                .map_err(other)?;
+            encoder.add_text_chunk(PNG_CHUNK.into(), text).map_err(other)?;
         }
         let mut writer = encoder.write_header().map_err(other)?;
         writer.write_image_data(rgb).map_err(other)?;
@@ -276,11 +259,7 @@ fn write_png(
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_phase_only(
-    path: &Path,
-    levels: ArrayView3<'_, u8>,
-    info: &HologramInfo,
-) -> Result<()> {
+pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
     let (_, height, width) = levels.dim();
     write_png(path, width, height, &interleaved(levels, |v| v), Some(info))
 }
@@ -289,14 +268,8 @@ pub fn write_phase_only(
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_complex(
-    path: &Path,
-    field: ArrayView3<'_, Complex32>,
-    info: &HologramInfo,
-) -> Result<()> {
-    write_atomically(path, |file| {
-        field.write_npy(file).map_err(std::io::Error::other)
-    })?;
+pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &HologramInfo) -> Result<()> {
+    write_atomically(path, |file| field.write_npy(file).map_err(std::io::Error::other))?;
     let beside = path.with_extension("json");
     let text = serde_json::to_string_pretty(info).map_err(|e| Error::file(&beside, e))?;
     write_atomically(&beside, |file| writeln!(file, "{text}"))
@@ -308,14 +281,9 @@ pub fn write_complex(
 /// A file that is missing or cut short, or an image that is no hologram of ours.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
-        let file =
-            File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        let field = Array3::<Complex32>::read_npy(BufReader::new(file)).map_err(|e| {
-            Error::file(
-                path,
-                format!("is not a whole complex64 .npy of shape (3, H, W): {e}"),
-            )
-        })?;
+        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+        let field = Array3::<Complex32>::read_npy(BufReader::new(file))
+            .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (3, H, W): {e}")))?;
         if field.dim().0 != 3 || field.is_empty() {
             return Err(Error::file(
                 path,
@@ -323,14 +291,10 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
             ));
         }
         let beside = path.with_extension("json");
-        let text = std::fs::read_to_string(&beside).map_err(|e| {
-            Error::file(&beside, format!("is needed beside {}: {e}", path.display()))
-        })?;
+        let text = std::fs::read_to_string(&beside)
+            .map_err(|e| Error::file(&beside, format!("is needed beside {}: {e}", path.display())))?;
         let info = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
-        return Ok(Hologram::Complex(
-            field.as_standard_layout().into_owned(),
-            info,
-        ));
+        return Ok(Hologram::Complex(field.as_standard_layout().into_owned(), info));
     }
     let info = read_info(path)?.ok_or_else(|| {
         Error::file(
@@ -344,9 +308,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
     };
     let (width, height) = (image.width() as usize, image.height() as usize);
     let bytes = image.into_raw();
-    let levels = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-        bytes[3 * (y * width + x) + c]
-    });
+    let levels = Array3::from_shape_fn((3, height, width), |(c, y, x)| bytes[3 * (y * width + x) + c]);
     Ok(Hologram::PhaseOnly(levels, info))
 }
 
@@ -419,10 +381,7 @@ impl DisplayFile {
     /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
-            (
-                "per_pixel",
-                phase_only && self.target.response.shape().is_some(),
-            ),
+            ("per_pixel", phase_only && self.target.response.shape().is_some()),
             ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
         ];
@@ -431,38 +390,30 @@ impl DisplayFile {
     }
 }
 
-/// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of 256
-/// levels, and those of [`crate::calibrate::table`].
+/// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
+/// 256 levels, and those of [`crate::calibrate::table`].
 ///
 /// # Errors
 /// A file that is missing or says what cannot be.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
-    let read = |path: &Path| {
-        std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))
-    };
+    let read =
+        |path: &Path| std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")));
     let text = read(path)?;
-    let mut table: toml::Table = toml::from_str(&text)
-        .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let mut table: toml::Table =
+        toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
     let mut named = |key: &str| match table.remove(key) {
         None => Ok(None),
         Some(toml::Value::String(name)) => Ok(Some(path.with_file_name(name))),
-        Some(_) => Err(Error::file(
-            path,
-            format!("{key} must be the name of a file"),
-        )),
+        Some(_) => Err(Error::file(path, format!("{key} must be the name of a file"))),
     };
     let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
     let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
-    let display = Display::deserialize(table)
-        .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let display = Display::deserialize(table).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
     let lut = match lut_path {
         None => None,
         Some(path) => {
-            let levels: std::result::Result<Vec<u8>, _> =
-                read(&path)?.split_whitespace().map(str::parse).collect();
-            let levels = levels.map_err(|e| {
-                Error::file(&path, format!("holds what is no level of 0..=255: {e}"))
-            })?;
+            let levels: std::result::Result<Vec<u8>, _> = read(&path)?.split_whitespace().map(str::parse).collect();
+            let levels = levels.map_err(|e| Error::file(&path, format!("holds what is no level of 0..=255: {e}")))?;
             Some(lut_of(&levels).map_err(|e| Error::file(&path, e))?)
         }
     };
@@ -497,14 +448,11 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     Ok(DisplayFile {
         target,
         lut,
-        aberration: aberration_path
-            .map(|p| table::read_aberrations(&p))
-            .transpose()?,
+        aberration: aberration_path.map(|p| table::read_aberrations(&p)).transpose()?,
     })
 }
 
 /// Whether the name of `path` ends in `.extension`.
 pub fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case(extension))
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
 }

@@ -73,13 +73,7 @@ pub struct Row {
 ///
 /// # Errors
 /// Fewer than two frames, or what a session refuses.
-pub fn study(
-    seed: u64,
-    frames: usize,
-    display: &Display,
-    method: &Method,
-    done: &dyn Fn(),
-) -> Result<Vec<Row>> {
+pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done: &dyn Fn()) -> Result<Vec<Row>> {
     if frames < 2 {
         return Err(Error::Input(
             "a change from frame to frame needs at least two frames".into(),
@@ -89,9 +83,7 @@ pub fn study(
     let random = scene::random_scene(seed, shape.0, shape.1);
     let ldi = scene::render_ldi_reference(&random, shape.0, shape.1, 1)?.quantized();
     let rgb = colour_bytes(&ldi);
-    let depth = ldi.layers[0]
-        .depth
-        .mapv(|d| if d.is_nan() { 1.0 } else { d });
+    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     let readings: Vec<Vec<u8>> = (0..frames)
         .map(|frame| {
             let readings = degrade(depth.view(), &SENSOR_FAULTS, seed + 1 + frame as u64);
@@ -134,20 +126,13 @@ pub fn study(
 }
 
 fn changes(setting: &'static str, seen: &[Vec<f32>]) -> Row {
-    let mean =
-        |frame: &[f32]| frame.iter().map(|v| f64::from(*v)).sum::<f64>() / frame.len() as f64;
+    let mean = |frame: &[f32]| frame.iter().map(|v| f64::from(*v)).sum::<f64>() / frame.len() as f64;
     let means: Vec<f64> = seen.iter().map(|frame| mean(frame)).collect();
     let overall = means.iter().sum::<f64>() / means.len() as f64;
     let steps = (means.len() - 1) as f64;
-    let brightness = means
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]).powi(2))
-        .sum::<f64>();
+    let brightness = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
     let pixel = (seen.windows(2)).map(|pair| {
-        let squares = pair[0]
-            .iter()
-            .zip(&pair[1])
-            .map(|(a, b)| f64::from(b - a).powi(2));
+        let squares = pair[0].iter().zip(&pair[1]).map(|(a, b)| f64::from(b - a).powi(2));
         squares.sum::<f64>() / pair[0].len() as f64
     });
     Row {
@@ -162,9 +147,7 @@ fn colour_bytes(ldi: &Ldi) -> Vec<u8> {
     let rgb = &ldi.layers[0].rgb;
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y, x)));
     pixels
-        .flat_map(|(y, x)| {
-            [0, 1, 2].map(|c| (rgb[(c, y, x)].clamp(0.0, 1.0) * 255.0).round() as u8)
-        })
+        .flat_map(|(y, x)| [0, 1, 2].map(|c| (rgb[(c, y, x)].clamp(0.0, 1.0) * 255.0).round() as u8))
         .collect()
 }
 

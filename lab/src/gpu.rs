@@ -44,11 +44,7 @@ pub fn keep_programs(device: &Device) {
 
 /// Where compiled programs are kept.
 fn programs() -> Option<PathBuf> {
-    let of = |name: &str| {
-        std::env::var_os(name)
-            .filter(|v| !v.is_empty())
-            .map(PathBuf::from)
-    };
+    let of = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let folder = of("XDG_CACHE_HOME").or_else(|| Some(of("HOME")?.join(".cache")))?;
     Some(folder.join("phasefront/gpu-programs"))
 }

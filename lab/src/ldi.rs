@@ -40,8 +40,8 @@ impl PartialEq for LdiLayer {
     }
 }
 
-/// The planes of [`phasefront::unstable::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn, each minus ½;
-/// black and farthest where there is no hit, or no such layer.
+/// The planes of [`phasefront::unstable::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn,
+/// each minus ½; black and farthest where there is no hit, or no such layer.
 impl Source for Ldi {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let Some(layer) = self.layers.get(plane / 4) else {
@@ -94,8 +94,7 @@ impl Ldi {
         for index in 0..count {
             layers.push(read_layer(dir, index)?);
         }
-        check_layers(&layers)
-            .map_err(|(index, reason)| Error::file(dir.join(depth_name(index)), reason))?;
+        check_layers(&layers).map_err(|(index, reason)| Error::file(dir.join(depth_name(index)), reason))?;
         Ok(Self { layers })
     }
 
@@ -109,11 +108,9 @@ impl Ldi {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
-        let temp =
-            temp_dir(parent).map_err(|e| Error::file(dir, format!("cannot write here: {e}")))?;
+        let temp = temp_dir(parent).map_err(|e| Error::file(dir, format!("cannot write here: {e}")))?;
         for (index, layer) in self.layers.iter().enumerate() {
-            write_layer(temp.path(), index, layer)
-                .map_err(|e| Error::file(dir.join(layer_name(index)), e))?;
+            write_layer(temp.path(), index, layer).map_err(|e| Error::file(dir.join(layer_name(index)), e))?;
         }
         if !exists {
             fs::rename(temp.path(), dir).map_err(|e| Error::file(dir, e))?;
@@ -174,11 +171,7 @@ fn check_layers(layers: &[LdiLayer]) -> std::result::Result<(), (usize, String)>
         if let Some(value) = layer.rgb.iter().find(|value| !(0.0..=1.0).contains(*value)) {
             return bad(format!("colour {value} is outside [0, 1]"));
         }
-        if let Some(value) = layer
-            .depth
-            .iter()
-            .find(|d| !d.is_nan() && !(0.0..=1.0).contains(*d))
-        {
+        if let Some(value) = layer.depth.iter().find(|d| !d.is_nan() && !(0.0..=1.0).contains(*d)) {
             return bad(format!("depth {value} is outside [0, 1]"));
         }
         for (deepest, &d) in deepest.iter_mut().zip(&layer.depth) {
@@ -265,11 +258,7 @@ fn count_layers(dir: &Path) -> Result<usize> {
             "no layer_0.png here; an LDI folder holds layer_0.png, depth_0.png, layer_1.png …",
         ));
     }
-    match found
-        .iter()
-        .enumerate()
-        .find(|&(expected, &index)| expected != index)
-    {
+    match found.iter().enumerate().find(|&(expected, &index)| expected != index) {
         Some((missing, next)) => Err(Error::file(
             dir.join(layer_name(missing)),
             format!(
@@ -285,10 +274,7 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
     let colour = decode(&dir.join(layer_name(index)))?.to_rgba8();
     let depth_path = dir.join(depth_name(index));
     let (depth_shape, depths): (_, Vec<f32>) = match decode(&depth_path)? {
-        DynamicImage::ImageLuma16(image) => (
-            image.dimensions(),
-            image.iter().map(|&v| depth_of_code(v)).collect(),
-        ),
+        DynamicImage::ImageLuma16(image) => (image.dimensions(), image.iter().map(|&v| depth_of_code(v)).collect()),
         DynamicImage::ImageLuma8(image) => (
             image.dimensions(),
             image.iter().map(|&v| f32::from(v) / 255.0).collect(),
@@ -296,10 +282,7 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
         other => {
             return Err(Error::file(
                 depth_path,
-                format!(
-                    "{:?} pixels; a depth map is grey of 16 or 8 bits",
-                    other.color()
-                ),
+                format!("{:?} pixels; a depth map is grey of 16 or 8 bits", other.color()),
             ));
         }
     };
@@ -311,11 +294,7 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
             format!("{w}x{h} pixels, but its layer has {width}x{height}"),
         ));
     }
-    Ok(from_codes(
-        (height as usize, width as usize),
-        colour.as_raw(),
-        &depths,
-    ))
+    Ok(from_codes((height as usize, width as usize), colour.as_raw(), &depths))
 }
 
 fn decode(path: &Path) -> Result<DynamicImage> {
@@ -331,9 +310,7 @@ fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> std::result::Resul
     let (rgba, depth) = to_codes(layer);
     let encode = |name: String, bytes: &[u8], kind| -> std::result::Result<(), String> {
         let mut file = BufWriter::new(File::create(dir.join(name)).map_err(|e| e.to_string())?);
-        let shape = |n: usize| {
-            u32::try_from(n).map_err(|_| format!("{width}x{height} pixels are too many for a PNG"))
-        };
+        let shape = |n: usize| u32::try_from(n).map_err(|_| format!("{width}x{height} pixels are too many for a PNG"));
         let (width, height) = (shape(width)?, shape(height)?);
         PngEncoder::new(&mut file)
             .write_image(bytes, width, height, kind)
@@ -366,9 +343,7 @@ mod tests {
     /// Two layers of 7x5 with values that do not fall on codes, and holes.
     fn sample() -> Ldi {
         let layer = |base: f32, hole: usize| LdiLayer {
-            rgb: Array3::from_shape_fn((3, 5, 7), |(c, y, x)| {
-                ((c * 35 + y * 7 + x) as f32 * 0.618) % 1.0
-            }),
+            rgb: Array3::from_shape_fn((3, 5, 7), |(c, y, x)| ((c * 35 + y * 7 + x) as f32 * 0.618) % 1.0),
             depth: Array2::from_shape_fn((5, 7), |(y, x)| {
                 if (y + x) % hole == 0 {
                     f32::NAN
@@ -437,10 +412,7 @@ mod tests {
                 assert_eq!(read.depth[[y, x]].is_nan(), d.is_nan());
                 if !d.is_nan() {
                     assert!((read.depth[[y, x]] - d).abs() <= 0.5 / 65535.0 + 1e-7);
-                    assert!(
-                        (0..3).all(|c| (read.rgb[[c, y, x]] - made.rgb[[c, y, x]]).abs()
-                            <= 0.5 / 255.0 + 1e-6)
-                    );
+                    assert!((0..3).all(|c| (read.rgb[[c, y, x]] - made.rgb[[c, y, x]]).abs() <= 0.5 / 255.0 + 1e-6));
                 }
             }
         }
@@ -454,10 +426,7 @@ mod tests {
         fs::write(root.path().join("notes.txt"), "mine").unwrap();
         let one = Ldi::new(sample().layers[..1].to_vec()).unwrap();
         one.write(root.path()).unwrap();
-        assert_eq!(
-            names(root.path()),
-            ["depth_0.png", "layer_0.png", "notes.txt"]
-        );
+        assert_eq!(names(root.path()), ["depth_0.png", "layer_0.png", "notes.txt"]);
         assert_eq!(Ldi::read(root.path()).unwrap(), one.quantized());
     }
 
@@ -482,10 +451,7 @@ mod tests {
     /// The error names the file `name` and says `reason`.
     fn assert_refused(dir: &Path, name: &str, reason: &str) {
         let message = Ldi::read(dir).unwrap_err().to_string();
-        assert!(
-            message.contains(name) && message.contains(reason),
-            "{message}"
-        );
+        assert!(message.contains(name) && message.contains(reason), "{message}");
         assert!(!message.contains('\n'), "{message}");
     }
 
@@ -508,13 +474,9 @@ mod tests {
         fs::write(dir.join("layer_1.png"), &bytes[..bytes.len() / 2]).unwrap();
         assert_refused(&dir, "layer_1.png", "not a readable PNG");
         restore();
-        image::GrayImage::new(3, 3)
-            .save(dir.join("depth_0.png"))
-            .unwrap();
+        image::GrayImage::new(3, 3).save(dir.join("depth_0.png")).unwrap();
         assert_refused(&dir, "depth_0.png", "3x3 pixels, but its layer has 7x5");
-        image::RgbImage::new(7, 5)
-            .save(dir.join("depth_0.png"))
-            .unwrap();
+        image::RgbImage::new(7, 5).save(dir.join("depth_0.png")).unwrap();
         assert_refused(&dir, "depth_0.png", "grey of 16 or 8 bits");
         restore();
         fs::rename(dir.join("depth_0.png"), dir.join("swap")).unwrap();

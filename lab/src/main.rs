@@ -13,12 +13,7 @@ fn main() -> ExitCode {
         .parse_default_env()
         .format(|out, record| {
             use std::io::Write;
-            writeln!(
-                out,
-                "{}: {}",
-                record.level().as_str().to_lowercase(),
-                record.args()
-            )
+            writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args())
         })
         .init();
     match command.run() {

@@ -68,17 +68,11 @@ pub fn ssim(a: ArrayView2<'_, f32>, b: ArrayView2<'_, f32>) -> f64 {
     let (height, width) = a.dim();
     let half = SSIM_HALF.min((height.min(width) - 1) / 2);
     let blur = |value: &dyn Fn(f64, f64) -> f64| {
-        let joined = Zip::from(a)
-            .and(b)
-            .map_collect(|a, b| value((*a).into(), (*b).into()));
+        let joined = Zip::from(a).and(b).map_collect(|a, b| value((*a).into(), (*b).into()));
         window(&joined, half)
     };
     let (mean_a, mean_b) = (blur(&|a, _| a), blur(&|_, b| b));
-    let (aa, bb, ab) = (
-        blur(&|a, _| a * a),
-        blur(&|_, b| b * b),
-        blur(&|a, b| a * b),
-    );
+    let (aa, bb, ab) = (blur(&|a, _| a * a), blur(&|_, b| b * b), blur(&|a, b| a * b));
     let (c1, c2) = (0.01f64.powi(2), 0.03f64.powi(2));
     let similarity = Zip::from(&mean_a)
         .and(&mean_b)
@@ -118,9 +112,7 @@ mod tests {
     /// SSIM by its definition: a double sum over each window.
     fn naive_ssim(a: &Array2<f32>, b: &Array2<f32>) -> f64 {
         let (h, w) = a.dim();
-        let g = |i: usize, j: usize| {
-            (-((i as f64 - 5.0).powi(2) + (j as f64 - 5.0).powi(2)) / (2.0 * 1.5 * 1.5)).exp()
-        };
+        let g = |i: usize, j: usize| (-((i as f64 - 5.0).powi(2) + (j as f64 - 5.0).powi(2)) / (2.0 * 1.5 * 1.5)).exp();
         let total: f64 = (0..121).map(|k| g(k / 11, k % 11)).sum();
         let mut sum = 0.0;
         for y in 0..h - 10 {
@@ -137,8 +129,7 @@ mod tests {
                 let va = mean(&|a, _| (a - ma).powi(2));
                 let vb = mean(&|_, b| (b - mb).powi(2));
                 let cov = mean(&|a, b| (a - ma) * (b - mb));
-                sum += (2.0 * ma * mb + 1e-4) * (2.0 * cov + 9e-4)
-                    / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
+                sum += (2.0 * ma * mb + 1e-4) * (2.0 * cov + 9e-4) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4));
             }
         }
         sum / ((h - 10) * (w - 10)) as f64
@@ -146,8 +137,7 @@ mod tests {
 
     fn planes() -> (Array2<f32>, Array2<f32>) {
         let a = Array2::from_shape_fn((17, 14), |(y, x)| ((y * 3 + x * 5) % 11) as f32 / 11.0);
-        let b = a.mapv(|v| v * 0.8 + 0.05)
-            + &Array2::from_shape_fn((17, 14), |(y, x)| ((y * x) % 7) as f32 / 100.0);
+        let b = a.mapv(|v| v * 0.8 + 0.05) + &Array2::from_shape_fn((17, 14), |(y, x)| ((y * x) % 7) as f32 / 100.0);
         (a, b)
     }
 

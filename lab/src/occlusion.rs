@@ -150,12 +150,7 @@ pub fn two_bars() -> Ldi {
 ///
 /// # Errors
 /// A scene without points, and what the methods refuse.
-pub fn study(
-    ldi: &Ldi,
-    display: &Display,
-    planes: usize,
-    progress: &dyn Fn(usize),
-) -> Result<Study> {
+pub fn study(ldi: &Ldi, display: &Display, planes: usize, progress: &dyn Fn(usize)) -> Result<Study> {
     let (height, width) = ldi.shape();
     let rasterized = Ldi {
         layers: ldi.layers[..1].to_vec(),
@@ -164,9 +159,7 @@ pub fn study(
     for setting in SETTINGS {
         let input = if setting.rasterized { &rasterized } else { ldi };
         holograms.push(match setting.method {
-            Method::Points(occlusion) => {
-                point_based::hologram(input, display, planes, occlusion, &|_, _| {})?
-            }
+            Method::Points(occlusion) => point_based::hologram(input, display, planes, occlusion, &|_, _| {})?,
             Method::Waves => sm_lbm::hologram(input, display, planes, &|_, _| {})?,
         });
         progress(holograms.len());
@@ -180,9 +173,7 @@ pub fn study(
         let values = hologram.as_slice().expect("standard layout");
         let stack = plan.focal_stack(values, &focuses)?;
         let [front, rear]: [Vec<f32>; 2] = stack.try_into().expect("a view a focus");
-        let shaped = |view| {
-            Array3::from_shape_vec((3, height, width), view).expect("a view of the scene's shape")
-        };
+        let shaped = |view| Array3::from_shape_vec((3, height, width), view).expect("a view of the scene's shape");
         views.push([shaped(front), shaped(rear)]);
     }
     let regions = Regions::of(ldi, display, [front_z_m, rear_z_m]);
@@ -228,8 +219,7 @@ fn focuses(ldi: &Ldi, display: &Display, planes: usize) -> Result<[f64; 2]> {
     }
     depths.sort_unstable_by(f32::total_cmp);
     let last = depths.len() - 1;
-    Ok([last / 20, last - last / 20]
-        .map(|i| plane_z_m(plane_of_depth(depths[i], planes), planes, display)))
+    Ok([last / 20, last - last / 20].map(|i| plane_z_m(plane_of_depth(depths[i], planes), planes, display)))
 }
 
 /// Where the artefacts are looked for.
@@ -328,9 +318,8 @@ mod tests {
         }
         for reach in [0, 1, 3, 20] {
             let expected = Array2::from_shape_fn(set.dim(), |(y, x)| {
-                set.indexed_iter().any(|((sy, sx), marked)| {
-                    *marked && y.abs_diff(sy) <= reach && x.abs_diff(sx) <= reach
-                })
+                set.indexed_iter()
+                    .any(|((sy, sx), marked)| *marked && y.abs_diff(sy) <= reach && x.abs_diff(sx) <= reach)
             });
             assert_eq!(widened(&set, reach), expected);
         }

@@ -31,9 +31,9 @@ pub struct Panel<'a> {
 /// A point that is not finite, no point at all, or a file that cannot be written.
 pub fn write_svg(path: &Path, panels: &[Panel<'_>]) -> Result<()> {
     let bad = panels.is_empty()
-        || panels.iter().any(|panel| {
-            panel.points.is_empty() || panel.points.iter().any(|(_, y)| !y.is_finite())
-        });
+        || panels
+            .iter()
+            .any(|panel| panel.points.is_empty() || panel.points.iter().any(|(_, y)| !y.is_finite()));
     if bad {
         return Err(Error::Input(
             "a plot needs at least one point a curve, all of them finite".into(),
@@ -69,11 +69,7 @@ pub fn write_bars(path: &Path, title: &str, bars: &[Bar]) -> Result<()> {
     files::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
-fn draw_bars(
-    text: &mut String,
-    title: &str,
-    bars: &[Bar],
-) -> std::result::Result<(), Box<dyn std::error::Error>> {
+fn draw_bars(text: &mut String, title: &str, bars: &[Bar]) -> std::result::Result<(), Box<dyn std::error::Error>> {
     const COLOURS: [RGBColor; 4] = [
         COLOUR,
         RGBColor(231, 138, 50),
@@ -104,10 +100,7 @@ fn draw_bars(
         for (k, (_, length)) in bar.parts.iter().enumerate() {
             let at = |length: f64| LEFT + (length / longest * LENGTH).round() as i32;
             let corners = [(at(end), y), (at(end + length), y + ROW - 7)];
-            root.draw(&Rectangle::new(
-                corners,
-                COLOURS[k % COLOURS.len()].filled(),
-            ))?;
+            root.draw(&Rectangle::new(corners, COLOURS[k % COLOURS.len()].filled()))?;
             end += length;
         }
         let x = LEFT + 6 + (end / longest * LENGTH).round() as i32;
@@ -117,10 +110,7 @@ fn draw_bars(
     Ok(())
 }
 
-fn draw(
-    text: &mut String,
-    panels: &[Panel<'_>],
-) -> std::result::Result<(), Box<dyn std::error::Error>> {
+fn draw(text: &mut String, panels: &[Panel<'_>]) -> std::result::Result<(), Box<dyn std::error::Error>> {
     let size = (PANEL.0 * panels.len() as u32, PANEL.1);
     let root = SVGBackend::with_string(text, size).into_drawing_area();
     root.fill(&WHITE)?;
@@ -145,16 +135,8 @@ fn draw(
             .axis_desc_style(("sans-serif", 15))
             .light_line_style(TRANSPARENT)
             .draw()?;
-        chart.draw_series(LineSeries::new(
-            panel.points.iter().copied(),
-            COLOUR.stroke_width(2),
-        ))?;
-        chart.draw_series(
-            panel
-                .points
-                .iter()
-                .map(|point| Circle::new(*point, 4, COLOUR.filled())),
-        )?;
+        chart.draw_series(LineSeries::new(panel.points.iter().copied(), COLOUR.stroke_width(2)))?;
+        chart.draw_series(panel.points.iter().map(|point| Circle::new(*point, 4, COLOUR.filled())))?;
     }
     root.present()?;
     Ok(())

@@ -109,11 +109,7 @@ impl Table {
             let lit = row.slice(s![radius - half..=radius + half]);
             values.extend(lit.iter().map(|v| Complex32::new(v.re as f32, v.im as f32)));
         }
-        Table {
-            radius,
-            rows,
-            values,
-        }
+        Table { radius, rows, values }
     }
 
     /// Adds `amplitude` times the sub-hologram of a point at (`y`, `x`) to `plane`, rows `rows` of a frame of `width`,
@@ -353,8 +349,8 @@ pub fn hologram(
                         let Some(tables) = &tables[hit.plane as usize] else {
                             continue;
                         };
-                        let shaded = occlusion == Occlusion::Geometric
-                            && mask.cast(&points, (y, x), hit.plane, widest(tables));
+                        let shaded =
+                            occlusion == Occlusion::Geometric && mask.cast(&points, (y, x), hit.plane, widest(tables));
                         let open = shaded.then_some(&mask);
                         for (c, table) in tables.iter().enumerate() {
                             let plane = &mut part[c * size..][..size];
@@ -387,10 +383,7 @@ pub fn hologram(
 
 fn check_planes(planes: usize) -> Result<()> {
     if !(1..=1 << 24).contains(&planes) {
-        return Err(Error::Input(format!(
-            "{planes} planes; there must be 1 to {}",
-            1 << 24
-        )));
+        return Err(Error::Input(format!("{planes} planes; there must be 1 to {}", 1 << 24)));
     }
     Ok(())
 }

@@ -21,11 +21,7 @@ impl AberratedOptics {
     ///
     /// # Errors
     /// An empty shape.
-    pub fn new(
-        (height, width): (usize, usize),
-        display: &Display,
-        correction: &Aberration,
-    ) -> Result<Self> {
+    pub fn new((height, width): (usize, usize), display: &Display, correction: &Aberration) -> Result<Self> {
         let pitch_m = display.pitch_m();
         let plans = Propagator::for_colours_corrected(
             height,
@@ -74,8 +70,8 @@ impl Hologram {
         self.views_on(&self.info().display_file()?, z_m)
     }
 
-    /// [`Self::views`] on a display with its calibration: by its own phase curves, under its laser, through its aberration, which
-    /// must be one for all depths.
+    /// [`Self::views`] on a display with its calibration: by its own phase curves, under its laser, through its
+    /// aberration, which must be one for all depths.
     ///
     /// # Errors
     /// As [`Self::views`]; a table made for fewer pixels; an aberration that changes over depth or over the frame.
@@ -117,10 +113,7 @@ impl Hologram {
         let views = plan.focal_stack(field.as_slice().expect("standard layout"), z_m)?;
         Ok(views
             .into_iter()
-            .map(|view| {
-                Array3::from_shape_vec((3, height, width), view)
-                    .expect("a view of the hologram's shape")
-            })
+            .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the hologram's shape"))
             .collect())
     }
 }

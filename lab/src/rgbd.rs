@@ -32,9 +32,7 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     if normalized && let Some(bad) = readings.iter().find(|v| v.is_infinite()) {
         return Err(Error::file(
             depth_path,
-            format!(
-                "holds {bad}; normalized depth must lie in 0..=1, NaN where there is no reading"
-            ),
+            format!("holds {bad}; normalized depth must lie in 0..=1, NaN where there is no reading"),
         ));
     }
     let (_, height, width) = rgb.dim();
@@ -72,10 +70,7 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
 fn nearest(plane: &Array2<f32>, (height, width): (usize, usize)) -> Array2<f32> {
     let (h, w) = plane.dim();
     Array2::from_shape_fn((height, width), |(y, x)| {
-        plane[(
-            (2 * y + 1) * h / (2 * height),
-            (2 * x + 1) * w / (2 * width),
-        )]
+        plane[((2 * y + 1) * h / (2 * height), (2 * x + 1) * w / (2 * width))]
     })
 }
 
@@ -87,11 +82,7 @@ mod tests {
     fn the_nearest_sample_is_the_centred_one() {
         let plane = Array2::from_shape_fn((2, 3), |(y, x)| (3 * y + x) as f32);
         let doubled = nearest(&plane, (4, 6));
-        assert!(
-            doubled
-                .indexed_iter()
-                .all(|((y, x), v)| *v == plane[(y / 2, x / 2)])
-        );
+        assert!(doubled.indexed_iter().all(|((y, x), v)| *v == plane[(y / 2, x / 2)]));
         assert_eq!(nearest(&doubled, (2, 3)), plane);
     }
 }

@@ -82,31 +82,16 @@ impl Mesh {
     fn check(&self) -> std::result::Result<(), String> {
         let count = self.positions.len();
         if self.uv.len() != count {
-            return Err(format!(
-                "{} texture coordinates for {count} vertices",
-                self.uv.len()
-            ));
+            return Err(format!("{} texture coordinates for {count} vertices", self.uv.len()));
         }
         if !self.colour.is_empty() && self.colour.len() != count {
-            return Err(format!(
-                "{} colours for {count} vertices",
-                self.colour.len()
-            ));
+            return Err(format!("{} colours for {count} vertices", self.colour.len()));
         }
-        if let Some(index) = self
-            .triangles
-            .iter()
-            .flatten()
-            .find(|&&index| index as usize >= count)
-        {
-            return Err(format!(
-                "a triangle names vertex {index}, but there are {count}"
-            ));
+        if let Some(index) = self.triangles.iter().flatten().find(|&&index| index as usize >= count) {
+            return Err(format!("a triangle names vertex {index}, but there are {count}"));
         }
         for p in &self.positions {
-            let inside = p[0].abs() <= MAX_COORDINATE_PX
-                && p[1].abs() <= MAX_COORDINATE_PX
-                && p[2].is_finite();
+            let inside = p[0].abs() <= MAX_COORDINATE_PX && p[1].abs() <= MAX_COORDINATE_PX && p[2].is_finite();
             if !inside {
                 return Err(format!(
                     "vertex {p:?} is not finite or farther than {MAX_COORDINATE_PX} px from the frame"

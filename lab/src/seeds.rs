@@ -1,10 +1,10 @@
 //! What seeded networks are trained on: the sweep's fields of a data set's scenes, on depths that were given.
 //!
-//! A folder holds for each scene `depth_000123.npy`, uint16 (V, H, W): V variants of its visible depth, d·65535, clean or
-//! as a phone would measure it; the training package makes them. To each, [`make`] adds `refined_000123.npy`, uint16
-//! (R, H, W): a sensor's readings of the first, each with faults of its own, as the core refines them; `seed_000123.npy`,
-//! int16 (V + R, 6, H, W): the real planes of the field's three colours and its three imaginary ones, times [`SCALE`], on
-//! all of them; and to the folder, `seeds.json`, which says by which sweep and what R is.
+//! A folder holds for each scene `depth_000123.npy`, uint16 (V, H, W): V variants of its visible depth, d·65535, clean
+//! or as a phone would measure it; the training package makes them. To each, [`make`] adds `refined_000123.npy`, uint16
+//! (R, H, W): a sensor's readings of the first, each with faults of its own, as the core refines them;
+//! `seed_000123.npy`, int16 (V + R, 6, H, W): the real planes of the field's three colours and its three imaginary
+//! ones, times [`SCALE`], on all of them; and to the folder, `seeds.json`, which says by which sweep and what R is.
 
 use crate::dataset::{self, Manifest};
 use crate::depth_study::{Degradation, RATIO, degrade, refine};
@@ -32,8 +32,8 @@ const MOST_NOISE: f64 = 0.008;
 /// Farthest that refined depth stands beside the colour, display pixels.
 const MOST_SHIFT: usize = 3;
 
-/// Makes the seeds of the data set in `data`, which `manifest` describes, for all depths in `dir` that have none yet, and
-/// for `refined` more of each scene, by `sweep`. `made` hears of each that is there.
+/// Makes the seeds of the data set in `data`, which `manifest` describes, for all depths in `dir` that have none yet,
+/// and for `refined` more of each scene, by `sweep`. `made` hears of each that is there.
 ///
 /// # Errors
 /// Depths that are of another shape than the scenes, scenes that a sensor's readings do not divide, seeds of another
@@ -89,9 +89,7 @@ pub fn make(
                 depths = concatenate![Axis(0), depths, more];
             }
             let fields = fields(&plan, &colour, depths.view())?;
-            files::write_atomically(&seeds, |file| {
-                fields.write_npy(file).map_err(std::io::Error::other)
-            })?;
+            files::write_atomically(&seeds, |file| fields.write_npy(file).map_err(std::io::Error::other))?;
         }
         made();
         Ok(())
@@ -111,12 +109,7 @@ fn read_depths(path: &Path, size: usize) -> Result<Array3<u16>> {
 }
 
 /// `count` depths of scene `index` as a sensor with faults reads its true `depth` and the core refines that.
-fn refined_depths(
-    depth: ArrayView2<'_, u16>,
-    colour: &Array3<f32>,
-    index: usize,
-    count: usize,
-) -> Result<Array3<u16>> {
+fn refined_depths(depth: ArrayView2<'_, u16>, colour: &Array3<f32>, index: usize, count: usize) -> Result<Array3<u16>> {
     let (height, width) = depth.dim();
     let depth = depth.mapv(depth_of_code);
     let mut all = Array3::zeros((count, height, width));
@@ -136,11 +129,7 @@ fn refined_depths(
 }
 
 /// The fields of one scene on all its depths.
-fn fields(
-    plan: &SweepPlan,
-    colour: &Array3<f32>,
-    depths: ArrayView3<'_, u16>,
-) -> Result<Array4<i16>> {
+fn fields(plan: &SweepPlan, colour: &Array3<f32>, depths: ArrayView3<'_, u16>) -> Result<Array4<i16>> {
     let (variants, height, width) = depths.dim();
     let mut fields = Array4::zeros((variants, 6, height, width));
     let mut scratch = plan.scratch();

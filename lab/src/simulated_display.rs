@@ -73,8 +73,8 @@ pub struct SimulatedDisplay {
 
 impl SimulatedDisplay {
     /// A display of the physics of `display`, whose flaws follow from `seed`: curves that leave the factory's linear
-    /// table wrong by more than 0.3 rad, a beam off its middle, a camera a little askew that sees each pixel of the modulator
-    /// with `zoom` of its own; no aberration, see [`Self::with_aberration`].
+    /// table wrong by more than 0.3 rad, a beam off its middle, a camera a little askew that sees each pixel of the
+    /// modulator with `zoom` of its own; no aberration, see [`Self::with_aberration`].
     ///
     /// # Errors
     /// A camera over 2³⁰ pixels, or a zoom below 1.
@@ -91,10 +91,7 @@ impl SimulatedDisplay {
                 ]
             })
             .collect();
-        let (w, h) = (
-            display.width() as f64 * zoom,
-            display.height() as f64 * zoom,
-        );
+        let (w, h) = (display.width() as f64 * zoom, display.height() as f64 * zoom);
         let border = 0.07 * w;
         let size = |n: f64| (n + 2.0 * border).round();
         if !(zoom >= 1.0 && size(w) * size(h) < f64::from(1u32 << 30)) {
@@ -110,12 +107,7 @@ impl SimulatedDisplay {
             ]
         };
         let camera = Camera {
-            corners: [
-                corner(0.0, 0.0),
-                corner(1.0, 0.0),
-                corner(0.0, 1.0),
-                corner(1.0, 1.0),
-            ],
+            corners: [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)],
             shape: (size(h) as usize, size(w) as usize),
             exposure: 0.55,
             full_well: 20_000.0,
@@ -173,7 +165,8 @@ impl SimulatedDisplay {
         &self.curves
     }
 
-    /// How far level `level` of pixel (`x`, `y`) turns the phase against level 0, radians: the truth that a calibration seeks.
+    /// How far level `level` of pixel (`x`, `y`) turns the phase against level 0, radians: the truth that a calibration
+    /// seeks.
     pub fn phase(&self, colour: usize, y: usize, x: usize, level: f64) -> f64 {
         let u = (x as f64 + 0.5) / self.display.width() as f64;
         let v = (y as f64 + 0.5) / self.display.height() as f64;
@@ -202,14 +195,8 @@ impl SimulatedDisplay {
         let (rows, columns) = per_pixel::nodes(height, width, spacing);
         let (mut levels, mut turns) = (Vec::new(), Vec::new());
         for node in 0..3 * rows * columns {
-            let (colour, i, j) = (
-                node / (rows * columns),
-                node / columns % rows,
-                node % columns,
-            );
-            let curve = std::array::from_fn(|level| {
-                self.phase(colour, i * spacing, j * spacing, level as f64) as f32
-            });
+            let (colour, i, j) = (node / (rows * columns), node / columns % rows, node % columns);
+            let curve = std::array::from_fn(|level| self.phase(colour, i * spacing, j * spacing, level as f64) as f32);
             let phase = |k: usize| k as f32 / intervals as f32 * std::f32::consts::TAU;
             levels.extend((0..=intervals).map(|k| curve::level_of(&curve, phase(k))));
             let end = std::f32::consts::TAU;
@@ -240,12 +227,7 @@ impl SimulatedDisplay {
     ///
     /// # Errors
     /// Levels of another shape, or a z too far to propagate to.
-    pub fn intensity(
-        &self,
-        levels: ArrayView2<'_, u8>,
-        colour: usize,
-        z_m: f64,
-    ) -> Result<Array2<f32>> {
+    pub fn intensity(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64) -> Result<Array2<f32>> {
         let (height, width) = (self.display.height(), self.display.width());
         if levels.dim() != (height, width) {
             return Err(Error::Input(format!(
@@ -257,14 +239,7 @@ impl SimulatedDisplay {
         let (pitch, wavelength) = (self.display.pitch_m(), self.display.wavelengths_m()[colour]);
         let distance = z_m - self.display.offset_m();
         let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + 8;
-        let padded = asm::padded_shape(
-            height + more,
-            width + more,
-            pitch,
-            wavelength,
-            distance,
-            Padding::Reach,
-        )?;
+        let padded = asm::padded_shape(height + more, width + more, pitch, wavelength, distance, Padding::Reach)?;
         let (ph, pw) = padded;
         let mut plane: Vec<Complex32> = vec![Complex32::ZERO; height * width];
         let rows = plane.par_chunks_exact_mut(width).enumerate();
@@ -314,24 +289,16 @@ impl SimulatedDisplay {
         }))
     }
 
-    /// A photograph of `levels`, (H, W), lit in one colour, the camera focused at `z_m`. `shot` tells photographs apart:
-    /// their noise follows from it.
+    /// A photograph of `levels`, (H, W), lit in one colour, the camera focused at `z_m`. `shot` tells photographs
+    /// apart: their noise follows from it.
     ///
     /// # Errors
     /// As [`Self::intensity`].
-    pub fn photograph(
-        &self,
-        levels: ArrayView2<'_, u8>,
-        colour: usize,
-        z_m: f64,
-        shot: u64,
-    ) -> Result<Photograph> {
+    pub fn photograph(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64, shot: u64) -> Result<Photograph> {
         let fine = self.intensity(levels, colour, z_m)?;
         let (rows, columns) = fine.dim();
         let at = |y: isize, x: isize| match (y, x) {
-            (0.., 0..) if (y as usize) < rows && (x as usize) < columns => {
-                f64::from(fine[(y as usize, x as usize)])
-            }
+            (0.., 0..) if (y as usize) < rows && (x as usize) < columns => f64::from(fine[(y as usize, x as usize)]),
             _ => 0.0,
         };
         self.expose(colour, shot, |x, y| {
@@ -354,12 +321,7 @@ impl SimulatedDisplay {
         let (height, width) = (self.display.height(), self.display.width());
         let mut dice = Dice::new(self.seed ^ 0x4455_5354);
         let specks: Vec<_> = (0..40)
-            .map(|_| {
-                (
-                    dice.range(0.0, width as f64),
-                    dice.range(0.0, height as f64),
-                )
-            })
+            .map(|_| (dice.range(0.0, width as f64), dice.range(0.0, height as f64)))
             .collect();
         self.expose(colour, shot, |x, y| {
             let inside = (0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y);
@@ -372,12 +334,7 @@ impl SimulatedDisplay {
     }
 
     /// The camera's answer to an intensity over the modulator, `light`(x, y), pixels from its top left corner.
-    fn expose(
-        &self,
-        colour: usize,
-        shot: u64,
-        light: impl Fn(f64, f64) -> f64 + Sync,
-    ) -> Result<Photograph> {
+    fn expose(&self, colour: usize, shot: u64, light: impl Fn(f64, f64) -> f64 + Sync) -> Result<Photograph> {
         let camera = &self.camera;
         let (height, width) = camera.shape;
         let (w, h) = (self.display.width() as f64, self.display.height() as f64);
@@ -389,9 +346,7 @@ impl SimulatedDisplay {
         let rows = values.par_chunks_exact_mut(width).enumerate();
         rows.for_each(|(row, values)| {
             let mut dice = Dice::new(
-                self.seed
-                    ^ (shot << 24 | (colour as u64) << 20 | row as u64)
-                        .wrapping_mul(0x9e37_79b9_7f4a_7c15),
+                self.seed ^ (shot << 24 | (colour as u64) << 20 | row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15),
             );
             for (column, value) in values.iter_mut().enumerate() {
                 let [x, y] = back.map([column as f64 + 0.5, row as f64 + 0.5]);
@@ -460,8 +415,7 @@ mod tests {
     #[test]
     fn the_intensity_is_that_of_the_filtered_field() {
         let display = small();
-        let levels =
-            Array2::from_shape_fn((40, 48), |(y, x)| if (x + y) % 2 == 0 { 90 } else { 0 });
+        let levels = Array2::from_shape_fn((40, 48), |(y, x)| if (x + y) % 2 == 0 { 90 } else { 0 });
         let fine = display.intensity(levels.view(), 1, 0.0).unwrap();
         // Away from the rim, where padding with darkness and a periodic plane agree.
         let mut plane: Vec<_> = (0..40 * 48)
@@ -491,10 +445,7 @@ mod tests {
         assert!(photo.saturated() > 0.1);
         assert!(photo.values.iter().all(|v| v % 16 == 0));
         (camera.exposure, camera.bits) = (0.5, 8);
-        let photo = small()
-            .with_camera(camera)
-            .photograph(flat.view(), 0, 0.0, 0)
-            .unwrap();
+        let photo = small().with_camera(camera).photograph(flat.view(), 0, 0.0, 0).unwrap();
         assert_eq!((photo.full, photo.saturated()), (255, 0.0));
         let middle = f64::from(photo.sample(photo.width as f64 / 2.0, photo.height as f64 / 2.0));
         assert!((middle / 255.0 - 0.5).abs() < 0.05, "{middle}");

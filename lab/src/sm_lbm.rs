@@ -133,12 +133,7 @@ pub(crate) fn cross(
 }
 
 /// `points` alone on a plane whose rows have `width` values.
-pub(crate) fn place(
-    points: &[Point],
-    plane: &mut [Complex32],
-    width: usize,
-    content: impl Fn(&Point) -> Complex32,
-) {
+pub(crate) fn place(points: &[Point], plane: &mut [Complex32], width: usize, content: impl Fn(&Point) -> Complex32) {
     plane.fill(Complex32::ZERO);
     for point in points {
         plane[point.y as usize * width + point.x as usize] = content(point);
@@ -168,10 +163,7 @@ pub fn hologram(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     if planes == 0 {
-        return Err(phasefront::Error::Plan(
-            "no planes to cut the scene into; at least 1 is needed".into(),
-        )
-        .into());
+        return Err(phasefront::Error::Plan("no planes to cut the scene into; at least 1 is needed".into()).into());
     }
     let (height, width) = ldi.shape();
     let scene = Planes::of(ldi, planes);
@@ -191,15 +183,7 @@ pub fn hologram(
     let total = 3 * scene.occupied.len();
     let step_m = display.volume_depth_m() / planes as f64;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer = |distance_m| {
-            Transfer::new(
-                shape,
-                display.pitch_m(),
-                wavelength_m,
-                distance_m,
-                |_, _| true,
-            )
-        };
+        let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
         let neighbour = transfer(step_m);
         let Some((back, points)) = scene.occupied.first() else {
             break;
@@ -233,11 +217,7 @@ pub fn hologram(
             &mut scratch.work,
         );
         fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
-        crop(
-            &scratch.rows,
-            padded_width,
-            hologram.index_axis_mut(Axis(0), colour),
-        );
+        crop(&scratch.rows, padded_width, hologram.index_axis_mut(Axis(0), colour));
         progress(done + scene.occupied.len(), total);
     }
     Ok(hologram)

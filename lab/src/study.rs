@@ -52,18 +52,12 @@ pub struct Row {
 /// No scenes, or what [`sm_lbm::hologram`] refuses.
 pub fn layers(scenes: &Scenes, planes: usize, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>> {
     let values: Vec<usize> = (1..FINEST_LAYERS).collect();
-    against_finest(
-        scenes,
-        FINEST_LAYERS,
-        &values,
-        FINEST_LAYERS,
-        &|ldi, count| {
-            let front = Ldi::new(ldi.layers[..count].to_vec())?;
-            let hologram = sm_lbm::hologram(&front, &scenes.display, planes, &|_, _| {})?;
-            done(planes);
-            Ok(hologram)
-        },
-    )
+    against_finest(scenes, FINEST_LAYERS, &values, FINEST_LAYERS, &|ldi, count| {
+        let front = Ldi::new(ldi.layers[..count].to_vec())?;
+        let hologram = sm_lbm::hologram(&front, &scenes.display, planes, &|_, _| {})?;
+        done(planes);
+        Ok(hologram)
+    })
 }
 
 /// The planes of all holograms of [`layers`].
@@ -76,12 +70,7 @@ pub fn layers_work(scenes: &Scenes, planes: usize) -> usize {
 ///
 /// # Errors
 /// No scenes, a `finest` that leaves nothing to compare, or what [`sm_lbm::hologram`] refuses.
-pub fn planes(
-    scenes: &Scenes,
-    ldi_layers: usize,
-    finest: usize,
-    done: &(dyn Fn(usize) + Sync),
-) -> Result<Vec<Row>> {
+pub fn planes(scenes: &Scenes, ldi_layers: usize, finest: usize, done: &(dyn Fn(usize) + Sync)) -> Result<Vec<Row>> {
     let values = fewer(finest);
     if values.is_empty() {
         return Err(Error::Input(format!(

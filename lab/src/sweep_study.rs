@@ -110,9 +110,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
                 for frame in &frames {
                     let frame = frame.as_ref().map_err(|e| Error::Input(e.to_string()))?;
                     let field = match (way, plan) {
-                        (Way::Exact { hidden, planes }, _) => {
-                            exact(frame, display, *hidden, *planes)?
-                        }
+                        (Way::Exact { hidden, planes }, _) => exact(frame, display, *hidden, *planes)?,
                         (_, Some(plan)) => swept(plan, frame)?,
                         _ => unreachable!("a sweep has a plan"),
                     };
@@ -153,10 +151,7 @@ pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
 /// What is compared: the part that is changed, in words, as a number, and how.
 fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Way)> {
     let usual = Sweep::for_display(display);
-    let sweep = |sweep| Way::Sweep {
-        sweep,
-        merged: true,
-    };
+    let sweep = |sweep| Way::Sweep { sweep, merged: true };
     let mut settings = Vec::new();
     for hidden in 0..=sweep::MAX_HIDDEN_LAYERS {
         for planes in [planes, usual.planes] {
@@ -182,10 +177,7 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
     }
     for hidden_layers in 0..sweep::MAX_HIDDEN_LAYERS {
         let words = format!("{hidden_layers} hidden layers");
-        let way = Sweep {
-            hidden_layers,
-            ..usual
-        };
+        let way = Sweep { hidden_layers, ..usual };
         settings.push(("hidden", words, hidden_layers, sweep(way)));
     }
     let way = Sweep {
@@ -227,11 +219,7 @@ pub struct DisplayRow {
 ///
 /// # Errors
 /// No scenes.
-pub fn displays(
-    scenes: &Scenes,
-    planes: usize,
-    done: &(dyn Fn() + Sync),
-) -> Result<Vec<DisplayRow>> {
+pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<DisplayRow>> {
     check(scenes)?;
     let mut rows = Vec::new();
     for toml in DISPLAYS {
@@ -298,12 +286,7 @@ fn render(scenes: &Scenes, i: u64) -> Result<Ldi> {
 }
 
 /// SM-LBM of what is visible and the first `hidden` layers that the sweep adds.
-fn exact(
-    frame: &RgbdFrame,
-    display: &Display,
-    hidden: usize,
-    planes: usize,
-) -> Result<Array3<Complex32>> {
+fn exact(frame: &RgbdFrame, display: &Display, hidden: usize, planes: usize) -> Result<Array3<Complex32>> {
     let mut layers = filled(frame, display)?.layers;
     layers.truncate(1 + hidden);
     sm_lbm::hologram(&Ldi::new(layers)?, display, planes, &|_, _| {})

@@ -55,32 +55,20 @@ pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
         let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
             continue;
         };
-        let number = |prefix: &str| -> Option<u64> {
-            stem.strip_prefix(prefix)?
-                .trim_start_matches(['_', '-'])
-                .parse()
-                .ok()
-        };
+        let number =
+            |prefix: &str| -> Option<u64> { stem.strip_prefix(prefix)?.trim_start_matches(['_', '-']).parse().ok() };
         if let Some(number) = ["color", "colour", "rgb"].into_iter().find_map(number) {
             colours.insert(number, path);
         } else if let Some(number) = number("depth") {
             depths.insert(number, path);
         }
     }
-    let alone = (colours
-        .iter()
-        .find(|(number, _)| !depths.contains_key(number)))
-    .or_else(|| {
-        depths
-            .iter()
-            .find(|(number, _)| !colours.contains_key(number))
-    });
+    let alone = (colours.iter().find(|(number, _)| !depths.contains_key(number)))
+        .or_else(|| depths.iter().find(|(number, _)| !colours.contains_key(number)));
     if let Some((number, path)) = alone {
         return Err(Error::file(
             path,
-            format!(
-                "has no partner; frame {number} needs both a color_{number} and a depth_{number}"
-            ),
+            format!("has no partner; frame {number} needs both a color_{number} and a depth_{number}"),
         ));
     }
     if colours.is_empty() {
@@ -174,8 +162,8 @@ impl RawVideo {
             unit => {
                 let numbers = depth.as_chunks::<2>().0;
                 let readings = numbers.iter().map(|n| f32::from(u16::from_le_bytes(*n)));
-                let readings = Array2::from_shape_vec(self.depth, readings.collect())
-                    .map_err(|e| Error::Input(e.to_string()))?;
+                let readings =
+                    Array2::from_shape_vec(self.depth, readings.collect()).map_err(|e| Error::Input(e.to_string()))?;
                 depth_bytes(&readings, unit)
             }
         };
@@ -224,18 +212,9 @@ mod tests {
             touch(name);
         }
         let frames = frames_of_folder(dir.path()).unwrap();
-        let names: Vec<_> = frames
-            .iter()
-            .map(|(c, d)| (c.file_name(), d.file_name()))
-            .collect();
-        assert_eq!(
-            names[0],
-            (Some("rgb_2.png".as_ref()), Some("depth_0002.npy".as_ref()))
-        );
-        assert_eq!(
-            names[1],
-            (Some("color_10.jpg".as_ref()), Some("depth_10.png".as_ref()))
-        );
+        let names: Vec<_> = frames.iter().map(|(c, d)| (c.file_name(), d.file_name())).collect();
+        assert_eq!(names[0], (Some("rgb_2.png".as_ref()), Some("depth_0002.npy".as_ref())));
+        assert_eq!(names[1], (Some("color_10.jpg".as_ref()), Some("depth_10.png".as_ref())));
         touch("depth_11.png");
         assert!(refused().contains("depth_11.png") && refused().contains("no partner"));
     }
@@ -250,27 +229,13 @@ mod tests {
         let bytes: Vec<u8> = (0..44).collect();
         let mut pipe = &bytes[..];
         let first = raw.read(&mut pipe).unwrap().unwrap();
-        assert_eq!(
-            (first.shape(), first.colour[17], first.depth[0]),
-            ((2, 3), 17, 18)
-        );
-        assert_eq!(
-            raw.read(&mut pipe).unwrap().unwrap().depth,
-            [40, 41, 42, 43]
-        );
+        assert_eq!((first.shape(), first.colour[17], first.depth[0]), ((2, 3), 17, 18));
+        assert_eq!(raw.read(&mut pipe).unwrap().unwrap().depth, [40, 41, 42, 43]);
         assert_eq!(raw.read(&mut pipe).unwrap(), None);
-        let cut = raw
-            .read(&mut &bytes[..30])
-            .and_then(|_| raw.read(&mut &bytes[22..40]));
-        assert!(
-            cut.unwrap_err()
-                .to_string()
-                .contains("18 bytes into a frame of 22")
-        );
+        let cut = raw.read(&mut &bytes[..30]).and_then(|_| raw.read(&mut &bytes[22..40]));
+        assert!(cut.unwrap_err().to_string().contains("18 bytes into a frame of 22"));
         let units = RawVideo {
-            unit: DepthUnit::Raw {
-                units_per_m: 5000.0,
-            },
+            unit: DepthUnit::Raw { units_per_m: 5000.0 },
             ..raw
         };
         let frame = units.read(&mut &bytes[..22]).unwrap().unwrap();

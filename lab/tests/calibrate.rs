@@ -73,14 +73,8 @@ fn per_pixel_calibration_brings_phases_and_black_back() {
         );
         assert!(before > 0.3, "{colour}: {before}");
         assert!(after < 0.02, "{colour}: {after}");
-        assert!(
-            grey - black > 10.0 && black < -35.0,
-            "{colour}: {grey} {black}"
-        );
-        assert!(
-            errors.between_rms < 0.02 && errors.compact_rms < 0.02,
-            "{errors:?}"
-        );
+        assert!(grey - black > 10.0 && black < -35.0, "{colour}: {grey} {black}");
+        assert!(errors.between_rms < 0.02 && errors.compact_rms < 0.02, "{errors:?}");
         assert!(errors.linear_rms > 0.3);
         assert!(curves.silent.is_empty() && curves.under_pi == 0.0);
     }
@@ -120,12 +114,7 @@ fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<P
     let dir = tempfile::tempdir().unwrap();
     let shoot = |k: usize| {
         let levels = pattern.frame(k as u8);
-        change(
-            k,
-            simulated
-                .photograph(levels.view(), 1, 0.0, k as u64)
-                .unwrap(),
-        )
+        change(k, simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap())
     };
     match lut::measure(&pattern, 1, &shoot, dir.path(), &|_, _| {}) {
         Err(Refusal::Problems(problems)) => problems,
@@ -137,11 +126,7 @@ fn told(change: impl Fn(usize, Photograph) -> Result<Photograph, What>) -> Vec<P
 fn bad_captures_are_told_one_by_one() {
     let simulated = simulated();
     let pattern = Pattern::new(SIZE.0, SIZE.1).unwrap();
-    let of = |k: u8| {
-        simulated
-            .photograph(pattern.frame(k).view(), 1, 0.0, k.into())
-            .unwrap()
-    };
+    let of = |k: u8| simulated.photograph(pattern.frame(k).view(), 1, 0.0, k.into()).unwrap();
     let problems = told(|k, photo| match k {
         3 => Err(What::Missing),
         10 => Ok(of(11)),
@@ -179,10 +164,7 @@ fn bad_captures_are_told_one_by_one() {
     });
     let said: Vec<_> = problems.iter().map(ToString::to_string).collect();
     let expected = [
-        (
-            "green/capture_003",
-            "is missing; photograph pattern_003.png",
-        ),
+        ("green/capture_003", "is missing; photograph pattern_003.png"),
         ("green/capture_010", "shows pattern 011"),
         ("green/capture_011", "shows pattern 010"),
         ("green/capture_040", "shorten the exposure"),
@@ -205,9 +187,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     // A speck of dust on the optics: dark in every photograph.
     let shoot = |k: usize| {
         let levels = pattern.frame(k as u8);
-        let mut photo = simulated
-            .photograph(levels.view(), 1, 0.0, k as u64)
-            .unwrap();
+        let mut photo = simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap();
         let (y, x) = (photo.height / 2, photo.width / 2);
         for dy in 0..5 {
             for dx in 0..5 {
@@ -217,11 +197,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
         Ok(photo)
     };
     let curves = lut::measure(&pattern, 1, &shoot, dir.path(), &|_, _| {}).unwrap();
-    assert!(
-        (1..=16).contains(&curves.silent.len()),
-        "{:?}",
-        curves.silent
-    );
+    assert!((1..=16).contains(&curves.silent.len()), "{:?}", curves.silent);
     for (y, x) in &curves.silent {
         assert!(y.abs_diff(SIZE.0 / 2) < 8 && x.abs_diff(SIZE.1 / 2) < 8);
     }
@@ -231,9 +207,7 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     // A display that does not answer at all is refused.
     let flat = |k: usize| {
         let levels = pattern.frame(0).mapv(|_| 0);
-        let mut photo = simulated
-            .photograph(levels.view(), 1, 0.0, k as u64)
-            .unwrap();
+        let mut photo = simulated.photograph(levels.view(), 1, 0.0, k as u64).unwrap();
         let marked = simulated
             .photograph(pattern.frame(k as u8).view(), 1, 0.0, k as u64)
             .unwrap();
@@ -249,9 +223,9 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
     }
 }
 
-/// Fig. 8: what a cylinder of 200 mm before an eyepiece of 21 mm does to the wave, by the correction for it. The eyepiece
-/// brings frequency µ to λfµ in its pupil, where the cylinder bends by −kx²/2f; so along x alone it is as if
-/// z were another by f²/f₁ = 2.2 mm.
+/// Fig. 8: what a cylinder of 200 mm before an eyepiece of 21 mm does to the wave, by the correction for it. The
+/// eyepiece brings frequency µ to λfµ in its pupil, where the cylinder bends by −kx²/2f; so along x alone it is as if z
+/// were another by f²/f₁ = 2.2 mm.
 fn cylinder() -> Aberration {
     let display = Display::default();
     let shift_m = 21e-3 * 21e-3 / 200e-3;
@@ -263,8 +237,9 @@ fn cylinder() -> Aberration {
     Aberration::new(coefficients).unwrap()
 }
 
-/// Three boards behind one another, each with soft bars of its own, upright ones, lying ones and slanted ones, six to nine pixels
-/// wide: what a double phase shows well, and what a cylinder washes out, as in the test pattern of the paper's figure.
+/// Three boards behind one another, each with soft bars of its own, upright ones, lying ones and slanted ones, six to
+/// nine pixels wide: what a double phase shows well, and what a cylinder washes out, as in the test pattern of the
+/// paper's figure.
 fn boards((h, w): (usize, usize), planes: usize, in_focus: [usize; 3]) -> Ldi {
     let board = |x: usize| 3 * x / w;
     let depth = |k: usize| (k as f32 + 0.5) / planes as f32;
@@ -301,7 +276,8 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
         aberration: Some(AberrationFile::Uniform(all)),
         ..bare.clone()
     };
-    // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by a quarter.
+    // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by
+    // a quarter.
     let options = EncoderOptions {
         encoding: Encoding::ANTI_ALIAS,
         brightness: Brightness::Fixed(1.0),
@@ -334,9 +310,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let info = encoded(&plain, false).1;
     let truth = Hologram::Complex(plain.clone(), info).views(&z_m).unwrap();
     let quality = |(levels, info): (Array3<u8>, HologramInfo), file: &DisplayFile| -> f64 {
-        let views = Hologram::PhaseOnly(levels, info)
-            .views_on(file, &z_m)
-            .unwrap();
+        let views = Hologram::PhaseOnly(levels, info).views_on(file, &z_m).unwrap();
         // Away from the rim, over which the cylinder spreads light out of the frame.
         let inner = ndarray::s![.., 16..h - 16, 16..w - 16];
         let psnr = (views.iter().zip(&truth)).map(|(view, truth)| {
@@ -350,9 +324,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     let uncorrected = quality(encoded(&plain, false), &aberrated);
     let by_layers = quality(encoded(&corrected, false), &aberrated);
     let by_offset = quality(encoded(&plain, true), &aberrated);
-    eprintln!(
-        "without {without:.2} dB, uncorrected {uncorrected:.2}, corrected {by_layers:.2} and {by_offset:.2}"
-    );
+    eprintln!("without {without:.2} dB, uncorrected {uncorrected:.2}, corrected {by_layers:.2} and {by_offset:.2}");
     assert!(without > 22.0, "{without}");
     assert!(by_layers > without - 1.0, "{without} {by_layers}");
     assert!(by_offset > without - 1.0, "{without} {by_offset}");

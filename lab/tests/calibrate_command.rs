@@ -90,8 +90,7 @@ fn the_same_by_hand(folder: &Folder) {
     assert!(said.contains("red") && said.contains("table:"), "{said}");
     assert_eq!(bytes(folder, "table.pfp"), bytes(folder, "out/table.pfp"));
     assert!(folder.path("report/curves.svg").is_file());
-    let full: ndarray::Array3<u8> =
-        ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
+    let full: ndarray::Array3<u8> = ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
     assert_eq!(full.dim(), (64, 144, 256));
     assert!(full[(32, 72, 255)] > 150 && full[(32, 72, 0)] == 0);
     assert!(folder.fails(&LUT, 1).contains("--force"));
@@ -130,19 +129,13 @@ fn bad_captures_are_named(folder: &Folder) {
     ] {
         assert!(said.contains(words), "no {words:?} in {said}");
     }
-    assert_eq!(
-        said.lines().filter(|l| l.starts_with("error")).count(),
-        1,
-        "{said}"
-    );
+    assert_eq!(said.lines().filter(|l| l.starts_with("error")).count(), 1, "{said}");
     assert_eq!(bytes(folder, "table.pfp"), bytes(folder, "out/table.pfp"));
 }
 
 /// A hologram for the calibrated display, and its view on it.
 fn holograms_are_for_it(folder: &Folder) {
-    let rgb = image::RgbImage::from_fn(96, 48, |x, y| {
-        image::Rgb([(x * 2) as u8, (y * 5) as u8, 90])
-    });
+    let rgb = image::RgbImage::from_fn(96, 48, |x, y| image::Rgb([(x * 2) as u8, (y * 5) as u8, 90]));
     rgb.save(folder.path("rgb.png")).unwrap();
     image::GrayImage::from_pixel(96, 48, image::Luma([128]))
         .save(folder.path("depth.png"))
@@ -169,14 +162,7 @@ fn holograms_are_for_it(folder: &Folder) {
         said.contains("per_pixel, laser, aberration") && said.contains("--display"),
         "{said}"
     );
-    folder.succeeds(&[
-        "refocus",
-        "plain.png",
-        "--z-mm",
-        "0",
-        "-o",
-        "plain_view.png",
-    ]);
+    folder.succeeds(&["refocus", "plain.png", "--z-mm", "0", "-o", "plain_view.png"]);
     folder.succeeds(&[
         "refocus",
         "h.png",
@@ -236,26 +222,13 @@ fn patterns_are_written_once() {
         .unwrap()
         .into_luma8();
     assert_eq!(pattern.dimensions(), (144, 64));
-    assert_eq!(
-        (pattern.get_pixel(80, 40)[0], pattern.get_pixel(81, 40)[0]),
-        (200, 0)
-    );
+    assert_eq!((pattern.get_pixel(80, 40)[0], pattern.get_pixel(81, 40)[0]), (200, 0));
     assert_eq!(fs::read_dir(folder.path("patterns")).unwrap().count(), 256);
     assert!(folder.fails(&write, 1).contains("--force"));
     folder.fails(&["calibrate", "lut"], 2);
     folder.fails(&["calibrate", "lut", "--captures", "x"], 2);
     fs::write(folder.path("small.toml"), "width = 64\nheight = 64").unwrap();
-    let said = folder.fails(
-        &[
-            "calibrate",
-            "lut",
-            "--patterns",
-            "p",
-            "--display",
-            "small.toml",
-        ],
-        1,
-    );
+    let said = folder.fails(&["calibrate", "lut", "--patterns", "p", "--display", "small.toml"], 1);
     assert!(said.contains("144×64"), "{said}");
 }
 
@@ -290,10 +263,7 @@ fn an_aberration_is_searched_round_by_round() {
         let here = folder.path("search").join(format!("round_{round}"));
         if round == 0 {
             let said = folder.fails(&search, 1);
-            assert!(
-                said.contains("capture_00.png") && said.contains("missing"),
-                "{said}"
-            );
+            assert!(said.contains("capture_00.png") && said.contains("missing"), "{said}");
         }
         for i in 0..spot::TRIALS {
             let trial = Photograph::read(&here.join(format!("trial_{i:02}.png")), 0).unwrap();
@@ -301,9 +271,7 @@ fn an_aberration_is_searched_round_by_round() {
             let levels = Array2::from_shape_vec((72, 80), levels).unwrap();
             let shot = (round * 100 + i) as u64;
             let photo = simulated.photograph(levels.view(), 1, 7e-3, shot).unwrap();
-            photo
-                .write(&here.join(format!("capture_{i:02}.png")))
-                .unwrap();
+            photo.write(&here.join(format!("capture_{i:02}.png"))).unwrap();
         }
     }
     let said = folder.succeeds(&search);

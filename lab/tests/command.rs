@@ -55,20 +55,15 @@ impl Folder {
 
     /// A small frame: `rgb.png` and `depth.png`.
     fn with_frame(self) -> Self {
-        let rgb = image::RgbImage::from_fn(48, 32, |x, y| {
-            image::Rgb([(x * 5) as u8, (y * 7) as u8, 90])
-        });
+        let rgb = image::RgbImage::from_fn(48, 32, |x, y| image::Rgb([(x * 5) as u8, (y * 7) as u8, 90]));
         rgb.save(self.path("rgb.png")).unwrap();
-        let depth =
-            image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 30 } else { 220 }]));
+        let depth = image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 30 } else { 220 }]));
         depth.save(self.path("depth.png")).unwrap();
         self
     }
 
     fn depth_npy(&self, name: &str, depth: &Array2<f32>) {
-        depth
-            .write_npy(File::create(self.path(name)).unwrap())
-            .unwrap();
+        depth.write_npy(File::create(self.path(name)).unwrap()).unwrap();
     }
 }
 
@@ -78,16 +73,9 @@ fn with<'a>(more: &[&'a str]) -> Vec<&'a str> {
     FRAME.iter().chain(more).copied().collect()
 }
 
-fn psnr(
-    a: &Array3<f32>,
-    b: &Array3<f32>,
-    y: std::ops::Range<usize>,
-    x: std::ops::Range<usize>,
-) -> f64 {
+fn psnr(a: &Array3<f32>, b: &Array3<f32>, y: std::ops::Range<usize>, x: std::ops::Range<usize>) -> f64 {
     let part = s![.., y, x];
-    metrics::compare(a.slice(part), b.slice(part))
-        .unwrap()
-        .psnr_overall
+    metrics::compare(a.slice(part), b.slice(part)).unwrap().psnr_overall
 }
 
 #[test]
@@ -116,29 +104,22 @@ fn a_hologram_travels_with_all_that_refocus_needs() {
         let view = files::read_rgb(&folder.path("view.png")).unwrap();
         let field = files::read_rgb(&folder.path("field.png")).unwrap();
         let alike = psnr(&view, &field, 4..28, 4..44);
-        assert!(
-            alike > 20.0,
-            "{method}: phase-only and complex differ: {alike} dB"
-        );
+        assert!(alike > 20.0, "{method}: phase-only and complex differ: {alike} dB");
     }
 }
 
 #[test]
 fn json_is_one_object_on_stdout() {
     let folder = Folder::new().with_frame();
-    let made: serde_json::Value =
-        serde_json::from_str(&folder.succeeds(&with(&["-o", "h.png", "--json"]))).unwrap();
+    let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&with(&["-o", "h.png", "--json"]))).unwrap();
     assert_eq!(made["width"], 48);
     for stage in ["network", "propagate", "encode"] {
         assert!(made["stage_ms"][stage].is_number(), "{made}");
     }
     let compared: serde_json::Value =
-        serde_json::from_str(&folder.succeeds(&["compare", "rgb.png", "rgb.png", "--json"]))
-            .unwrap();
+        serde_json::from_str(&folder.succeeds(&["compare", "rgb.png", "rgb.png", "--json"])).unwrap();
     assert_eq!(compared["ssim_overall"], 1.0);
-    let scene = folder.succeeds(&[
-        "scene", "--seed", "1", "--size", "64x48", "-o", "s", "--json",
-    ]);
+    let scene = folder.succeeds(&["scene", "--seed", "1", "--size", "64x48", "-o", "s", "--json"]);
     let scene: serde_json::Value = serde_json::from_str(&scene).unwrap();
     assert_eq!(scene["hits"].as_array().unwrap().len(), 5);
 }
@@ -147,9 +128,7 @@ fn json_is_one_object_on_stdout() {
 fn scenes_and_stacks_are_written_and_read_back() {
     let folder = Folder::new();
     for name in ["a", "b"] {
-        folder.succeeds(&[
-            "scene", "--seed", "5", "--size", "61x47", "--layers", "3", "-o", name,
-        ]);
+        folder.succeeds(&["scene", "--seed", "5", "--size", "61x47", "--layers", "3", "-o", name]);
     }
     for file in ["layer_0.png", "depth_0.png", "layer_2.png"] {
         assert_eq!(
@@ -160,20 +139,8 @@ fn scenes_and_stacks_are_written_and_read_back() {
     folder.succeeds(&["hologram", "--ldi", "a", "--planes", "20", "-o", "h.png"]);
     folder.succeeds(&["refocus", "h.png", "--stack", "3", "-o", "stack"]);
     assert_eq!(fs::read_dir(folder.path("stack")).unwrap().count(), 3);
-    folder.succeeds(&[
-        "refocus",
-        "h.png",
-        "--stack",
-        "3",
-        "--gif",
-        "-o",
-        "stack.gif",
-    ]);
-    assert!(
-        fs::read(folder.path("stack.gif"))
-            .unwrap()
-            .starts_with(b"GIF89a")
-    );
+    folder.succeeds(&["refocus", "h.png", "--stack", "3", "--gif", "-o", "stack.gif"]);
+    assert!(fs::read(folder.path("stack.gif")).unwrap().starts_with(b"GIF89a"));
 }
 
 #[test]
@@ -209,10 +176,7 @@ fn the_object_in_focus_matches_the_sample_there_and_not_elsewhere() {
             files::read_rgb(&folder.path("view.png")).unwrap()
         };
         let (near, far) = (view(near), view(far));
-        for (what, at, sharp, blurred) in [
-            ("board", &board, &near, &far),
-            ("clock", &clock, &far, &near),
-        ] {
+        for (what, at, sharp, blurred) in [("board", &board, &near, &far), ("clock", &clock, &far, &near)] {
             let sharp = psnr(sharp, &image, at.0.clone(), at.1.clone());
             let blurred = psnr(blurred, &image, at.0.clone(), at.1.clone());
             assert!(
@@ -262,10 +226,7 @@ fn depth_of_another_size_is_resampled_with_a_warning() {
     let output = folder.run(&with(&["-o", "h.png"]));
     assert!(output.status.success());
     let warnings = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        warnings.contains("warn") && warnings.contains("24×16"),
-        "{warnings}"
-    );
+    assert!(warnings.contains("warn") && warnings.contains("24×16"), "{warnings}");
 }
 
 /// Arguments that make a hologram of these files.
@@ -297,21 +258,9 @@ fn pictures_that_cannot_be_used_are_named() {
             hologram("short.png", "depth.png"),
             &["short.png", "whole"],
         ),
-        (
-            "an empty file",
-            hologram("empty.png", "depth.png"),
-            &["empty.png"],
-        ),
-        (
-            "colour as depth",
-            hologram("rgb.png", "rgb.png"),
-            &["rgb.png", "grey"],
-        ),
-        (
-            "depth of another shape",
-            hologram("rgb.png", "square.png"),
-            &["aspect"],
-        ),
+        ("an empty file", hologram("empty.png", "depth.png"), &["empty.png"]),
+        ("colour as depth", hologram("rgb.png", "rgb.png"), &["rgb.png", "grey"]),
+        ("depth of another shape", hologram("rgb.png", "square.png"), &["aspect"]),
         (
             "pictures of two sizes",
             vec!["compare", "rgb.png", "square.png"],
@@ -345,31 +294,19 @@ fn depth_that_means_nothing_is_named() {
             hologram("rgb.png", "infinite.npy"),
             &["infinite.npy", "inf"],
         ),
-        (
-            "all holes",
-            hologram("rgb.png", "nan.npy"),
-            &["nan.npy", "no reading"],
-        ),
+        ("all holes", hologram("rgb.png", "nan.npy"), &["nan.npy", "no reading"]),
         (
             "metres as parts of the volume",
             hologram("rgb.png", "metres.npy"),
             &["metres.npy", "unit"],
         ),
-        (
-            "no pixel",
-            hologram("rgb.png", "nothing.npy"),
-            &["nothing.npy"],
-        ),
+        ("no pixel", hologram("rgb.png", "nothing.npy"), &["nothing.npy"]),
     ]);
     // Holes are filled; in metres infinity is one.
     depth[(3, 4)] = f32::NAN;
     folder.depth_npy("hole.npy", &depth);
     folder.succeeds(&hologram("rgb.png", "hole.npy"));
-    let metres = [
-        &hologram("rgb.png", "infinite.npy")[..],
-        &["--depth-unit", "m"],
-    ]
-    .concat();
+    let metres = [&hologram("rgb.png", "infinite.npy")[..], &["--depth-unit", "m"]].concat();
     folder.succeeds(&metres);
 }
 
@@ -387,11 +324,7 @@ fn options_that_cannot_be_meant_are_named() {
             made(&["--offset-mm", "nan"]),
             &["offset_mm"],
         ),
-        (
-            "no planes",
-            made(&["--method", "layers", "--planes", "0"]),
-            &["plane"],
-        ),
+        ("no planes", made(&["--method", "layers", "--planes", "0"]), &["plane"]),
         ("no light", made(&["--scale", "0"]), &["scale"]),
         (
             "near behind far",
@@ -415,11 +348,7 @@ fn options_that_cannot_be_meant_are_named() {
         ("raw depth without a scale", &raw, "--depth-scale"),
         ("an unknown option", &with(&["--nonsense"]), "--nonsense"),
         ("no frame", &["hologram", "-o", "h.png"], "--rgb"),
-        (
-            "no distance",
-            &["refocus", "rgb.png", "-o", "v.png"],
-            "--z-mm",
-        ),
+        ("no distance", &["refocus", "rgb.png", "-o", "v.png"], "--z-mm"),
         (
             "an empty size",
             &["scene", "--seed", "1", "--size", "0x5", "-o", "s"],
@@ -437,11 +366,7 @@ fn displays_that_cannot_be_used_are_named() {
     let cases: [(&str, &str, &[&str]); 4] = [
         ("a pitch in µm", "pitch_um = 3.74", &["pitch", "3.740"]),
         ("12 bits", "bits = 12", &["display.toml", "bits"]),
-        (
-            "a table that is not there",
-            "lut = \"none.txt\"",
-            &["none.txt"],
-        ),
+        ("a table that is not there", "lut = \"none.txt\"", &["none.txt"]),
         ("a table of 3", "lut = \"lut.txt\"", &["lut.txt", "256"]),
     ];
     fs::write(folder.path("lut.txt"), "1 2 3").unwrap();
@@ -459,11 +384,7 @@ fn networks_that_cannot_be_used_are_named() {
     fs::write(folder.path("half.onnx"), &model[..model.len() / 2]).unwrap();
     folder.refuses_each(&[
         ("no network", made(&["--network", "no.onnx"]), &["no.onnx"]),
-        (
-            "half a network",
-            made(&["--network", "half.onnx"]),
-            &["half.onnx"],
-        ),
+        ("half a network", made(&["--network", "half.onnx"]), &["half.onnx"]),
         (
             "none that comes along",
             made(&["--network", "9"]),
@@ -501,12 +422,7 @@ fn a_data_set_resumed_or_sharded_is_the_one_made_in_one_go() {
             .collect();
         files.sort();
         (files.iter())
-            .map(|path| {
-                (
-                    path.file_name().unwrap().to_owned(),
-                    fs::read(path).unwrap(),
-                )
-            })
+            .map(|path| (path.file_name().unwrap().to_owned(), fs::read(path).unwrap()))
             .collect::<Vec<_>>()
     };
     make("whole", &[]);
@@ -524,11 +440,7 @@ fn a_data_set_resumed_or_sharded_is_the_one_made_in_one_go() {
         1,
         &["manifest.json", "other parameters"],
     );
-    folder.refuses(
-        &["dataset", "--scenes", "7", "--shard", "4/4", "-o", "x"],
-        2,
-        &["i/n"],
-    );
+    folder.refuses(&["dataset", "--scenes", "7", "--shard", "4/4", "-o", "x"], 2, &["i/n"]);
 }
 
 #[test]
@@ -549,15 +461,7 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
             "h.png",
         ]);
     }
-    let study = [
-        "occlusion",
-        "--ldi",
-        "scene",
-        "--planes",
-        "32",
-        "-o",
-        "study",
-    ];
+    let study = ["occlusion", "--ldi", "scene", "--planes", "32", "-o", "study"];
     let figures: serde_json::Value =
         serde_json::from_str(&folder.succeeds(&[&study[..], &["--json"]].concat())).unwrap();
     let settings = figures["settings"].as_array().unwrap();
@@ -577,21 +481,9 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
         text.contains("waves (computation)") && text.contains("study/comparison.png"),
         "{text}"
     );
+    folder.refuses(&["occlusion", "--ldi", "nowhere", "-o", "other"], 1, &["nowhere"]);
     folder.refuses(
-        &["occlusion", "--ldi", "nowhere", "-o", "other"],
-        1,
-        &["nowhere"],
-    );
-    folder.refuses(
-        &[
-            "occlusion",
-            "--ldi",
-            "scene",
-            "--planes",
-            "0",
-            "-o",
-            "other",
-        ],
+        &["occlusion", "--ldi", "scene", "--planes", "0", "-o", "other"],
         1,
         &["planes"],
     );
@@ -624,12 +516,7 @@ fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> Option<serde_json::Valu
 
 /// Few levels of two pictures are more than neighbours.
 fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
-    let levels = |name| {
-        image::open(folder.path(name))
-            .unwrap()
-            .into_rgb8()
-            .into_raw()
-    };
+    let levels = |name| image::open(folder.path(name)).unwrap().into_rgb8().into_raw();
     let apart = |(a, b): (&u8, &u8)| (a.wrapping_sub(*b) as i8).unsigned_abs() > 1;
     let (a, b) = (levels(a), levels(b));
     let differing = a.iter().zip(&b).filter(|pair| apart(*pair)).count();
@@ -720,16 +607,13 @@ fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
         });
         folder.depth_npy(name, &depth);
         let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&[
-            "hologram", "--rgb", "rgb.png", "--depth", name, "--method", "auto", "--json", "-o",
-            "h.png",
+            "hologram", "--rgb", "rgb.png", "--depth", name, "--method", "auto", "--json", "-o", "h.png",
         ]))
         .unwrap();
         assert!(made["stage_ms"][stage].is_number(), "{name}: {made}");
     }
     folder.refuses(
-        &[
-            "hologram", "--ldi", "scene", "--method", "auto", "-o", "a.png",
-        ],
+        &["hologram", "--ldi", "scene", "--method", "auto", "-o", "a.png"],
         1,
         &["take --rgb and --depth"],
     );
@@ -738,27 +622,13 @@ fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
 #[test]
 fn a_network_for_layers_takes_a_layered_depth_image() {
     let folder = Folder::new();
-    folder.succeeds(&[
-        "scene", "--seed", "5", "--size", "61x47", "--layers", "2", "-o", "a",
-    ]);
+    folder.succeeds(&["scene", "--seed", "5", "--size", "61x47", "--layers", "2", "-o", "a"]);
     let network = format!("{MODELS}/ldi3-15.onnx");
-    let call = [
-        "hologram",
-        "--ldi",
-        "a",
-        "--network",
-        &network,
-        "-o",
-        "h.png",
-    ];
-    let made: serde_json::Value =
-        serde_json::from_str(&folder.succeeds(&[&call[..], &["--json"]].concat())).unwrap();
+    let call = ["hologram", "--ldi", "a", "--network", &network, "-o", "h.png"];
+    let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&[&call[..], &["--json"]].concat())).unwrap();
     assert!(made["stage_ms"]["network"].is_number(), "{made}");
     let engine = made["engine"].as_str().unwrap();
-    assert!(
-        engine.contains("15 layers of 24 filters in f32"),
-        "{engine}"
-    );
+    assert!(engine.contains("15 layers of 24 filters in f32"), "{engine}");
     let ldi = ["hologram", "--ldi", "a", "-o", "h.png"];
     let method = [&ldi[..], &["--method", "network"]].concat();
     folder.refuses(&method, 1, &["--network for layered depth images"]);
@@ -776,11 +646,7 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
     let alone = [&deep[..], &["--network", "8"]].concat();
     folder.refuses(&alone, 1, &["--encoder deep needs --prefilter"]);
     let far = [&deep[..], &["--offset-mm", "3"]].concat();
-    folder.refuses(
-        &far,
-        1,
-        &["offsets of 0, 6, 12 mm", "--network 8 --encoder anti-alias"],
-    );
+    folder.refuses(&far, 1, &["offsets of 0, 6, 12 mm", "--network 8 --encoder anti-alias"]);
     let pair = ["--prefilter", hologram_network];
     folder.refuses(&[&deep[..], &pair].concat(), 1, &["'field'", "'rgbd'"]);
     let other = with(&["-o", "h.png", "--encoder", "double"]);
@@ -816,22 +682,11 @@ fn the_bench_measures_every_stage_and_draws_it() {
         "--threads",
         "1",
     ];
-    let more = [
-        "--seconds",
-        "0",
-        "--offset-mm",
-        "2",
-        "--plot",
-        "bars.svg",
-        "--json",
-    ];
+    let more = ["--seconds", "0", "--offset-mm", "2", "--plot", "bars.svg", "--json"];
     let text = folder.succeeds(&[&bench[..], &more].concat());
     let value: serde_json::Value = serde_json::from_str(&text).unwrap();
     let row = &value["rows"][0];
-    assert_eq!(
-        (row["width"].as_u64(), row["height"].as_u64()),
-        (Some(40), Some(30))
-    );
+    assert_eq!((row["width"].as_u64(), row["height"].as_u64()), (Some(40), Some(30)));
     assert_eq!(
         (row["encoder"].as_str(), row["offset_mm"].as_f64()),
         (Some("anti-alias"), Some(2.0))
@@ -843,11 +698,7 @@ fn the_bench_measures_every_stage_and_draws_it() {
     );
     let picture = std::fs::read_to_string(folder.path("bars.svg")).unwrap();
     assert!(picture.starts_with("<svg") && picture.contains("8 layers int8 40×30, 1 thr."));
-    folder.refuses(
-        &[&bench[..], &["--plot", "bars.png"]].concat(),
-        1,
-        &[".svg"],
-    );
+    folder.refuses(&[&bench[..], &["--plot", "bars.png"]].concat(), 1, &[".svg"]);
 }
 
 #[test]
@@ -856,25 +707,18 @@ fn a_calibrated_display_is_packed_for_an_app() {
     let lut: Vec<u8> = (0..=255).map(|i| i / 2 + 30).collect();
     let text: Vec<_> = lut.iter().map(u8::to_string).collect();
     fs::write(folder.path("lut.txt"), text.join(" ")).unwrap();
-    let at = |z_mm: f64, a: f64| {
-        format!("[[at]]\nz_mm = {z_mm:?}\ngreen = [0.0, {a:?}, 0.0, 0.0, 0.0]\n")
-    };
+    let at = |z_mm: f64, a: f64| format!("[[at]]\nz_mm = {z_mm:?}\ngreen = [0.0, {a:?}, 0.0, 0.0, 0.0]\n");
     fs::write(folder.path("same.toml"), at(-3.0, 0.5) + &at(3.0, 0.5)).unwrap();
     fs::write(folder.path("other.toml"), at(-3.0, 0.5) + &at(3.0, 0.75)).unwrap();
     for (name, aberration) in [("display.toml", "same.toml"), ("deep.toml", "other.toml")] {
-        let text = format!(
-            "width = 64\nheight = 48\noffset_mm = 2.0\nlut = \"lut.txt\"\naberration = \"{aberration}\"\n"
-        );
+        let text =
+            format!("width = 64\nheight = 48\noffset_mm = 2.0\nlut = \"lut.txt\"\naberration = \"{aberration}\"\n");
         fs::write(folder.path(name), text).unwrap();
     }
     let pack = ["calibrate", "pack", "-o", "app.pfc", "--display"];
     folder.succeeds(&[&pack[..], &["display.toml"]].concat());
-    let packed =
-        phasefront::Target::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
-    assert_eq!(
-        (packed.display.width(), packed.display.offset_m()),
-        (64, 2e-3)
-    );
+    let packed = phasefront::Target::from_bytes(&fs::read(folder.path("app.pfc")).unwrap()).unwrap();
+    assert_eq!((packed.display.width(), packed.display.offset_m()), (64, 2e-3));
     assert_eq!(
         packed.response,
         phasefront::target::Response::lut(lut.try_into().unwrap())

@@ -71,8 +71,7 @@ fn agrees_with_equation_5_plane_by_plane() {
                 return kernel(z_m[next.min(z_m.len() - 1)], lambda, mu, nu);
             }
             let t = (z - z_m[next - 1]) / (z_m[next] - z_m[next - 1]);
-            kernel(z_m[next - 1], lambda, mu, nu) * (1.0 - t)
-                + kernel(z_m[next], lambda, mu, nu) * t
+            kernel(z_m[next - 1], lambda, mu, nu) * (1.0 - t) + kernel(z_m[next], lambda, mu, nu) * t
         };
         for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
             let content = |k: usize| {
@@ -102,11 +101,7 @@ fn agrees_with_equation_5_plane_by_plane() {
                 let mut spectrum = fft2(&field, false);
                 for ((ky, kx), value) in spectrum.indexed_iter_mut() {
                     let frequency = |k: usize, n: usize| {
-                        let signed = if 2 * k < n {
-                            k as f64
-                        } else {
-                            k as f64 - n as f64
-                        };
+                        let signed = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
                         signed / (n as f64 * pitch)
                     };
                     let (mu, nu) = (frequency(kx, shape.1), frequency(ky, shape.0));
@@ -146,9 +141,7 @@ fn a_shift_moves_the_hologram() {
     let display = Display::default();
     // Two pixels right, three down; the plane is that much larger than it must be.
     let (h, w) = shape_for(&ldi);
-    let shift = |_: f64, _: f64, mu: f64, nu: f64| {
-        Complex64::from_polar(1.0, -2.0 * PI * 8e-6 * (2.0 * mu + 3.0 * nu))
-    };
+    let shift = |_: f64, _: f64, mu: f64, nu: f64| Complex64::from_polar(1.0, -2.0 * PI * 8e-6 * (2.0 * mu + 3.0 * nu));
     let correction = Correction::sampled(vec![0.0], (h + 3, w + 2), &display, shift).unwrap();
     let ours = hologram(&ldi, 30, &correction);
     let one = |_: f64, _: f64, _: f64, _: f64| Complex64::ONE;
@@ -168,9 +161,12 @@ fn a_defocus_moves_the_focus() {
     let display = Display::default();
     for (depth, ahead_m) in [(0.0, moved_m), (0.5, moved_m / 2.0), (1.0, 0.0)] {
         let ldi = Ldi::new(vec![LdiLayer {
-            rgb: Array3::from_shape_fn((3, 96, 96), |(_, y, x)| {
-                if (x / 3 + y / 4) % 2 == 0 { 0.8 } else { 0.2 }
-            }),
+            rgb: Array3::from_shape_fn(
+                (3, 96, 96),
+                |(_, y, x)| {
+                    if (x / 3 + y / 4) % 2 == 0 { 0.8 } else { 0.2 }
+                },
+            ),
             depth: Array2::from_elem(frame, depth),
         }])
         .unwrap();
@@ -188,8 +184,7 @@ fn a_defocus_moves_the_focus() {
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         let error_at = |z_m: f64| {
             let lambda = display.wavelengths_m()[1];
-            let plan =
-                Propagator::new(96, 96, display.pitch_m(), lambda, z_m, Padding::Reach).unwrap();
+            let plan = Propagator::new(96, 96, display.pitch_m(), lambda, z_m, Padding::Reach).unwrap();
             let mut plane = ours.index_axis(Axis(0), 1).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
             let image = ldi.layers[0].rgb.index_axis(Axis(0), 1);
@@ -215,39 +210,21 @@ fn what_cannot_be_computed_is_refused() {
     let one = |_: f64, _: f64, _: f64, _: f64| Complex64::ONE;
     let refused = |result: phasefront_lab::Result<Correction>, word: &str| {
         let message = result.err().unwrap().to_string();
-        assert!(
-            message.contains(word) && !message.contains('\n'),
-            "{message}"
-        );
+        assert!(message.contains(word) && !message.contains('\n'), "{message}");
     };
     refused(Correction::new(vec![], vec![]), "at least one");
-    refused(
-        Correction::sampled(vec![1e-3, 0.0], shape, &display, one),
-        "ascend",
-    );
-    refused(
-        Correction::sampled(vec![f64::NAN], shape, &display, one),
-        "ascend",
-    );
+    refused(Correction::sampled(vec![1e-3, 0.0], shape, &display, one), "ascend");
+    refused(Correction::sampled(vec![f64::NAN], shape, &display, one), "ascend");
     let nan = |_: f64, _: f64, mu: f64, _: f64| Complex64::new(0.0, 1.0 / mu * 0.0);
-    refused(
-        Correction::sampled(vec![0.0], shape, &display, nan),
-        "no numbers",
-    );
+    refused(Correction::sampled(vec![0.0], shape, &display, nan), "no numbers");
     let cube = |n| Array3::from_elem((3, n, n), Complex32::ONE);
-    refused(
-        Correction::new(vec![0.0, 1.0], vec![cube(4), cube(5)]),
-        "one shape",
-    );
+    refused(Correction::new(vec![0.0, 1.0], vec![cube(4), cube(5)]), "one shape");
 
     let small = Correction::new(vec![0.0], vec![cube(32)]).unwrap();
     let refused = |planes, correction: &Correction, word: &str| {
         let e = corrected::hologram(&ldi, &display, planes, correction, &|_, _| {});
         let message = e.unwrap_err().to_string();
-        assert!(
-            message.contains(word) && !message.contains('\n'),
-            "{message}"
-        );
+        assert!(message.contains(word) && !message.contains('\n'), "{message}");
     };
     refused(8, &small, "at least");
     refused(0, &small, "at least 1");
@@ -301,10 +278,7 @@ fn coefficients_that_change_over_depth_are_followed() {
         Complex64::from_polar(1.0, all.at(z).phase(colour, mu, nu, display.pitch_m()))
     })
     .unwrap();
-    let (ours, exact) = (
-        hologram(&ldi, planes, &ours),
-        hologram(&ldi, planes, &exact),
-    );
+    let (ours, exact) = (hologram(&ldi, planes, &ours), hologram(&ldi, planes, &exact));
     for colour in 0..3 {
         let error = relative_error(&plane_of(&ours, colour), &plane_of(&exact, colour));
         assert!(error < 0.02, "{colour}: {error}");

@@ -50,16 +50,7 @@ impl Data {
     }
 
     fn evaluate(&self, methods: &[Method<'_>], shown: &[Shown]) -> Vec<Row> {
-        evaluate::evaluate(
-            &self.manifest,
-            self.path(),
-            &[78, 79],
-            methods,
-            shown,
-            5,
-            &|| {},
-        )
-        .unwrap()
+        evaluate::evaluate(&self.manifest, self.path(), &[78, 79], methods, shown, 5, &|| {}).unwrap()
     }
 
     fn command(&self, arguments: &[&str]) -> std::process::Output {
@@ -85,9 +76,7 @@ fn a_pair_is_read_as_it_was_made() {
     let data = Data::new();
     let pair = dataset::read_pair(&data.manifest, data.path(), 79).unwrap();
     let scene = scene::random_scene(data.manifest.scene_seed(79), SIZE, SIZE);
-    let ldi = scene::render_ldi_reference(&scene, SIZE, SIZE, 3)
-        .unwrap()
-        .quantized();
+    let ldi = scene::render_ldi_reference(&scene, SIZE, SIZE, 3).unwrap().quantized();
     assert_eq!(pair.ldi, ldi);
     let hologram = sm_lbm::hologram(&ldi, &Display::default(), PLANES, &|_, _| {}).unwrap();
     assert_eq!(pair.hologram, hologram);
@@ -107,10 +96,7 @@ fn a_pair_is_read_as_it_was_made() {
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     refused(78, &["pair_000078.npz", "no whole pair"]);
     let other = Manifest::new(80, SIZE + 1, PLANES, 3, 4, Display::default()).unwrap();
-    let message = dataset::read_pair(&other, data.path(), 79)
-        .err()
-        .unwrap()
-        .to_string();
+    let message = dataset::read_pair(&other, data.path(), 79).err().unwrap().to_string();
     assert!(message.contains("49×49"), "{message}");
 }
 
@@ -143,9 +129,7 @@ fn the_figures_are_those_of_the_definition() {
                 let mut out = field.clone();
                 for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
                     let z = display.z_of_depth(*d);
-                    let plan =
-                        Propagator::new(SIZE, SIZE, display.pitch_m(), lambda, z, Padding::Double)
-                            .unwrap();
+                    let plan = Propagator::new(SIZE, SIZE, display.pitch_m(), lambda, z, Padding::Double).unwrap();
                     let mut plane = out.index_axis_mut(Axis(0), colour);
                     plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
                 }
@@ -155,11 +139,7 @@ fn the_figures_are_those_of_the_definition() {
             psnr += at.psnr_overall / depths.len() as f64;
             ssim += at.ssim_overall / depths.len() as f64;
         }
-        assert!(
-            (figures.focal_psnr - psnr).abs() < 0.1,
-            "{} {psnr}",
-            figures.focal_psnr
-        );
+        assert!((figures.focal_psnr - psnr).abs() < 0.1, "{} {psnr}", figures.focal_psnr);
         assert!(
             (figures.focal_ssim - ssim).abs() < 5e-3,
             "{} {ssim}",
@@ -183,10 +163,7 @@ fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
     let [layers, visible, rgb] = [0, 1, 2].map(|i| &rows[i].mean);
     assert_eq!(layers.amplitude_psnr, f64::INFINITY);
     assert!((layers.focal_ssim - 1.0).abs() < 1e-9);
-    assert!(
-        visible.amplitude_psnr > rgb.amplitude_psnr,
-        "{visible:?} {rgb:?}"
-    );
+    assert!(visible.amplitude_psnr > rgb.amplitude_psnr, "{visible:?} {rgb:?}");
     assert!(visible.focal_ssim > rgb.focal_ssim);
 }
 
@@ -197,11 +174,7 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let all = Aberrations::new(vec![(0.0, cylinder)]).unwrap();
     let plain = Data::new();
     let corrected = Data::correcting(Some(&AberrationFile::Uniform(all)));
-    let psnr = |data: &Data, method: Method<'_>| {
-        data.evaluate(&[method], &[Shown::complex()])[0]
-            .mean
-            .amplitude_psnr
-    };
+    let psnr = |data: &Data, method: Method<'_>| data.evaluate(&[method], &[Shown::complex()])[0].mean.amplitude_psnr;
     let display = Display::default();
     let layers = || Method::layers(&display, PLANES);
     assert!(psnr(&plain, layers()) > 100.0);
@@ -213,9 +186,7 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let see = |data: &Data| {
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
         let viewer = Viewer::new(&data.manifest).unwrap();
-        viewer
-            .views(&pair.hologram, &Shown::complex(), &z_m)
-            .unwrap()
+        viewer.views(&pair.hologram, &Shown::complex(), &z_m).unwrap()
     };
     let inner = ndarray::s![.., 12..SIZE - 12, 12..SIZE - 12];
     for (there, here) in see(&corrected).iter().zip(&see(&plain)) {
@@ -259,10 +230,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
             scale: Some(modulation.scale),
             lut: None,
         };
-        let view = Hologram::PhaseOnly(levels, info)
-            .views(&[0.0])
-            .unwrap()
-            .remove(0);
+        let view = Hologram::PhaseOnly(levels, info).views(&[0.0]).unwrap().remove(0);
         let truth = pair.hologram.mapv(|v| v.norm());
         let direct = metrics::compare(view.view(), truth.view()).unwrap();
         let ours = row.scenes[0].1;
@@ -284,9 +252,7 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
     let depth = Array2::from_shape_vec((1, depths.len()), depths).unwrap();
     let stack = evaluate::stack_depths(&depth, 1);
     assert_eq!(stack.len(), 20);
-    let frequent: Vec<f64> = (0..15)
-        .map(|k| (2.0 * f64::from(k) + 0.5) / 200.0)
-        .collect();
+    let frequent: Vec<f64> = (0..15).map(|k| (2.0 * f64::from(k) + 0.5) / 200.0).collect();
     assert_eq!(stack[..15], frequent);
     let mut sorted = stack.clone();
     sorted.sort_by(f64::total_cmp);
@@ -329,11 +295,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
         "--worst",
         "1",
     ]);
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let rows = result["rows"].as_array().unwrap();
     let names: Vec<_> = rows
@@ -352,10 +314,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
     let worst = |i: usize| {
         let scenes = rows[i]["scenes"].as_array().unwrap();
         let psnr = |s: &serde_json::Value| s[1]["amplitude_psnr"].as_f64().unwrap();
-        let worst = scenes
-            .iter()
-            .min_by(|a, b| psnr(a).total_cmp(&psnr(b)))
-            .unwrap();
+        let worst = scenes.iter().min_by(|a, b| psnr(a).total_cmp(&psnr(b))).unwrap();
         worst[0].as_u64().unwrap()
     };
     for (i, (method, shown)) in names.iter().enumerate() {
@@ -371,10 +330,6 @@ fn the_command_prints_figures_and_draws_the_worst() {
         assert!(errors.contains(word), "{errors}");
     };
     refused(&[], 2, "--method");
-    refused(
-        &["--method", "rgb", "--split", "validation"],
-        1,
-        "pair_000076.npz",
-    );
+    refused(&["--method", "rgb", "--split", "validation"], 1, "pair_000076.npz");
     refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
 }

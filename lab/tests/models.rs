@@ -30,11 +30,7 @@ fn quarters(ldi: &Ldi) -> [[f32; 3]; 4] {
 }
 
 fn hits(ldi: &Ldi, layer: usize) -> usize {
-    ldi.layers[layer]
-        .depth
-        .iter()
-        .filter(|d| !d.is_nan())
-        .count()
+    ldi.layers[layer].depth.iter().filter(|d| !d.is_nan()).count()
 }
 
 /// Red, green, blue, white, as a PNG; the last one's alpha as given.
@@ -59,25 +55,12 @@ fn picture(alpha: u8) -> Vec<u8> {
 /// A square from −1 to 1 with that picture, as glTF's JSON and its buffer.
 fn square() -> (Value, Vec<u8>) {
     let mut buffer = Vec::new();
-    let positions = [
-        [-1.0f32, -1., 0.],
-        [1., -1., 0.],
-        [1., 1., 0.],
-        [-1., 1., 0.],
-    ];
+    let positions = [[-1.0f32, -1., 0.], [1., -1., 0.], [1., 1., 0.], [-1., 1., 0.]];
     let uv = [[0.0f32, 1.], [1., 1.], [1., 0.], [0., 0.]];
     let colours = [[1.0f32, 0., 0.]; 4];
-    positions
-        .iter()
-        .flatten()
-        .for_each(|v| buffer.extend(v.to_le_bytes()));
-    uv.iter()
-        .flatten()
-        .for_each(|v| buffer.extend(v.to_le_bytes()));
-    colours
-        .iter()
-        .flatten()
-        .for_each(|v| buffer.extend(v.to_le_bytes()));
+    positions.iter().flatten().for_each(|v| buffer.extend(v.to_le_bytes()));
+    uv.iter().flatten().for_each(|v| buffer.extend(v.to_le_bytes()));
+    colours.iter().flatten().for_each(|v| buffer.extend(v.to_le_bytes()));
     [0u16, 1, 2, 0, 2, 3]
         .iter()
         .for_each(|v| buffer.extend(v.to_le_bytes()));
@@ -157,15 +140,8 @@ fn a_textured_glb_is_seen_upright_and_fits_the_frame() {
         "an opaque material has no holes"
     );
     for ((y, x), d) in ldi.layers[0].depth.indexed_iter() {
-        assert_eq!(
-            !d.is_nan(),
-            (1..19).contains(&y) && (11..29).contains(&x),
-            "({y}, {x})"
-        );
-        assert!(
-            d.is_nan() || *d == 0.5,
-            "what is flat lies in the middle of the volume"
-        );
+        assert_eq!(!d.is_nan(), (1..19).contains(&y) && (11..29).contains(&x), "({y}, {x})");
+        assert!(d.is_nan() || *d == 0.5, "what is flat lies in the middle of the volume");
     }
     assert_eq!(hits(&ldi, 1), 0);
 }
@@ -273,8 +249,7 @@ fn without_texture_coordinates_the_plain_and_vertex_colours_are_seen() {
     assert_eq!(quarters(&seen(&path)), [RED; 4]);
     // A linear factor of 0.5 is 0.73 to the eye.
     let path = changed(folder.path(), |json| {
-        json["materials"][0]["pbrMetallicRoughness"] =
-            json!({"baseColorFactor": [0.5, 0.5, 0.5, 1]});
+        json["materials"][0]["pbrMetallicRoughness"] = json!({"baseColorFactor": [0.5, 0.5, 0.5, 1]});
     });
     assert!((quarters(&seen(&path))[0][0] - 0.5f32.powf(1.0 / 2.2)).abs() < 0.003);
 }
@@ -292,11 +267,7 @@ fn strips_and_fans_are_triangles_too() {
             .for_each(|(i, v)| buffer[128 + 2 * i..][..2].copy_from_slice(&v.to_le_bytes()));
         let path = folder.path().join("model.glb");
         fs::write(&path, glb(&json, &buffer)).unwrap();
-        assert_eq!(
-            quarters(&seen(&path)),
-            [RED, GREEN, BLUE, WHITE],
-            "mode {mode}"
-        );
+        assert_eq!(quarters(&seen(&path)), [RED, GREEN, BLUE, WHITE], "mode {mode}");
     }
 }
 
@@ -332,44 +303,28 @@ fn broken_gltf_is_refused_by_name() {
     fs::write(folder.join("empty.glb"), "").unwrap();
     assert!(read_model(&folder.join("empty.glb"), 20, 40, None).is_err());
 
-    let refused =
-        |change: &dyn Fn(&mut Value), reason: &str| refused(&changed(folder, change), reason);
-    refused(
-        &|json| json["scenes"][0]["nodes"] = json!([]),
-        "no triangles",
-    );
+    let refused = |change: &dyn Fn(&mut Value), reason: &str| refused(&changed(folder, change), reason);
+    refused(&|json| json["scenes"][0]["nodes"] = json!([]), "no triangles");
     refused(
         &|json| json["accessors"][3]["count"] = json!(3 * MAX_MODEL_TRIANGLES as u64 + 3),
         "at most",
     );
-    refused(
-        &|json| json["accessors"][0]["count"] = json!(1u64 << 60),
-        "items; 1 to",
-    );
+    refused(&|json| json["accessors"][0]["count"] = json!(1u64 << 60), "items; 1 to");
     refused(
         &|json| json["accessors"][0]["count"] = json!(3),
         "vertex 3, but there are 3",
     );
-    refused(
-        &|json| json["accessors"][1]["count"] = json!(3),
-        "differ in number",
-    );
+    refused(&|json| json["accessors"][1]["count"] = json!(3), "differ in number");
     refused(
         &|json| json["accessors"][0]["count"] = json!(4000),
         "outside their buffer",
     );
-    refused(
-        &|json| json["accessors"][3]["type"] = json!("VEC3"),
-        "accessor 3",
-    );
+    refused(&|json| json["accessors"][3]["type"] = json!("VEC3"), "accessor 3");
     refused(
         &|json| json["accessors"][1]["componentType"] = json!(5120),
         "accessor 1",
     );
-    refused(
-        &|json| json["bufferViews"][0]["byteStride"] = json!(4),
-        "overlap",
-    );
+    refused(&|json| json["bufferViews"][0]["byteStride"] = json!(4), "overlap");
     refused(
         &|json| json["bufferViews"][4]["byteLength"] = json!(99999),
         "outside its buffer",
@@ -382,18 +337,9 @@ fn broken_gltf_is_refused_by_name() {
         &|json| json["images"][0] = json!({"uri": "%ff.png"}),
         "not the name of a file",
     );
-    refused(
-        &|json| json["nodes"] = json!([{"mesh": 0, "children": [0]}]),
-        "circle",
-    );
-    refused(
-        &|json| json["nodes"][0]["scale"] = json!([1e39, 1, 1]),
-        "not finite",
-    );
-    refused(
-        &|json| json["nodes"][0]["scale"] = json!([0, 0, 1]),
-        "has no size",
-    );
+    refused(&|json| json["nodes"] = json!([{"mesh": 0, "children": [0]}]), "circle");
+    refused(&|json| json["nodes"][0]["scale"] = json!([1e39, 1, 1]), "not finite");
+    refused(&|json| json["nodes"][0]["scale"] = json!([0, 0, 1]), "has no size");
 }
 
 /// No file cut short and no file with a wrong byte makes it panic; each error is one line.
@@ -451,10 +397,7 @@ fn obj_with_its_materials_is_seen_upright() {
 
     let plain = [0.0, 0.6, 1.0];
     let without_uv = OBJ.replace("f 1/1 2/2 3/3 4/4", "f 1 2 3 4");
-    assert_eq!(
-        quarters(&seen(&obj(folder.path(), &without_uv))),
-        [plain; 4]
-    );
+    assert_eq!(quarters(&seen(&obj(folder.path(), &without_uv))), [plain; 4]);
     fs::write(folder.path().join("picture.png"), &picture(255)[..30]).unwrap();
     refused(&obj(folder.path(), OBJ), "picture.png");
     fs::remove_file(folder.path().join("picture.png")).unwrap();
@@ -471,14 +414,8 @@ fn broken_obj_is_refused_by_name() {
     refused(&obj(folder, "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), "no triangles");
     refused(&obj(folder, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"), "");
     refused(&obj(folder, "v 0 0 0\nv 1 0 zero\nv 0 1 0\nf 1 2 3\n"), "");
-    refused(
-        &obj(folder, "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"),
-        "not finite",
-    );
-    refused(
-        &obj(folder, "v 0 0 0\nv 0 0 1\nv 0 0 2\nf 1 2 3\n"),
-        "has no size",
-    );
+    refused(&obj(folder, "v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), "not finite");
+    refused(&obj(folder, "v 0 0 0\nv 0 0 1\nv 0 0 2\nf 1 2 3\n"), "has no size");
     fs::write(folder.join("model.obj"), [0xff, 0xfe, 0, 1, 2]).unwrap();
     assert!(read_model(&folder.join("model.obj"), 20, 40, None).is_err());
     let path = obj(folder, OBJ);

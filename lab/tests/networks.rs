@@ -32,14 +32,9 @@ fn input(kind: InputKind, height: usize, width: usize) -> Vec<f32> {
 #[test]
 fn pairs_are_for_their_offset_and_display() {
     for pair in PAIRS {
-        let display = Display::default()
-            .with_offset_m(pair.offset_mm * 1e-3)
-            .unwrap();
+        let display = Display::default().with_offset_m(pair.offset_mm * 1e-3).unwrap();
         for precision in PRECISIONS {
-            let DeepPair {
-                hologram,
-                prefilter,
-            } = pair_for(&display, precision).unwrap();
+            let DeepPair { hologram, prefilter } = pair_for(&display, precision).unwrap();
             assert_eq!(hologram.precision(), numbers(precision));
             assert_eq!(prefilter.precision(), numbers(precision));
             assert!((prefilter.display().offset_m - display.offset_m()).abs() < 1e-9);

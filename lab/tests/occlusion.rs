@@ -17,9 +17,7 @@ fn the_artefacts_are_where_the_paper_sees_them() {
     let present = |values: [Option<f64>; 6]| values.map(|v| v.unwrap());
 
     // 6 is the reference; of the others waves come first, and no occlusion at all last.
-    let psnr: Vec<f64> = (study.outcomes.iter())
-        .map(|o| o.front_quality.psnr_overall)
-        .collect();
+    let psnr: Vec<f64> = (study.outcomes.iter()).map(|o| o.front_quality.psnr_overall).collect();
     assert_eq!(psnr[5], f64::INFINITY);
     let best = psnr[..5].iter().copied().fold(0.0, f64::max);
     let worst = psnr.iter().copied().fold(f64::INFINITY, f64::min);
@@ -40,10 +38,7 @@ fn the_artefacts_are_where_the_paper_sees_them() {
     let loss = present(of(&|o| o.artefacts.loss_from_occluded));
     for lossy in [1, 2, 4] {
         for complete in [0, 3, 5] {
-            assert!(
-                loss[lossy] > 0.15 && loss[lossy] > 1.5 * loss[complete],
-                "{loss:?}"
-            );
+            assert!(loss[lossy] > 0.15 && loss[lossy] > 1.5 * loss[complete], "{loss:?}");
         }
     }
     // 4: rays are not waves; there is nothing of it where no ray is cast.

@@ -7,9 +7,7 @@ mod driver;
 use std::sync::Arc;
 
 use phasefront_lab::ldi::Ldi;
-use phasefront_lab::scene::{
-    DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference,
-};
+use phasefront_lab::scene::{DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference};
 
 /// A peeler, or none where there is no GPU and no software driver.
 fn peeler() -> Option<DepthPeeler> {
@@ -23,8 +21,7 @@ type Pixel = (f32, [f32; 3]);
 fn differing(a: &Ldi, b: &Ldi) -> usize {
     let pixels = |ldi: &Ldi| {
         let of_layer = |layer: &phasefront_lab::ldi::LdiLayer| {
-            let pixel =
-                |((y, x), &d): ((usize, usize), &f32)| (d, [0, 1, 2].map(|c| layer.rgb[[c, y, x]]));
+            let pixel = |((y, x), &d): ((usize, usize), &f32)| (d, [0, 1, 2].map(|c| layer.rgb[[c, y, x]]));
             layer.depth.indexed_iter().map(pixel).collect::<Vec<_>>()
         };
         ldi.layers.iter().flat_map(of_layer).collect::<Vec<_>>()
@@ -44,12 +41,7 @@ fn differing(a: &Ldi, b: &Ldi) -> usize {
 fn wall(x: [f32; 2], d: f32, rgb: [f32; 3]) -> Mesh {
     let corner = |i: usize, y: f32| [x[i], y, 0.5 - d];
     Mesh {
-        positions: vec![
-            corner(0, 9.0),
-            corner(1, 9.0),
-            corner(1, 0.0),
-            corner(0, 0.0),
-        ],
+        positions: vec![corner(0, 9.0), corner(1, 9.0), corner(1, 0.0), corner(0, 0.0)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         uv: vec![[0.5; 2]; 4],
         colour: Vec::new(),
@@ -87,10 +79,7 @@ fn simple_scenes_are_the_references_exactly() {
     let same = |meshes: Vec<Mesh>| {
         let scene = Scene { meshes };
         let expected = render_ldi_reference(&scene, 9, 14, 3).unwrap();
-        assert_eq!(
-            differing(&peeler.render(&scene, 9, 14, 3).unwrap(), &expected),
-            0
-        );
+        assert_eq!(differing(&peeler.render(&scene, 9, 14, 3).unwrap(), &expected), 0);
         expected
     };
     let (red, green, blue) = ([1., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
@@ -103,18 +92,13 @@ fn simple_scenes_are_the_references_exactly() {
     ]);
     assert_eq!(ends.layers[0].depth[[4, 1]], 1.0);
     assert_eq!(ends.layers[0].depth[[4, 12]], 0.0);
-    let ties = same(
-        [red, green, blue]
-            .map(|rgb| wall([1.5, 12.5], 0.5, rgb))
-            .to_vec(),
-    );
+    let ties = same([red, green, blue].map(|rgb| wall([1.5, 12.5], 0.5, rgb)).to_vec());
     assert!(ties.layers[1].depth.iter().all(|d| d.is_nan()));
     // Backs are not seen, holes are seen through, colours are held to one.
     let mut back = wall([0., 14.], 0.2, red);
     back.triangles.iter_mut().for_each(|t| t.swap(0, 1));
     let mut sieve = wall([0., 14.], 0.4, green);
-    sieve.texture =
-        Arc::new(Texture::new(2, 1, vec![[200, 200, 9, 255], [200, 200, 9, 0]]).unwrap());
+    sieve.texture = Arc::new(Texture::new(2, 1, vec![[200, 200, 9, 255], [200, 200, 9, 0]]).unwrap());
     sieve.uv = vec![[0.1, 1.0], [3.1, 1.0], [3.1, 0.0], [0.1, 0.0]];
     sieve.colour = vec![[2.0, 0.5, 1.0]; 4];
     same(vec![back, sieve, wall([0., 14.], 0.9, blue)]);
@@ -126,17 +110,8 @@ fn what_does_not_fit_is_refused() {
     let scene = Scene {
         meshes: vec![wall([0., 9.], 0.5, [1.0; 3])],
     };
-    for (height, width, layers) in [
-        (0, 4, 1),
-        (4, 0, 1),
-        (4, 4, 0),
-        (1 << 20, 4, 1),
-        (usize::MAX, 2, 2),
-    ] {
-        let message = peeler
-            .render(&scene, height, width, layers)
-            .unwrap_err()
-            .to_string();
+    for (height, width, layers) in [(0, 4, 1), (4, 0, 1), (4, 4, 0), (1 << 20, 4, 1), (usize::MAX, 2, 2)] {
+        let message = peeler.render(&scene, height, width, layers).unwrap_err().to_string();
         assert!(!message.contains('\n'), "{message}");
     }
     let mut long = scene.clone();

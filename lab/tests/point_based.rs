@@ -58,8 +58,7 @@ fn agrees_with_its_definition() {
         let ldi = random_ldi(shape, 4);
         for occlusion in ALL {
             let ours = hologram(&ldi, planes, occlusion);
-            let expected =
-                point_based::reference::hologram(&ldi, &display, planes, occlusion).unwrap();
+            let expected = point_based::reference::hologram(&ldi, &display, planes, occlusion).unwrap();
             for colour in 0..3 {
                 let plane = ours.index_axis(Axis(0), colour);
                 let plane = widen(plane.to_slice().unwrap(), shape);
@@ -78,9 +77,7 @@ fn agrees_with_its_definition() {
 fn bands_of_rows_join() {
     // More rows than one band holds, against the definition.
     let ldi = random_ldi((71, 6), 2);
-    let expected =
-        point_based::reference::hologram(&ldi, &Display::default(), 20, Occlusion::Geometric)
-            .unwrap();
+    let expected = point_based::reference::hologram(&ldi, &Display::default(), 20, Occlusion::Geometric).unwrap();
     let ours = hologram(&ldi, 20, Occlusion::Geometric);
     for colour in 0..3 {
         let plane = ours.index_axis(Axis(0), colour);
@@ -137,8 +134,7 @@ fn a_plane_of_constant_depth_gives_back_its_amplitude() {
         let ours = hologram(&ldi, 100, Occlusion::Geometric);
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
-            let plan =
-                Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
+            let plan = Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
             let mut plane = ours.index_axis(Axis(0), colour).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
             let image = ldi.layers[0].rgb.index_axis(Axis(0), colour);
@@ -147,10 +143,7 @@ fn a_plane_of_constant_depth_gives_back_its_amplitude() {
             let psnr = -10.0 * difference.mean().unwrap().log10();
             assert!(psnr >= 35.0, "depth {depth}, colour {colour}: {psnr} dB");
             let ratio = amplitude.slice(inner).sum() / image.slice(inner).sum();
-            assert!(
-                (ratio - 1.0).abs() < 0.01,
-                "depth {depth}, colour {colour}: × {ratio}"
-            );
+            assert!((ratio - 1.0).abs() < 0.01, "depth {depth}, colour {colour}: × {ratio}");
         }
     }
 }
@@ -159,10 +152,7 @@ fn a_plane_of_constant_depth_gives_back_its_amplitude() {
 fn threads_do_not_change_a_bit() {
     let ldi = random_ldi((75, 47), 3);
     let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| hologram(&ldi, 50, Occlusion::Geometric))
     };
     assert_eq!(with(1), with(3));
@@ -215,10 +205,7 @@ fn what_cannot_be_computed_is_refused() {
         let display = Display::from_toml(display).unwrap();
         let e = point_based::hologram(&ldi, &display, planes, Occlusion::None, &|_, _| {});
         let message = e.unwrap_err().to_string();
-        assert!(
-            message.contains(word) && !message.contains('\n'),
-            "{message}"
-        );
+        assert!(message.contains(word) && !message.contains('\n'), "{message}");
     };
     refuses("", 0, "planes");
     refuses("", usize::MAX, "planes");

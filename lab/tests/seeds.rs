@@ -34,26 +34,14 @@ fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
         planes: 8,
         ..Sweep::for_display(&manifest.display)
     };
-    let make = |refined| {
-        seeds::make(
-            &manifest,
-            data.path(),
-            folder.path(),
-            sweep,
-            refined,
-            &|| {},
-        )
-    };
+    let make = |refined| seeds::make(&manifest, data.path(), folder.path(), sweep, refined, &|| {});
     make(2).unwrap();
 
     let refined: Array3<u16> = read_npy(file("refined")).unwrap();
     assert_eq!(refined.dim(), (2, SIZE, SIZE));
     assert_ne!(refined.slice(s![0, .., ..]), refined.slice(s![1, .., ..]));
     for depth in refined.outer_iter() {
-        let near = depth
-            .iter()
-            .zip(&clean)
-            .filter(|(a, b)| a.abs_diff(**b) < 3277);
+        let near = depth.iter().zip(&clean).filter(|(a, b)| a.abs_diff(**b) < 3277);
         let near = near.count();
         assert!(near > SIZE * SIZE * 3 / 4, "{near}");
     }
@@ -72,10 +60,7 @@ fn seeds_are_the_sweeps_fields_on_given_and_refined_depth() {
         for ((c, y, x), value) in field.indexed_iter() {
             for (c, part) in [(c, value.re), (c + 3, value.im)] {
                 let found = f32::from(stored[(c, y, x)]) / seeds::SCALE;
-                assert!(
-                    (found - part).abs() <= 0.51 / seeds::SCALE,
-                    "{found} {part}"
-                );
+                assert!((found - part).abs() <= 0.51 / seeds::SCALE, "{found} {part}");
             }
         }
     }
@@ -89,20 +74,8 @@ fn scenes_that_no_sensor_divides_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let manifest = manifest(50);
     let sweep = Sweep::for_display(&manifest.display);
-    let make = |refined| {
-        seeds::make(
-            &manifest,
-            folder.path(),
-            folder.path(),
-            sweep,
-            refined,
-            &|| {},
-        )
-    };
+    let make = |refined| seeds::make(&manifest, folder.path(), folder.path(), sweep, refined, &|| {});
     let error = make(1).unwrap_err().to_string();
-    assert!(
-        error.contains("50×50") && error.contains("multiple of 4"),
-        "{error}"
-    );
+    assert!(error.contains("50×50") && error.contains("multiple of 4"), "{error}");
     make(0).unwrap();
 }

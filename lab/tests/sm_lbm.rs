@@ -67,10 +67,7 @@ fn agrees_with_equations_1_to_4() {
         let ours = hologram(&ldi, planes);
         for colour in 0..3 {
             let error = relative_error(&plane_of(&ours, colour), &expected(&ldi, planes, colour));
-            assert!(
-                error < most,
-                "{shape:?} {planes} planes, colour {colour}: {error:e}"
-            );
+            assert!(error < most, "{shape:?} {planes} planes, colour {colour}: {error:e}");
         }
     }
 }
@@ -96,11 +93,9 @@ fn two_planes_equal_the_closed_computation() {
             .slice_mut(s![..48, ..56])
             .assign(&image(&rear.layers[0]).mapv(|a| a * start(z(1))));
         field = reference::asm_periodic(&field, 8e-6, lambda, z(0) - z(1));
-        field.slice_mut(s![..48, ..28]).assign(
-            &image(&front.layers[0])
-                .slice(s![.., ..28])
-                .mapv(|a| a * start(z(0))),
-        );
+        field
+            .slice_mut(s![..48, ..28])
+            .assign(&image(&front.layers[0]).slice(s![.., ..28]).mapv(|a| a * start(z(0))));
         field = reference::asm_periodic(&field, 8e-6, lambda, -z(0));
         let closed = field.slice(s![..48, ..56]).to_owned();
         assert!(relative_error(&plane_of(&ours, colour), &closed) < 1e-4);
@@ -117,12 +112,10 @@ fn a_plane_of_constant_depth_refocuses_to_its_amplitude() {
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         let inner = s![32..88, 32..128];
         for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
-            let plan =
-                Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
+            let plan = Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
             let mut plane = ours.index_axis(Axis(0), colour).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
-            let difference =
-                &plane.mapv(|v| v.norm()) - &ldi.layers[0].rgb.index_axis(Axis(0), colour);
+            let difference = &plane.mapv(|v| v.norm()) - &ldi.layers[0].rgb.index_axis(Axis(0), colour);
             let mean_square = difference.slice(inner).mapv(|d| d * d).mean().unwrap();
             let psnr = -10.0 * mean_square.log10();
             assert!(psnr >= 40.0, "depth {depth}, colour {colour}: {psnr} dB");
@@ -134,10 +127,7 @@ fn a_plane_of_constant_depth_refocuses_to_its_amplitude() {
 fn threads_do_not_change_a_bit() {
     let ldi = random_ldi((61, 47), 3);
     let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| hologram(&ldi, 20))
     };
     assert_eq!(with(1), with(3));

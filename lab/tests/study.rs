@@ -47,17 +47,12 @@ fn layers_are_compared_with_ten() {
     let direct: Vec<f64> = [11, 12]
         .map(|seed| {
             let (two, ten) = (amplitude(&ldi(seed, 40, 2)), amplitude(&ldi(seed, 40, 10)));
-            metrics::compare(two.view(), ten.view())
-                .unwrap()
-                .ssim_overall
+            metrics::compare(two.view(), ten.view()).unwrap().ssim_overall
         })
         .to_vec();
     assert_eq!(rows[1].ssim_of_scenes, direct);
     assert!((rows[1].ssim - (direct[0] + direct[1]) / 2.0).abs() < 1e-12);
-    assert!(
-        rows[8].ssim >= rows[3].ssim && rows[3].ssim > rows[0].ssim,
-        "{rows:?}"
-    );
+    assert!(rows[8].ssim >= rows[3].ssim && rows[3].ssim > rows[0].ssim, "{rows:?}");
 }
 
 #[test]
@@ -68,17 +63,9 @@ fn planes_are_compared_with_the_finest() {
     };
     let rows = study::planes(&scenes(40), 5, 300, &count).unwrap();
     assert_eq!(work.into_inner(), study::planes_work(&scenes(40), 300));
-    assert_eq!(
-        rows.iter().map(|row| row.value).collect::<Vec<_>>(),
-        [32, 128]
-    );
-    assert!(
-        rows[1].ssim > rows[0].ssim && rows[1].psnr > rows[0].psnr,
-        "{rows:?}"
-    );
-    let message = study::planes(&scenes(40), 5, 32, &|_| {})
-        .unwrap_err()
-        .to_string();
+    assert_eq!(rows.iter().map(|row| row.value).collect::<Vec<_>>(), [32, 128]);
+    assert!(rows[1].ssim > rows[0].ssim && rows[1].psnr > rows[0].psnr, "{rows:?}");
+    let message = study::planes(&scenes(40), 5, 32, &|_| {}).unwrap_err().to_string();
     assert!(message.contains("over 32"), "{message}");
     let none = Scenes {
         scenes: 0,
@@ -95,11 +82,7 @@ fn run(what: &str, size: &str, folder: &Path) -> serde_json::Value {
         .arg(folder)
         .output()
         .unwrap();
-    assert!(
-        output.status.success(),
-        "{}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let text = std::fs::read_to_string(folder.join(format!("{what}.json"))).unwrap();
     serde_json::from_str(&text).unwrap()
 }
@@ -149,11 +132,7 @@ fn what_cannot_be_plotted_is_refused_and_leaves_no_file() {
         y: "y",
         points,
     };
-    for panels in [
-        vec![],
-        vec![panel(vec![])],
-        vec![panel(vec![(1, f64::NAN)])],
-    ] {
+    for panels in [vec![], vec![panel(vec![])], vec![panel(vec![(1, f64::NAN)])]] {
         assert!(plot::write_svg(&path, &panels).is_err());
         assert!(!path.exists());
     }
@@ -180,16 +159,10 @@ fn the_sweep_is_studied_beside_exact_waves() {
     let usual = of("usual", 40);
     // Merged steps and tiles change nothing but the time.
     for same in [of("merge", 0), of("tile", 128)] {
-        assert!(
-            (same.clean.psnr - usual.clean.psnr).abs() < 0.02,
-            "{same:?}"
-        );
+        assert!((same.clean.psnr - usual.clean.psnr).abs() < 0.02, "{same:?}");
         assert!(same.ns_per_pixel.unwrap() > 0.0);
     }
-    assert!(
-        usual.clean.psnr > of("hidden", 0).clean.psnr + 0.5,
-        "{rows:?}"
-    );
+    assert!(usual.clean.psnr > of("hidden", 0).clean.psnr + 0.5, "{rows:?}");
     assert!(usual.clean.psnr > of("between", 0).clean.psnr + 0.05);
     assert!(of("planes", 64).clean.psnr > of("planes", 16).clean.psnr + 1.0);
     assert!(usual.clean.psnr > usual.degraded.psnr, "{usual:?}");
@@ -205,9 +178,7 @@ fn the_sweep_is_studied_beside_exact_waves() {
         .map(|seed| {
             let ldi = ldi(seed, 64, 5);
             let rgb = evaluate::visible_rgb(&ldi);
-            let depth = ldi.layers[0]
-                .depth
-                .mapv(|d| if d.is_nan() { 1.0 } else { d });
+            let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
             let frame = RgbdFrame::new(rgb, depth).unwrap();
             let plan = SweepPlan::new(64, 64, display, sweep, 0.0).unwrap();
             let mut field = Array3::zeros((3, 64, 64));

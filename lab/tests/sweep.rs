@@ -1,5 +1,5 @@
-//! The plane sweep on displays that no network was trained for: beside exact waves on the same surfaces, and both beside
-//! the truth. And on a frame that a camera took: no seams between tiles.
+//! The plane sweep on displays that no network was trained for: beside exact waves on the same surfaces, and both
+//! beside the truth. And on a frame that a camera took: no seams between tiles.
 #![allow(clippy::unwrap_used)]
 
 use ndarray::Array3;
@@ -46,11 +46,7 @@ fn to_display(mut field: Array3<Complex32>, display: &Display) -> Array3<Complex
             Padding::Reach,
         );
         let values = field.as_slice_mut().unwrap();
-        for (plan, plane) in plans
-            .unwrap()
-            .iter()
-            .zip(values.chunks_exact_mut(SIZE * SIZE))
-        {
+        for (plan, plane) in plans.unwrap().iter().zip(values.chunks_exact_mut(SIZE * SIZE)) {
             plan.propagate(plane, &mut plan.scratch());
         }
     }
@@ -89,25 +85,15 @@ fn other_displays_need_no_training() {
                 to_display(field, &display)
             };
             let truth = waves(&ldi, TRUE_PLANES);
-            exact += decibels(
-                &waves(&filled(&frame, &display).unwrap(), sweep.planes),
-                &truth,
-            ) / 2.0;
+            exact += decibels(&waves(&filled(&frame, &display).unwrap(), sweep.planes), &truth) / 2.0;
             let mut field = Array3::from_elem((3, SIZE, SIZE), Complex32::ZERO);
             let values = field.as_slice_mut().unwrap();
             plan.field(&frame, values, &mut plan.scratch()).unwrap();
-            let field = if ends_there {
-                field
-            } else {
-                to_display(field, &display)
-            };
+            let field = if ends_there { field } else { to_display(field, &display) };
             swept += decibels(&field, &truth) / 2.0;
         }
         println!("{toml:?}: {sweep:?} sweep {swept:.2} dB, exact waves {exact:.2} dB");
-        assert!(
-            swept > exact - 1.5,
-            "{toml:?}: {swept} dB beside {exact} dB"
-        );
+        assert!(swept > exact - 1.5, "{toml:?}: {swept} dB beside {exact} dB");
     }
 }
 
@@ -120,19 +106,13 @@ fn captured(folder: &Path) -> RgbdFrame {
     let plan = ColourPlan::new(&image, Orientation::default(), OUT.0, OUT.1).unwrap();
     let mut rgb = Array3::zeros((3, OUT.0, OUT.1));
     let amplitudes = rgb.as_slice_mut().unwrap();
-    plan.convert(&image, amplitudes, &mut plan.scratch())
-        .unwrap();
+    plan.convert(&image, amplitudes, &mut plan.scratch()).unwrap();
     let millimetres = files::read_depth(&folder.join("depth_0.png"), false).unwrap();
     let shape = millimetres.dim();
     let holes = millimetres.mapv(|mm| f32::from(mm > 0.0));
-    let depth = phasefront::unstable::depth::normalize(
-        millimetres.view(),
-        DepthUnit::Millimetres,
-        None,
-        None,
-    )
-    .unwrap()
-    .depth;
+    let depth = phasefront::unstable::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
+        .unwrap()
+        .depth;
     let refiner = Refiner::new(shape, Crop::cover(shape, OUT), OUT).unwrap();
     let mut refined = ndarray::Array2::zeros(OUT);
     refiner
@@ -166,11 +146,7 @@ fn a_captured_frame_has_no_seams_between_tiles() {
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
         field
     });
-    let worst = |a: &[f32], b: &[f32]| {
-        (a.iter().zip(b))
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f32::max)
-    };
+    let worst = |a: &[f32], b: &[f32]| (a.iter().zip(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     let difference = (tiles.iter().zip(&whole))
         .map(|(a, b)| (a - b).norm())
         .fold(0.0, f32::max);
@@ -189,10 +165,7 @@ fn a_captured_frame_has_no_seams_between_tiles() {
         };
         let seams = (1..width / usual.tile + 1).map(|i| i * usual.tile);
         let seams: Vec<f64> = seams.filter(|x| *x < width).map(step).collect();
-        let others: Vec<f64> = (1..width)
-            .filter(|x| x % usual.tile != 0)
-            .map(step)
-            .collect();
+        let others: Vec<f64> = (1..width).filter(|x| x % usual.tile != 0).map(step).collect();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         println!(
             "z {z_m}: steps {:.5} over edges, {:.5} elsewhere",

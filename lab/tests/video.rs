@@ -32,14 +32,8 @@ fn refusal(arguments: &[&str]) -> String {
 }
 
 /// Colour and depth in millimetres of a square that moves over a wall.
-fn frame(
-    index: u32,
-) -> (
-    image::RgbImage,
-    image::ImageBuffer<image::Luma<u16>, Vec<u16>>,
-) {
-    let square =
-        |x: u32, y: u32| (8 + index * 4..24 + index * 4).contains(&x) && (12..30).contains(&y);
+fn frame(index: u32) -> (image::RgbImage, image::ImageBuffer<image::Luma<u16>, Vec<u16>>) {
+    let square = |x: u32, y: u32| (8 + index * 4..24 + index * 4).contains(&x) && (12..30).contains(&y);
     let colour = image::RgbImage::from_fn(WIDTH, HEIGHT, |x, y| match square(x, y) {
         true => image::Rgb([240, 180, 40]),
         false => image::Rgb([20, 60, 2 * x as u8]),
@@ -58,12 +52,8 @@ fn folder(frames: u32) -> (tempfile::TempDir, PathBuf) {
     std::fs::create_dir(&input).unwrap();
     for index in 0..frames {
         let (colour, depth) = frame(index);
-        colour
-            .save(input.join(format!("color_{index}.png")))
-            .unwrap();
-        depth
-            .save(input.join(format!("depth_{index}.png")))
-            .unwrap();
+        colour.save(input.join(format!("color_{index}.png"))).unwrap();
+        depth.save(input.join(format!("depth_{index}.png"))).unwrap();
     }
     (dir, input)
 }
@@ -71,12 +61,7 @@ fn folder(frames: u32) -> (tempfile::TempDir, PathBuf) {
 /// Every frame is told of once.
 fn sums_agree(report: &Value) {
     let count = |v: &Value| v.as_u64().unwrap();
-    let dropped: u64 = report["dropped"]
-        .as_object()
-        .unwrap()
-        .values()
-        .map(count)
-        .sum();
+    let dropped: u64 = report["dropped"].as_object().unwrap().values().map(count).sum();
     let told = ["processed", "failed", "refused"]
         .map(|key| count(&report[key]))
         .iter()
@@ -106,8 +91,7 @@ fn a_folder_becomes_phase_maps_previews_and_statistics() {
         (Some(4), Some(0))
     );
     sums_agree(&report);
-    let written: Value =
-        serde_json::from_slice(&std::fs::read(out.join("statistics.json")).unwrap()).unwrap();
+    let written: Value = serde_json::from_slice(&std::fs::read(out.join("statistics.json")).unwrap()).unwrap();
     assert_eq!(written, report);
     for index in 0..4 {
         let path = out.join(format!("phase_{index:06}.png"));
@@ -121,10 +105,7 @@ fn a_folder_becomes_phase_maps_previews_and_statistics() {
             .unwrap()
             .into_rgb8();
         let at = |x: u32| preview.get_pixel(x, 21)[0];
-        assert!(
-            at(16 + index * 4) > 150 && at(48 + index * 4 % 8) < 90,
-            "{index}"
-        );
+        assert!(at(16 + index * 4) > 150 && at(48 + index * 4 % 8) < 90, "{index}");
     }
     // A frame's phase map can be looked at like any hologram.
     let phase = out.join("phase_000002.png");
@@ -164,37 +145,17 @@ fn raw_frames_come_through_a_pipe_and_equal_those_of_files() {
     let (dir, input) = folder(3);
     let (files, pipe) = (dir.path().join("files"), dir.path().join("pipe"));
     let (files_name, pipe_name) = (files.to_str().unwrap(), pipe.to_str().unwrap());
-    json(&[
-        "video",
-        input.to_str().unwrap(),
-        "--depth-unit",
-        "mm",
-        "-o",
-        files_name,
-    ]);
-    let mut child = phasefront(&[
-        "video",
-        "-",
-        "--raw",
-        "64x48",
-        "--depth-unit",
-        "mm",
-        "-o",
-        pipe_name,
-    ])
-    .stdin(Stdio::piped())
-    .stdout(Stdio::null())
-    .spawn()
-    .unwrap();
+    json(&["video", input.to_str().unwrap(), "--depth-unit", "mm", "-o", files_name]);
+    let mut child = phasefront(&["video", "-", "--raw", "64x48", "--depth-unit", "mm", "-o", pipe_name])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
     let mut stdin = child.stdin.take().unwrap();
     for index in 0..3 {
         let (colour, depth) = frame(index);
         stdin.write_all(colour.as_raw()).unwrap();
-        let bytes: Vec<u8> = depth
-            .as_raw()
-            .iter()
-            .flat_map(|v| v.to_le_bytes())
-            .collect();
+        let bytes: Vec<u8> = depth.as_raw().iter().flat_map(|v| v.to_le_bytes()).collect();
         stdin.write_all(&bytes).unwrap();
     }
     drop(stdin);

@@ -1,5 +1,5 @@
-//! The trained networks that come with Phasefront, for the display of the paper: 8 µm, 638/520/450 nm, a volume of 6 mm.
-//! What each of them measures stands in its card, the `.md` beside its file.
+//! The trained networks that come with Phasefront, for the display of the paper: 8 µm, 638/520/450 nm, a volume of 6
+//! mm. What each of them measures stands in its card, the `.md` beside its file.
 //!
 //! ```
 //! use phasefront::Display;
@@ -192,10 +192,7 @@ mod tests {
             for pair in PAIRS {
                 let display = Display::default().with_offset_m(pair.offset_mm * 1e-3);
                 let networks = pair.networks(precision).unwrap();
-                networks
-                    .prefilter
-                    .check_prefilter(&display.unwrap())
-                    .unwrap();
+                networks.prefilter.check_prefilter(&display.unwrap()).unwrap();
             }
         }
     }
@@ -208,10 +205,7 @@ mod tests {
             let options = session_options(display);
             let deep = matches!(options.encoder.encoding, Encoding::Deep(_));
             assert_eq!(deep, paired, "{offset_mm} mm");
-            assert_eq!(
-                matches!(options.ladder[0].method, Method::Sweep(_)),
-                !paired
-            );
+            assert_eq!(matches!(options.ladder[0].method, Method::Sweep(_)), !paired);
         }
         let other = Display::from_toml("pitch_um = 3.74").unwrap();
         assert!(pair_for(&other, Precision::Int8).is_none());

@@ -1,5 +1,5 @@
-//! Which amplitude full light stands for, and how bright a field is without its brightest points. How a scale moves from
-//! frame to frame is a session's.
+//! Which amplitude full light stands for, and how bright a field is without its brightest points. How a scale moves
+//! from frame to frame is a session's.
 
 use crate::error::{Error, Result};
 use num_complex::Complex32;
@@ -7,8 +7,8 @@ use num_complex::Complex32;
 /// How the scale of a frame is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Brightness {
-    /// The amplitude that all but one of a thousand stay under, in a session smoothed over a second. What is brighter is
-    /// clipped.
+    /// The amplitude that all but one of a thousand stay under, in a session smoothed over a second. What is brighter
+    /// is clipped.
     #[default]
     Steady,
     /// This one, always. What is brighter is clipped.
@@ -22,20 +22,15 @@ impl Brightness {
     /// A fixed scale that is not positive.
     pub(crate) fn check(self) -> Result<()> {
         match self {
-            Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(
-                format!("a scale of {scale} cannot stand for full light; it must be above 0"),
-            )),
+            Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(format!(
+                "a scale of {scale} cannot stand for full light; it must be above 0"
+            ))),
             _ => Ok(()),
         }
     }
 
     /// The scale of `field`, which a steady one comes to from `past`; None for the field's largest amplitude.
-    pub(crate) fn scale(
-        self,
-        field: &[Complex32],
-        past: Option<Past>,
-        percentile: &mut Percentile,
-    ) -> Option<f32> {
+    pub(crate) fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
         match self {
             Brightness::FrameMax => None,
             Brightness::Fixed(scale) => Some(scale),

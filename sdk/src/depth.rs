@@ -86,11 +86,7 @@ pub fn normalize(
         true => v,
         false => unit.metres(v).unwrap_or(f32::NAN),
     });
-    if normalized
-        && let Some(bad) = metres
-            .iter()
-            .find(|v| !v.is_nan() && !(0.0..=1.0).contains(*v))
-    {
+    if normalized && let Some(bad) = metres.iter().find(|v| !v.is_nan() && !(0.0..=1.0).contains(*v)) {
         return Err(Error::Frame(format!(
             "normalized depth holds {bad}; it must lie in 0..=1, or another depth unit be named"
         )));
@@ -111,11 +107,7 @@ pub fn normalize(
         }
     };
     let given = near_m.is_some() || far_m.is_some();
-    if !(near.is_finite()
-        && far.is_finite()
-        && near >= 0.0
-        && (near < far || !given && near == far))
-    {
+    if !(near.is_finite() && far.is_finite() && near >= 0.0 && (near < far || !given && near == far)) {
         return Err(Error::Frame(format!(
             "near {near} m and far {far} m are no range; near must lie before far"
         )));
@@ -199,9 +191,7 @@ mod tests {
 
     #[test]
     fn each_unit_gives_metres_or_no_reading() {
-        let raw = DepthUnit::Raw {
-            units_per_m: 5000.0,
-        };
+        let raw = DepthUnit::Raw { units_per_m: 5000.0 };
         assert_eq!(DepthUnit::Metres.metres(2.5), Some(2.5));
         assert_eq!(DepthUnit::Millimetres.metres(2500.0), Some(2.5));
         assert_eq!(DepthUnit::Disparity.metres(0.4), Some(2.5));
@@ -228,11 +218,7 @@ mod tests {
     #[test]
     fn holes_take_the_nearest_reading() {
         let nan = f32::NAN;
-        let mut depth = array![
-            [nan, nan, nan, 0.7],
-            [0.2, nan, nan, nan],
-            [nan, nan, nan, nan]
-        ];
+        let mut depth = array![[nan, nan, nan, 0.7], [0.2, nan, nan, nan], [nan, nan, nan, nan]];
         assert_eq!(fill_nearest(&mut depth).unwrap(), 10);
         assert_eq!(depth[(2, 0)], 0.2);
         assert_eq!(depth[(1, 3)], 0.7);

@@ -123,17 +123,11 @@ impl Display {
             ));
         }
         if !(0.1e-6..=1e-3).contains(&self.pitch_m) {
-            return refuse(format!(
-                "pitch_um is {}; it must lie in 0.1..=1000",
-                self.pitch_m * 1e6
-            ));
+            return refuse(format!("pitch_um is {}; it must lie in 0.1..=1000", self.pitch_m * 1e6));
         }
         for l in self.wavelengths_m {
             if !(100e-9..=20e-6).contains(&l) {
-                return refuse(format!(
-                    "a wavelength is {} nm; each must lie in 100..=20000",
-                    l * 1e9
-                ));
+                return refuse(format!("a wavelength is {} nm; each must lie in 100..=20000", l * 1e9));
             }
             if l > 2.0 * self.pitch_m {
                 return refuse(format!(
@@ -211,11 +205,7 @@ impl Display {
     /// # Errors
     /// A side outside 1..=65536.
     pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
-        let display = Display {
-            height,
-            width,
-            ..self
-        };
+        let display = Display { height, width, ..self };
         display.check()?;
         Ok(display)
     }

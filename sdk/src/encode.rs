@@ -47,10 +47,7 @@ pub enum Encoding {
 
 impl Encoding {
     /// AA-DPM as published: σ 0.7 over 3 pixels.
-    pub const ANTI_ALIAS: Self = Encoding::AntiAlias {
-        sigma: 0.7,
-        width: 3,
-    };
+    pub const ANTI_ALIAS: Self = Encoding::AntiAlias { sigma: 0.7, width: 3 };
     /// BL-DPM as published: k = 1.
     pub const BAND_LIMIT: Self = Encoding::BandLimit { k: 1.0 };
 
@@ -118,8 +115,8 @@ enum PrefilterScratch {
 }
 
 impl Encoder {
-    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is divided
-    /// by the light that falls there.
+    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
+    /// divided by the light that falls there.
     ///
     /// # Errors
     /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
@@ -133,9 +130,7 @@ impl Encoder {
         target.check()?;
         let prefilter = match encoding {
             Encoding::DoublePhase => Prefilter::None,
-            Encoding::AntiAlias { sigma, width } => {
-                Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?)
-            }
+            Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
             Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, *k)?),
             Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network)?),
         };
@@ -153,9 +148,7 @@ impl Encoder {
     pub fn scratch(&self) -> EncoderScratch {
         let prefilter = match &self.prefilter {
             Prefilter::None => None,
-            Prefilter::AntiAlias(plan) => {
-                Some(PrefilterScratch::AntiAlias(plan.scratch(self.width)))
-            }
+            Prefilter::AntiAlias(plan) => Some(PrefilterScratch::AntiAlias(plan.scratch(self.width))),
             Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
             Prefilter::Deep(plan) => Some(PrefilterScratch::Deep(plan.scratch())),
         };
@@ -165,9 +158,9 @@ impl Encoder {
         }
     }
 
-    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it
-    /// used, the amplitude that full light stands for: `scale`, or the field's largest amplitude. `field` is worked on: what it holds afterwards means nothing.
-    /// Allocates nothing.
+    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it used, the amplitude
+    /// that full light stands for: `scale`, or the field's largest amplitude. `field` is worked on: what it holds
+    /// afterwards means nothing. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `phase` has not 3·H·W values.
@@ -205,12 +198,7 @@ impl Encoder {
     }
 
     /// The filters that need the whole field at once, the light where no filter by rows comes after it, and the scale.
-    fn prepare(
-        &self,
-        field: &mut [Complex32],
-        scale: Option<f32>,
-        scratch: &mut EncoderScratch,
-    ) -> f32 {
+    fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), 3 * plane);
         match (&self.prefilter, &mut scratch.prefilter) {
@@ -243,8 +231,8 @@ impl Encoder {
         }
     }
 
-    /// Hands each row of `field`, filtered by what needs some rows alone, and divided by the light, to `then`: its index in
-    /// the stack, its values, and its part of `out`.
+    /// Hands each row of `field`, filtered by what needs some rows alone, and divided by the light, to `then`: its
+    /// index in the stack, its values, and its part of `out`.
     fn rows<T: Send>(
         &self,
         field: &[Complex32],

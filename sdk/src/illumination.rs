@@ -63,8 +63,8 @@ impl Illumination {
         &self.gain
     }
 
-    /// One over the amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator: in y first, then in x. The oracle of
-    /// [`Self::divide`].
+    /// One over the amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator: in y first, then in x. The oracle
+    /// of [`Self::divide`].
     ///
     /// # Panics
     /// If `colour` is over 2 or the pixel outside.
@@ -84,17 +84,12 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field`, (3, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's amplitude. An
-    /// axis of the modulator shorter than the field's counts as that. Allocates nothing.
+    /// Divides `field`, (3, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's
+    /// amplitude. An axis of the modulator shorter than the field's counts as that. Allocates nothing.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.
-    pub fn divide(
-        &self,
-        field: &mut [Complex32],
-        shape: (usize, usize),
-        modulator: (usize, usize),
-    ) {
+    pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value *= gain);
     }
 
@@ -108,13 +103,7 @@ impl Illumination {
     }
 
     /// [`Self::divide`] for row `row` of a stack of planes of `height` rows.
-    pub fn divide_row(
-        &self,
-        values: &mut [Complex32],
-        row: usize,
-        height: usize,
-        modulator: (usize, usize),
-    ) {
+    pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: (usize, usize)) {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 
@@ -155,10 +144,7 @@ impl Illumination {
                 last if last == spans => end,
                 node => (node * steps).div_ceil(spans).min(end),
             };
-            let (near, far) = (
-                self.column(colour, i, j, fy),
-                self.column(colour, i, j + 1, fy),
-            );
+            let (near, far) = (self.column(colour, i, j, fy), self.column(colour, i, j + 1, fy));
             let (run, rest) = values.split_at_mut(next - at);
             let (first, each) = ((at * spans - j * steps) as i32, spans as i32);
             for (k, value) in run.iter_mut().enumerate() {
@@ -186,10 +172,7 @@ mod tests {
 
     fn beam(rows: usize, columns: usize) -> Array3<f32> {
         Array3::from_shape_fn((3, rows, columns), |(c, y, x)| {
-            let (u, v) = (
-                x as f32 / columns as f32 - 0.5,
-                y as f32 / rows as f32 - 0.45,
-            );
+            let (u, v) = (x as f32 / columns as f32 - 0.5, y as f32 / rows as f32 - 0.45);
             (c as f32 + 1.0) * (-(u * u + v * v) * (2.0 + c as f32)).exp()
         })
     }
@@ -223,11 +206,7 @@ mod tests {
         let mut amplitude = beam(4, 5);
         amplitude[(1, 0, 4)] = 0.0;
         let map = Illumination::new(amplitude.view()).unwrap();
-        let most = amplitude
-            .index_axis(Axis(0), 0)
-            .iter()
-            .copied()
-            .fold(0.0, f32::max);
+        let most = amplitude.index_axis(Axis(0), 0).iter().copied().fold(0.0, f32::max);
         assert_eq!(map.gain(0, 99, 49, (100, 50)), most / amplitude[(0, 3, 4)]);
         assert_eq!(map.gain(1, 0, 49, (100, 50)), MAX_GAIN);
         assert!(map.gains().iter().all(|g| (1.0..=MAX_GAIN).contains(g)));

@@ -6,6 +6,4 @@ pub use crate::depth::camera::{Alignment, CameraFrame};
 pub use crate::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
 pub use crate::depth::range::DepthRange;
 pub use crate::depth::stream::DepthOptions;
-pub use crate::frame::{
-    ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
-};
+pub use crate::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix};

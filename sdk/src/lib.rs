@@ -1,5 +1,5 @@
-//! RGB-D frames to phase-only 3D holograms, on the device, in real time: an implementation of *End-to-end learning of 3D
-//! phase-only holograms for holographic display* (Shi, Li, Matusik, Light: Science & Applications 11, 247, 2022).
+//! RGB-D frames to phase-only 3D holograms, on the device, in real time: an implementation of *End-to-end learning of
+//! 3D phase-only holograms for holographic display* (Shi, Li, Matusik, Light: Science & Applications 11, 247, 2022).
 //!
 //! A camera's frames go to a [`Session`], which answers with a [`Hologram`] each. A frame that is already amplitude and
 //! normalized depth goes through a [`Pipeline`]:
@@ -47,7 +47,8 @@
 //! # Features
 //!
 //! - `tract`, on by default: networks that the kernels do not take run on tract. Without it they are refused.
-//! - `gpu`: whole frames on Vulkan, Metal or DirectX 12, by [`SessionOptions::backend`](session::SessionOptions::backend).
+//! - `gpu`: whole frames on Vulkan, Metal or DirectX 12, by
+//!   [`SessionOptions::backend`](session::SessionOptions::backend).
 //!
 //! # How to be fast
 //!

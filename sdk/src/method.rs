@@ -38,9 +38,7 @@ impl Method {
     pub(crate) fn check(&self, display: &Display) -> Result<()> {
         let (network, input) = match self {
             Method::Sweep(_) => return Ok(()),
-            Method::Network(network) if network.input() == InputKind::RgbdXy => {
-                (network, InputKind::RgbdXy)
-            }
+            Method::Network(network) if network.input() == InputKind::RgbdXy => (network, InputKind::RgbdXy),
             Method::Network(network) => (network, InputKind::Rgbd),
             Method::Seeded(network) => (network, InputKind::Seeded),
             Method::BySharpness(_, network) => {
@@ -53,12 +51,7 @@ impl Method {
 }
 
 /// Plans `sweep` for (`height`, `width`) frames, on to a display that is not far away, else to the midpoint.
-pub(crate) fn sweep_plan(
-    height: usize,
-    width: usize,
-    sweep: Sweep,
-    display: &Display,
-) -> Result<SweepPlan> {
+pub(crate) fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
     let offset_m = display.offset_m();
     let z_m = match sweep::reaches(display, offset_m) {
         true => offset_m,
@@ -108,9 +101,7 @@ impl MethodPlan {
                 let plan = SeededPlan::new(height, width, &network, display)?;
                 Way::Seeded(Box::new(plan))
             }
-            Method::Sweep(sweep) => {
-                Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?))
-            }
+            Method::Sweep(sweep) => Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
             Method::BySharpness(sweep, network) => {
                 // Both end where the network does.
                 let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
@@ -169,12 +160,7 @@ impl MethodPlan {
     ///
     /// # Panics
     /// If `scratch` is another plan's.
-    pub fn field(
-        &self,
-        frame: &RgbdFrame,
-        field: &mut [Complex32],
-        scratch: &mut MethodScratch,
-    ) -> Result<()> {
+    pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
         self.field_after(false, frame, field, scratch)
     }
 

@@ -56,12 +56,7 @@ impl Modulator {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn from_z(
-        shape: (usize, usize),
-        z_m: f64,
-        target: &Target,
-        options: &EncoderOptions,
-    ) -> Result<Self> {
+    pub(crate) fn from_z(shape: (usize, usize), z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
         options.brightness.check()?;
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
@@ -103,10 +98,7 @@ impl Modulator {
     /// If `scratch` is another plan's, or `field` has not 3·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
-            for (plan, plane) in plans
-                .iter()
-                .zip(field.chunks_exact_mut(self.height * self.width))
-            {
+            for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
                 plan.propagate(plane, scratch);
             }
         }
@@ -117,12 +109,7 @@ impl Modulator {
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
-    pub fn modulate(
-        &self,
-        field: &mut [Complex32],
-        levels: &mut [u8],
-        scratch: &mut ModulatorScratch,
-    ) -> Modulation {
+    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut ModulatorScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
@@ -136,9 +123,7 @@ impl Modulator {
     ) -> Modulation {
         let start = Instant::now();
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-        let scale = self
-            .encoder
-            .encode_levels(field, scale, levels, &mut scratch.encoder);
+        let scale = self.encoder.encode_levels(field, scale, levels, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),
@@ -155,9 +140,7 @@ impl Modulator {
     ) -> Modulation {
         let start = Instant::now();
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-        let scale = self
-            .encoder
-            .encode(field, scale, phases, &mut scratch.encoder);
+        let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
         Modulation {
             scale,
             encode: start.elapsed(),
@@ -216,12 +199,7 @@ mod tests {
     #[test]
     fn the_mean_phase_is_taken_from_each_colour() {
         let mut field: Vec<_> = (0..3 * 20_000)
-            .map(|i| {
-                Complex32::from_polar(
-                    1.0 + (i % 7) as f32,
-                    (i / 20_000) as f32 + 0.1 * (i % 3) as f32,
-                )
-            })
+            .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i / 20_000) as f32 + 0.1 * (i % 3) as f32))
             .collect();
         remove_mean_phase(&mut field);
         for plane in field.chunks_exact(20_000) {

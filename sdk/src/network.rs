@@ -67,10 +67,7 @@ impl std::fmt::Debug for Network {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (layers, filters) = (self.layers(), self.filters());
         let (input, precision) = (self.input, self.precision());
-        write!(
-            f,
-            "Network({input}, {layers} layers of {filters} filters, {precision})"
-        )
+        write!(f, "Network({input}, {layers} layers of {filters} filters, {precision})")
     }
 }
 
@@ -81,9 +78,8 @@ impl Network {
     /// # Errors
     /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
-        let proto = ModelProto::decode(bytes).map_err(|why| {
-            Error::Network(format!("not an ONNX file, or a truncated one: {why}"))
-        })?;
+        let proto = ModelProto::decode(bytes)
+            .map_err(|why| Error::Network(format!("not an ONNX file, or a truncated one: {why}")))?;
         let graph = proto
             .graph
             .as_ref()
@@ -234,8 +230,8 @@ impl Network {
         })
     }
 
-    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels. A blur that
-    /// it asks for ([`InputKind::is_blurred`]) is the caller's.
+    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels. A blur
+    /// that it asks for ([`InputKind::is_blurred`]) is the caller's.
     ///
     /// # Errors
     /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
@@ -247,8 +243,8 @@ impl Network {
                 self.input
             )));
         }
-        let chain = FusedChain::new(&self.chain, None)
-            .map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
+        let chain =
+            FusedChain::new(&self.chain, None).map_err(|why| Error::Network(format!("as a pre-filter: {why}")))?;
         check_size(height, width, MAX_PIXELS)?;
         Ok(FilterPlan {
             engine: self.fused_engine(&chain),
@@ -396,12 +392,7 @@ impl NetworkPlan {
     ///
     /// # Errors
     /// [`Error::Frame`] when a length is wrong.
-    pub fn run(
-        &self,
-        input: &[f32],
-        output: &mut [f32],
-        scratch: &mut NetworkScratch,
-    ) -> Result<()> {
+    pub fn run(&self, input: &[f32], output: &mut [f32], scratch: &mut NetworkScratch) -> Result<()> {
         let (inputs, outputs) = self.channels();
         self.check("input", input.len(), inputs)?;
         self.check("output", output.len(), outputs)?;

@@ -147,11 +147,7 @@ impl Output {
     ///
     /// # Errors
     /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
-    pub fn new(
-        target: &Target,
-        (height, width): (usize, usize),
-        placement: Placement,
-    ) -> Result<Self> {
+    pub fn new(target: &Target, (height, width): (usize, usize), placement: Placement) -> Result<Self> {
         target.check()?;
         let (modulator, bits) = (target.modulator(), target.display.bits());
         if height > modulator.0 || width > modulator.1 {
@@ -160,9 +156,8 @@ impl Output {
                 modulator.1, modulator.0
             )));
         }
-        let from = |modulator: usize, hologram: usize, shift: i32| {
-            -(((modulator - hologram) / 2) as i64 + i64::from(shift))
-        };
+        let from =
+            |modulator: usize, hologram: usize, shift: i32| -(((modulator - hologram) / 2) as i64 + i64::from(shift));
         Ok(Output {
             modulator,
             hologram: (height, width),
@@ -295,9 +290,7 @@ mod tests {
 
     fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
         let mut bytes = vec![7; output.image_bytes()];
-        output
-            .write(Levels::Bytes(levels), image, &mut bytes)
-            .unwrap();
+        output.write(Levels::Bytes(levels), image, &mut bytes).unwrap();
         bytes
     }
 
@@ -381,9 +374,7 @@ mod tests {
         for (layout, expected) in [
             (
                 Layout::Rgb10,
-                (1023u32 | 512 << 10 | 256 << 20 | 3 << 30)
-                    .to_le_bytes()
-                    .to_vec(),
+                (1023u32 | 512 << 10 | 256 << 20 | 3 << 30).to_le_bytes().to_vec(),
             ),
             (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
             (Layout::Rgb, vec![255, 128, 64]),
@@ -395,9 +386,7 @@ mod tests {
         }
         let around = Output::new(&target, (1, 1), Placement::centred(Layout::Grey16)).unwrap();
         let mut bytes = vec![0; around.image_bytes()];
-        around
-            .write(Levels::Words(&[1, 2, 3]), 1, &mut bytes)
-            .unwrap();
+        around.write(Levels::Words(&[1, 2, 3]), 1, &mut bytes).unwrap();
         assert_eq!(bytes[..4], [0x80, 0, 0, 0xc0]);
     }
 }

@@ -58,12 +58,7 @@ impl Pipeline {
     /// # Errors
     /// What [`Method`] or the way to the target refuses: a network for another display, an offset or correction that
     /// moves light farther than can be padded, a parameter out of its range.
-    pub fn new(
-        shape: (usize, usize),
-        method: Method,
-        target: &Target,
-        options: &EncoderOptions,
-    ) -> Result<Self> {
+    pub fn new(shape: (usize, usize), method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
         let method = MethodPlan::new(shape.0, shape.1, method, &target.display)?;
         // The modulator does the rest of the way.
         let modulator = Modulator::from_z(shape, method.z_m(), target, options)?;
@@ -125,12 +120,7 @@ impl Pipeline {
     ///
     /// # Panics
     /// If `field` or `levels` has not 3·H·W values.
-    pub fn modulate(
-        &self,
-        field: &mut [Complex32],
-        levels: &mut [u8],
-        scratch: &mut PipelineScratch,
-    ) -> Modulation {
+    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut PipelineScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
@@ -154,8 +144,7 @@ impl Pipeline {
         phases: &mut [f32],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        self.modulator
-            .phases_after(past, field, phases, &mut scratch.modulator)
+        self.modulator.phases_after(past, field, phases, &mut scratch.modulator)
     }
 
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked

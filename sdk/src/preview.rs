@@ -3,7 +3,8 @@
 //!
 //! The light of `factor` × `factor` modulator pixels is averaged into one, which keeps the middle of the Fourier plane
 //! as the aperture does and takes the checkerboard of double phase away; the small field is then propagated.
-//! Frequencies over 1/(2·`factor`) cycles a pixel are lost, so fine detail far from focus is blurred less than it would be.
+//! Frequencies over 1/(2·`factor`) cycles a pixel are lost, so fine detail far from focus is blurred less than it would
+//! be.
 
 use crate::error::{Error, Result};
 use crate::frame::Axis;
@@ -43,12 +44,7 @@ impl Preview {
     ///
     /// # Errors
     /// A hologram under 2 pixels a side, an empty screen, a z too far away, or a table for another modulator.
-    pub fn new(
-        (height, width): (usize, usize),
-        target: &Target,
-        z_m: f64,
-        screen: (usize, usize),
-    ) -> Result<Self> {
+    pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
         if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
             return Err(Error::Plan(format!(
                 "a preview of {}×{} of a hologram of {width}×{height}: the screen's sides must be at least 1, the hologram's 2",
@@ -97,7 +93,8 @@ impl Preview {
         }
     }
 
-    /// The view of `levels`, (3, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red, green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
+    /// The view of `levels`, (3, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red,
+    /// green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
     ///
     /// # Panics
     /// If `levels` or `rgba` has another length than planned.
@@ -107,75 +104,81 @@ impl Preview {
         let (screen_height, screen_width) = self.screen;
         assert_eq!(levels.len(), 3 * height * width);
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
-        let factor = self.factor;
-        let light = scale / (factor * factor) as f32;
-        let table = match &self.response {
-            Response::PerPixel(table) => Some(table),
-            _ => None,
-        };
+        let light = scale / (self.factor * self.factor) as f32;
         // Where all pixels answer alike each level is one phase.
-        let shown: [Complex32; 256] = match table {
-            None => std::array::from_fn(|l| {
-                Complex32::from_polar(light, self.response.phase(l as u8, 0))
-            }),
-            Some(_) => [Complex32::ZERO; 256],
+        let shown: [Complex32; 256] = match &self.response {
+            Response::PerPixel(_) => [Complex32::ZERO; 256],
+            alike => std::array::from_fn(|l| Complex32::from_polar(light, alike.phase(l as u8, 0))),
         };
         let planes = levels.chunks_exact(height * width);
-        let amplitudes = scratch
-            .amplitude
-            .chunks_exact_mut(small_height * small_width);
+        let amplitudes = (scratch.amplitude).chunks_exact_mut(small_height * small_width);
         for (colour, (levels, amplitude)) in planes.zip(amplitudes).enumerate() {
             (scratch.field.par_chunks_exact_mut(small_width))
-                .zip(levels.par_chunks_exact(width * factor))
+                .zip(levels.par_chunks_exact(width * self.factor))
                 .enumerate()
-                .for_each(|(small_y, (sums, rows))| {
-                    sums.fill(Complex32::ZERO);
-                    for (y, row) in rows.chunks_exact(width).enumerate() {
-                        let first = (colour * height + small_y * factor + y) * width;
-                        for (x, (sum, pixels)) in
-                            sums.iter_mut().zip(row.chunks_exact(factor)).enumerate()
-                        {
-                            *sum += match table {
-                                None => {
-                                    pixels.iter().map(|l| shown[*l as usize]).sum::<Complex32>()
-                                }
-                                Some(table) => (pixels.iter().enumerate())
-                                    .map(|(i, l)| {
-                                        let phase = table.phase(*l, first + x * factor + i);
-                                        Complex32::from_polar(light, phase)
-                                    })
-                                    .sum::<Complex32>(),
-                            };
+                .for_each(|(y, (sums, rows))| {
+                    match &self.response {
+                        Response::PerPixel(table) => {
+                            let first = (colour * height + y * self.factor) * width;
+                            self.sum(rows, sums, |level, at| {
+                                Complex32::from_polar(light, table.phase(level, first + at))
+                            });
                         }
+                        _ => self.sum(rows, sums, |level, _| shown[usize::from(level)]),
                     }
-                    if let Some((illumination, modulator)) = &self.illumination {
-                        let middle = |at: usize, hologram: usize, modulator: usize| {
-                            at * factor + factor / 2 + modulator.saturating_sub(hologram) / 2
-                        };
-                        let all = (modulator.0.max(height), modulator.1.max(width));
-                        let y = middle(small_y, height, modulator.0);
-                        for (x, sum) in sums.iter_mut().enumerate() {
-                            let x = middle(x, width, modulator.1);
-                            *sum /= illumination.gain(colour, y, x, all);
-                        }
-                    }
+                    self.divide_by_light(colour, y, sums);
                 });
-            if let (Some(plans), Some(scratch_wave)) = (&self.propagators, &mut scratch.propagation)
-            {
+            if let (Some(plans), Some(scratch_wave)) = (&self.propagators, &mut scratch.propagation) {
                 plans[colour].propagate(&mut scratch.field, scratch_wave);
             }
             for (amplitude, value) in amplitude.iter_mut().zip(&scratch.field) {
                 *amplitude = value.norm();
             }
         }
-        let amplitude = &scratch.amplitude;
-        (rgba.par_chunks_exact_mut(4 * screen_width))
+        self.draw(&scratch.amplitude, rgba);
+    }
+
+    /// The light of `factor` × `factor` pixels a value, out of `factor` rows of levels. `light` gives that of a level
+    /// at an index in them.
+    fn sum(&self, rows: &[u8], sums: &mut [Complex32], light: impl Fn(u8, usize) -> Complex32) {
+        let width = self.hologram.1;
+        sums.fill(Complex32::ZERO);
+        for (y, row) in rows.chunks_exact(width).enumerate() {
+            for (x, (sum, pixels)) in (sums.iter_mut()).zip(row.chunks_exact(self.factor)).enumerate() {
+                let first = y * width + x * self.factor;
+                let lights = pixels.iter().enumerate();
+                *sum += lights.map(|(i, l)| light(*l, first + i)).sum::<Complex32>();
+            }
+        }
+    }
+
+    /// Divides row `y` of the small field by the gain of the light that falls on it.
+    fn divide_by_light(&self, colour: usize, y: usize, sums: &mut [Complex32]) {
+        let Some((illumination, modulator)) = &self.illumination else {
+            return;
+        };
+        let (height, width) = self.hologram;
+        let middle = |at: usize, hologram: usize, modulator: usize| {
+            at * self.factor + self.factor / 2 + modulator.saturating_sub(hologram) / 2
+        };
+        let all = (modulator.0.max(height), modulator.1.max(width));
+        let y = middle(y, height, modulator.0);
+        for (x, sum) in sums.iter_mut().enumerate() {
+            let x = middle(x, width, modulator.1);
+            *sum /= illumination.gain(colour, y, x, all);
+        }
+    }
+
+    /// The planes of amplitudes as pixels of the screen.
+    fn draw(&self, amplitude: &[f32], rgba: &mut [u8]) {
+        let (height, width) = self.small;
+        (rgba.par_chunks_exact_mut(4 * self.screen.1))
             .enumerate()
             .for_each(|(y, pixels)| {
                 let byte = |colour: usize, x: usize| {
-                    let plane = &amplitude[colour * small_height * small_width..];
+                    let plane = &amplitude[colour * height * width..];
                     let row = |(row, weight): (usize, f32)| {
-                        let row = &plane[row * small_width..][..small_width];
+                        let row = &plane[row * width..][..width];
                         weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
                     };
                     (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
@@ -205,16 +208,12 @@ mod tests {
         let mut field: Vec<Complex32> = (0..3 * height * width)
             .map(|i| {
                 let (c, y, x) = (i / (height * width), i / width % height, i % width);
-                let square =
-                    (x as f32 - 40.0 - 20.0 * c as f32).powi(2) + (y as f32 - 48.0).powi(2);
+                let square = (x as f32 - 40.0 - 20.0 * c as f32).powi(2) + (y as f32 - 48.0).powi(2);
                 Complex32::new(0.1 + 0.8 * (-square / 400.0).exp(), 0.0)
             })
             .collect();
         // From where they lie to the midpoint, and to the modulator.
-        let home = display
-            .clone()
-            .with_offset_m(display.offset_m() - 1e-3)
-            .unwrap();
+        let home = display.clone().with_offset_m(display.offset_m() - 1e-3).unwrap();
         let target = Target {
             response: response.clone(),
             ..home.into()
@@ -261,10 +260,7 @@ mod tests {
                         }
                     }
                     let error = (squares / (3 * screen.0 * screen.1) as f32).sqrt();
-                    assert!(
-                        error < 0.03,
-                        "offset {offset_m} z {z_m} {screen:?}: {error}"
-                    );
+                    assert!(error < 0.03, "offset {offset_m} z {z_m} {screen:?}: {error}");
                 }
             }
         }
@@ -277,11 +273,6 @@ mod tests {
         assert!(Preview::new(SHAPE, &target, 0.0, (0, 10)).is_err());
         assert!(Preview::new(SHAPE, &target, f64::NAN, (10, 10)).is_err());
         // A screen larger than the hologram has a view too.
-        assert_eq!(
-            Preview::new((5, 7), &target, 1e-3, (300, 200))
-                .unwrap()
-                .factor(),
-            2
-        );
+        assert_eq!(Preview::new((5, 7), &target, 1e-3, (300, 200)).unwrap().factor(), 2);
     }
 }

@@ -45,26 +45,14 @@ impl Refocus {
             return Err(Error::Plan("no z to refocus at; give at least one".into()));
         }
         if let Some(z) = z_m.iter().find(|z| !z.is_finite()) {
-            return Err(Error::Plan(format!(
-                "cannot refocus at z = {z} m; it must be finite"
-            )));
+            return Err(Error::Plan(format!("cannot refocus at z = {z} m; it must be finite")));
         }
         if let Some(radius) = aperture_radius {
             aperture::Aperture::new(1, 1, radius)?;
         }
-        let reach_m = z_m
-            .iter()
-            .map(|z| (z - display.offset_m()).abs())
-            .fold(0.0, f64::max);
+        let reach_m = z_m.iter().map(|z| (z - display.offset_m()).abs()).fold(0.0, f64::max);
         let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
-        let padded = asm::padded_shape(
-            height,
-            width,
-            display.pitch_m(),
-            longest,
-            reach_m,
-            Padding::Reach,
-        )?;
+        let padded = asm::padded_shape(height, width, display.pitch_m(), longest, reach_m, Padding::Reach)?;
         Ok(Refocus {
             display: display.clone(),
             fft: Fft2::new(height, width, padded.0, padded.1),
@@ -93,8 +81,7 @@ impl Refocus {
                 aperture::passes(fx, fy, radius)
             }
         };
-        self.fft
-            .rows_forward(plane, &mut scratch.rows, &mut scratch.work);
+        self.fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         self.fft.spectrum(
             &scratch.rows,
             &mut columns,
@@ -120,13 +107,7 @@ impl Refocus {
     ///
     /// # Panics
     /// If `plane` has not H·W values or `spectrum` or `scratch` is another plan's.
-    pub fn field(
-        &self,
-        spectrum: &Spectrum,
-        z_m: f64,
-        plane: &mut [Complex32],
-        scratch: &mut Scratch,
-    ) -> Result<()> {
+    pub fn field(&self, spectrum: &Spectrum, z_m: f64, plane: &mut [Complex32], scratch: &mut Scratch) -> Result<()> {
         let distance_m = z_m - self.display.offset_m();
         if distance_m.is_nan() || distance_m.abs() > self.reach_m * (1.0 + 1e-9) {
             return Err(Error::Plan(format!(
@@ -197,8 +178,7 @@ pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &
         });
         return;
     }
-    let shown: [Complex32; 256] =
-        std::array::from_fn(|l| Complex32::from_polar(scale, response.phase(l as u8, 0)));
+    let shown: [Complex32; 256] = std::array::from_fn(|l| Complex32::from_polar(scale, response.phase(l as u8, 0)));
     for (value, level) in field.iter_mut().zip(levels) {
         *value = shown[*level as usize];
     }

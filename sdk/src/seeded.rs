@@ -35,8 +35,8 @@ pub struct SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`crate::network::InputKind::Seeded`], for (`height`, `width`) frames, on the field
-    /// of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`crate::network::InputKind::Seeded`], for (`height`, `width`) frames, on the
+    /// field of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// A network or a sweep that cannot be planned.
@@ -68,14 +68,8 @@ impl SeededPlan {
     ///
     /// # Errors
     /// A frame of another shape, or a `field` that has not 3·H·W values.
-    pub fn field(
-        &self,
-        frame: &RgbdFrame,
-        field: &mut [Complex32],
-        scratch: &mut SeededScratch,
-    ) -> Result<()> {
-        self.sweep
-            .field(frame, &mut scratch.seed, &mut scratch.sweep)?;
+    pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SeededScratch) -> Result<()> {
+        self.sweep.field(frame, &mut scratch.seed, &mut scratch.sweep)?;
         let seeded = SeededFrame {
             frame,
             seed: &scratch.seed,

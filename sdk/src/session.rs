@@ -5,8 +5,8 @@
 //! ever waiting, works on one while the newest waits, and tells its listener of every result and every drop.
 //!
 //! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
-//! happens to a frame; `engine` is where CPU and GPU meet; `quality` is the ladder. One frame by itself, without a camera's formats, is
-//! [`crate::Pipeline`]'s.
+//! happens to a frame; `engine` is where CPU and GPU meet; `quality` is the ladder. One frame by itself, without a
+//! camera's formats, is [`crate::Pipeline`]'s.
 
 mod brightness;
 mod engine;
@@ -192,8 +192,7 @@ impl Work for LiveWork {
     type Output = Made;
 
     fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
-        self.0
-            .process(&mut lock(&self.0.stages), &frame.frame()?, !fresh)
+        self.0.process(&mut lock(&self.0.stages), &frame.frame()?, !fresh)
     }
 
     fn recover(&mut self) {
@@ -203,9 +202,7 @@ impl Work for LiveWork {
 
 impl Shared {
     fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<Made> {
-        let Control {
-            quality, thermal, ..
-        } = *lock(&self.control);
+        let Control { quality, thermal, .. } = *lock(&self.control);
         let made = stages.process(frame, past, thermal, quality)?;
         let mut recent = lock(&self.recent);
         recent.push(Instant::now(), made.hologram.times());
@@ -261,8 +258,7 @@ impl Session {
             Mode::Video(gate) => (gate, true),
             Mode::Live(_) => {
                 return Err(Error::Session(
-                    "it is live, so frames are submitted; process is for image and video sessions"
-                        .into(),
+                    "it is live, so frames are submitted; process is for image and video sessions".into(),
                 ));
             }
         };
@@ -400,32 +396,14 @@ impl Session {
 /// A report as the listener's events.
 fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) {
     match report {
-        Report::Done {
-            timestamp_ns,
-            output,
-        } => {
+        Report::Done { timestamp_ns, output } => {
             listener(Event::Hologram(output.hologram));
             if let Some(change) = output.change {
-                listener(Event::QualityChanged {
-                    timestamp_ns,
-                    change,
-                });
+                listener(Event::QualityChanged { timestamp_ns, change });
             }
         }
-        Report::Dropped {
-            timestamp_ns,
-            reason,
-        } => listener(Event::Dropped {
-            timestamp_ns,
-            reason,
-        }),
-        Report::Failed {
-            timestamp_ns,
-            error,
-        } => listener(Event::Failed {
-            timestamp_ns,
-            error,
-        }),
+        Report::Dropped { timestamp_ns, reason } => listener(Event::Dropped { timestamp_ns, reason }),
+        Report::Failed { timestamp_ns, error } => listener(Event::Failed { timestamp_ns, error }),
         Report::ListenerPanicked => lock(&shared.recent).listener_panics += 1,
     }
 }

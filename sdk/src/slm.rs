@@ -224,12 +224,7 @@ mod tests {
             Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8)),
         ] {
             r.levels(&phases, 0, &mut levels);
-            assert!(
-                phases
-                    .iter()
-                    .zip(&levels)
-                    .all(|(p, l)| r.level(*p, 0) == *l)
-            );
+            assert!(phases.iter().zip(&levels).all(|(p, l)| r.level(*p, 0) == *l));
         }
     }
 }

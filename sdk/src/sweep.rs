@@ -67,8 +67,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far as
-    /// [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
+    /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far
+    /// as [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
     pub fn for_display(display: &Display) -> Self {
         let reach = reach_px(display, display.volume_depth_m());
         let planes = (reach * 4.0 / 3.0).ceil() as usize;
@@ -103,10 +103,7 @@ impl Sweep {
     fn check(&self, display: &Display) -> Result<()> {
         let refuse = |what: String| Err(Error::Plan(format!("sweep: {what}")));
         if !(1..=MAX_PLANES).contains(&self.planes) {
-            return refuse(format!(
-                "{} planes; 1 to {MAX_PLANES} are right",
-                self.planes
-            ));
+            return refuse(format!("{} planes; 1 to {MAX_PLANES} are right", self.planes));
         }
         if !(3..=MAX_TAPS).contains(&self.taps) || self.taps.is_multiple_of(2) {
             return refuse(format!(
@@ -145,8 +142,8 @@ fn reach_px(display: &Display, distance_m: f64) -> f64 {
     crate::wave::asm::reach_m(distance_m, longest, display.pitch_m()) / display.pitch_m()
 }
 
-/// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall as
-/// the spectra of images do; 0 is perfect.
+/// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall
+/// as the spectra of images do; 0 is perfect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitError {
     /// Of one step.
@@ -182,13 +179,7 @@ impl SweepPlan {
     /// # Errors
     /// An empty or too large frame, numbers of `sweep` out of their range, or a hologram so far away that light spreads
     /// over [`MAX_HOME_REACH`] from the front of the volume.
-    pub fn new(
-        height: usize,
-        width: usize,
-        display: &Display,
-        sweep: Sweep,
-        z_m: f64,
-    ) -> Result<Self> {
+    pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
         sweep.check(display)?;
         if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
             return Err(Error::Plan(format!(
@@ -276,14 +267,7 @@ impl SweepPlan {
         let layers = self.sweep.hidden_layers;
         SweepScratch {
             planes: vec![0; size],
-            sources: vec![
-                0;
-                if layers > 0 {
-                    MAX_HIDDEN_LAYERS * size
-                } else {
-                    0
-                }
-            ],
+            sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
             hidden: self.hidden.scratch(),
             tiles: Workers::new(|| {
                 let mut scratch = self.layout.scratch();
@@ -301,12 +285,7 @@ impl SweepPlan {
     ///
     /// # Panics
     /// If `field` has not 3·H·W values or `scratch` is another plan's.
-    pub fn field(
-        &self,
-        frame: &RgbdFrame,
-        field: &mut [Complex32],
-        scratch: &mut SweepScratch,
-    ) -> Result<()> {
+    pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
         frame.check_shape(self.shape())?;
         let size = self.height * self.width;
         assert_eq!(field.len(), 3 * size);
@@ -321,8 +300,7 @@ impl SweepPlan {
             });
         let layers = self.sweep.hidden_layers;
         if layers > 0 {
-            self.hidden
-                .find(depth, &mut scratch.sources, &mut scratch.hidden);
+            self.hidden.find(depth, &mut scratch.sources, &mut scratch.hidden);
         }
         let surfaces = Surfaces {
             rgb,
@@ -335,22 +313,17 @@ impl SweepPlan {
         let mut planes = field.chunks_exact_mut(size);
         let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
         let (down, across) = self.layout.count(self.height, self.width);
-        (0..down * across)
-            .into_par_iter()
-            .with_max_len(1)
-            .for_each(|index| {
-                let tile = Tile::of(&self.layout, self.fir, surfaces, index);
-                scratch.tiles.with(|scratch| {
-                    tile.gather(scratch);
-                    for (colour, filters) in self.filters.iter().enumerate() {
-                        tile.sweep(colour, filters, scratch);
-                        let mut plane = planes[colour]
-                            .lock()
-                            .unwrap_or_else(PoisonError::into_inner);
-                        tile.store(&mut plane, scratch);
-                    }
-                });
+        (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
+            let tile = Tile::of(&self.layout, self.fir, surfaces, index);
+            scratch.tiles.with(|scratch| {
+                tile.gather(scratch);
+                for (colour, filters) in self.filters.iter().enumerate() {
+                    tile.sweep(colour, filters, scratch);
+                    let mut plane = planes[colour].lock().unwrap_or_else(PoisonError::into_inner);
+                    tile.store(&mut plane, scratch);
+                }
             });
+        });
         Ok(())
     }
 }

@@ -114,8 +114,7 @@ impl Target {
             (0.0, None) => Ok(None),
             (_, None) => {
                 let padding = Padding::Reach;
-                Propagator::for_colours(height, width, pitch_m, colours, distance_m, padding)
-                    .map(Some)
+                Propagator::for_colours(height, width, pitch_m, colours, distance_m, padding).map(Some)
             }
         }
     }

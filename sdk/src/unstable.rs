@@ -1,5 +1,5 @@
-//! The rooms of the core as they are inside, for the laboratory, the tests and the benchmarks. Nothing here is promised:
-//! it changes without notice, in any release.
+//! The rooms of the core as they are inside, for the laboratory, the tests and the benchmarks. Nothing here is
+//! promised: it changes without notice, in any release.
 
 /// Depth: units, holes, alignment, steadying, refinement.
 pub mod depth {

@@ -62,8 +62,7 @@ fn count(mut call: impl FnMut()) -> usize {
 fn camera_frames_and_previews() {
     let (h, w) = (30, 40);
     let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
-    let image =
-        ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
+    let image = ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
     let plan = ColourPlan::new(&image, Orientation::default(), h, w).unwrap();
     let mut scratch = plan.scratch();
     let mut rgb = vec![0.0; 3 * h * w];
@@ -72,13 +71,7 @@ fn camera_frames_and_previews() {
     let plan = Refiner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w)).unwrap();
     let mut scratch = plan.scratch();
     let depth: Vec<f32> = (0..300)
-        .map(|i| {
-            if i % 7 == 0 {
-                f32::NAN
-            } else {
-                (i % 20) as f32 / 20.0
-            }
-        })
+        .map(|i| if i % 7 == 0 { f32::NAN } else { (i % 20) as f32 / 20.0 })
         .collect();
     let mut refined = vec![0.0; h * w];
     let refine = || {
@@ -89,10 +82,7 @@ fn camera_frames_and_previews() {
     let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
     let mut scratch = plan.scratch();
     let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
-    assert_eq!(
-        count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)),
-        0
-    );
+    assert_eq!(count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)), 0);
 }
 
 #[test]
@@ -119,10 +109,7 @@ fn hot_calls_allocate_nothing() {
     )
     .unwrap();
     for threads in [1, 3] {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let plan = Propagator::new(h, w, 8e-6, 520e-9, 3e-3, Padding::Reach).unwrap();
             let mut scratch = plan.scratch();
@@ -136,8 +123,7 @@ fn hot_calls_allocate_nothing() {
                 Encoding::BAND_LIMIT,
                 Encoding::Deep(prefilter.clone()),
             ] {
-                let plan =
-                    Modulator::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
+                let plan = Modulator::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);

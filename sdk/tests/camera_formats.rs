@@ -34,10 +34,7 @@ fn every_format_converts_as_the_definition_says() {
                 let image = noise.image().unwrap();
                 let naive = reference::convert(&image, orientation, out.0, out.1);
                 for threads in [1, 3] {
-                    let pool = rayon::ThreadPoolBuilder::new()
-                        .num_threads(threads)
-                        .build()
-                        .unwrap();
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                     let fast = pool.install(|| {
                         let plan = ColourPlan::new(&image, orientation, out.0, out.1).unwrap();
                         let mut rgb = vec![9.0; 3 * out.0 * out.1];
@@ -47,10 +44,7 @@ fn every_format_converts_as_the_definition_says() {
                     let worst = (naive.iter().zip(&fast))
                         .map(|(a, b)| (a - b).abs())
                         .fold(0.0, f32::max);
-                    assert!(
-                        worst < 1e-5,
-                        "{format:?} {orientation:?} {shape:?} to {out:?}: {worst}"
-                    );
+                    assert!(worst < 1e-5, "{format:?} {orientation:?} {shape:?} to {out:?}: {worst}");
                 }
             }
         }
@@ -64,11 +58,7 @@ fn a_plan_refuses_an_image_of_another_size_or_format() {
     let image = noise.image().unwrap();
     let plan = ColourPlan::new(&image, Orientation::default(), 4, 5).unwrap();
     let mut rgb = vec![0.0; 60];
-    for (format, shape) in [
-        (formats[0], (8, 9)),
-        (formats[1], (8, 10)),
-        (formats[3], (8, 10)),
-    ] {
+    for (format, shape) in [(formats[0], (8, 9)), (formats[1], (8, 10)), (formats[3], (8, 10))] {
         let other = Noise::new(0, format, shape, 0);
         let refused = plan.convert(&other.image().unwrap(), &mut rgb, &mut plan.scratch());
         assert!(

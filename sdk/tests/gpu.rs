@@ -9,18 +9,14 @@ mod network_models;
 use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
 use num_complex::Complex32;
-use phasefront::input::{
-    ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
-};
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix};
 use phasefront::target::{Aberration, Illumination, Response};
 use phasefront::unstable::gpu::{
-    self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions,
-    Float, Frame, Fusion, GpuNetworkPlan, GpuPipeline, Job,
+    self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Float, Frame, Fusion,
+    GpuNetworkPlan, GpuPipeline, Job,
 };
 use phasefront::unstable::network::{Isa, reference};
-use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Method, Network, RgbdFrame, Sweep,
-};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Method, Network, RgbdFrame, Sweep};
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests; none where there is no driver, which the test says.
@@ -42,18 +38,10 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     a.iter()
         .zip(b)
         .map(|(a, b)| (a - b).abs())
-        .fold(
-            0.0,
-            |worst, d| if d > worst || d.is_nan() { d } else { worst },
-        )
+        .fold(0.0, |worst, d| if d > worst || d.is_nan() { d } else { worst })
 }
 
-fn run(
-    network: &Network,
-    options: ChainOptions,
-    (h, w): (usize, usize),
-    input: &[f32],
-) -> Vec<f32> {
+fn run(network: &Network, options: ChainOptions, (h, w): (usize, usize), input: &[f32]) -> Vec<f32> {
     let device = device().unwrap();
     let plan = GpuNetworkPlan::new(&device, network, h, w, options).unwrap();
     let mut output = vec![f32::NAN; 6 * h * w];
@@ -141,8 +129,7 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
             let input = frame(model.inputs, size.0, size.1, 7);
             let plan = network.plan(size.0, size.1).unwrap();
             let mut expected = vec![0.0; 6 * size.0 * size.1];
-            plan.run(&input, &mut expected, &mut plan.scratch())
-                .unwrap();
+            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
             for fusion in [Fusion::Layers, Fusion::Pairs] {
                 let output = run(&network, ChainOptions { float, fusion }, size, &input);
@@ -190,8 +177,7 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
             let input = frame(model.inputs, size.0, size.1, 7);
             let plan = network.plan_on(Isa::Portable, size.0, size.1).unwrap();
             let mut expected = vec![0.0; 6 * size.0 * size.1];
-            plan.run(&input, &mut expected, &mut plan.scratch())
-                .unwrap();
+            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             for fusion in [Fusion::Layers, Fusion::Pairs] {
                 let options = ChainOptions {
                     float: Float::F32,
@@ -234,11 +220,7 @@ fn f32_network() -> Arc<Network> {
 /// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
 fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
     let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level, 0));
-    let sum: f32 = a
-        .iter()
-        .zip(b)
-        .map(|(&a, &b)| (shown(a) - shown(b)).norm())
-        .sum();
+    let sum: f32 = a.iter().zip(b).map(|(&a, &b)| (shown(a) - shown(b)).norm()).sum();
     sum / a.len() as f32
 }
 
@@ -250,10 +232,7 @@ fn planned(
     brightness: Brightness,
 ) -> Job {
     Job {
-        encoder: EncoderOptions {
-            encoding,
-            brightness,
-        },
+        encoder: EncoderOptions { encoding, brightness },
         ..Job::new(shape, method, display)
     }
 }
@@ -274,11 +253,7 @@ fn whole_frames_are_those_of_the_cpu() {
     let (int8, f32) = (int8_network(), f32_network());
     let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
     let linear = Response::linear(8).unwrap();
-    let half = if device.has_half() {
-        Float::F16
-    } else {
-        Float::F32
-    };
+    let half = if device.has_half() { Float::F16 } else { Float::F32 };
     let cases = [
         (
             &int8,
@@ -353,11 +328,7 @@ fn whole_frames_are_those_of_the_cpu() {
         println!("{what}: {apart} {report:?}");
         assert!(apart < tolerance, "{what}: {apart}");
         let scales = (report.scale - expected_scale).abs() / expected_scale;
-        assert!(
-            scales < tolerance,
-            "{what}: {} {expected_scale}",
-            report.scale
-        );
+        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
     }
 }
 
@@ -379,14 +350,7 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         input: "seeded",
         ..Model::new(5, 8)
     };
-    let (float, int8) = (
-        model.bytes(),
-        Model {
-            int8: true,
-            ..model
-        }
-        .bytes(),
-    );
+    let (float, int8) = (model.bytes(), Model { int8: true, ..model }.bytes());
     let seeded = |bytes: &[u8]| Method::Seeded(Arc::new(Network::from_onnx(bytes).unwrap()));
     let half = match device.has_half() {
         true => Float::F16,
@@ -394,55 +358,13 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     };
     let f32 = Float::F32;
     for (method, (h, w), offset_m, encoding, float, tolerance) in [
-        (
-            Method::Sweep(usual),
-            (61, 47),
-            0.0,
-            Encoding::ANTI_ALIAS,
-            f32,
-            0.002,
-        ),
-        (
-            Method::Sweep(usual),
-            (47, 61),
-            3e-3,
-            Encoding::BAND_LIMIT,
-            f32,
-            0.002,
-        ),
-        (
-            Method::Sweep(plain),
-            (61, 47),
-            20e-3,
-            Encoding::DoublePhase,
-            f32,
-            0.002,
-        ),
-        (
-            seeded(&float),
-            (61, 47),
-            2e-3,
-            Encoding::ANTI_ALIAS,
-            f32,
-            0.002,
-        ),
-        (
-            seeded(&float),
-            (61, 47),
-            0.0,
-            Encoding::ANTI_ALIAS,
-            half,
-            0.05,
-        ),
+        (Method::Sweep(usual), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.002),
+        (Method::Sweep(usual), (47, 61), 3e-3, Encoding::BAND_LIMIT, f32, 0.002),
+        (Method::Sweep(plain), (61, 47), 20e-3, Encoding::DoublePhase, f32, 0.002),
+        (seeded(&float), (61, 47), 2e-3, Encoding::ANTI_ALIAS, f32, 0.002),
+        (seeded(&float), (61, 47), 0.0, Encoding::ANTI_ALIAS, half, 0.05),
         // A step of 8 bits to the other side is worth more than rounding.
-        (
-            seeded(&int8),
-            (61, 47),
-            0.0,
-            Encoding::ANTI_ALIAS,
-            f32,
-            0.02,
-        ),
+        (seeded(&int8), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.02),
     ] {
         let display = display.clone().with_offset_m(offset_m).unwrap();
         let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
@@ -457,15 +379,9 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
         println!("{what}: {apart} {report:?}");
         assert!(apart < tolerance, "{what}: {apart}");
         let scales = (report.scale - expected_scale).abs() / expected_scale;
-        assert!(
-            scales < tolerance,
-            "{what}: {} {expected_scale}",
-            report.scale
-        );
+        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
         // In another form from then on; the sweep asks for the last bit of each depth.
-        let words: Vec<u16> = (frame.depth().iter())
-            .map(|d| (d * 65535.0).round() as u16)
-            .collect();
+        let words: Vec<u16> = (frame.depth().iter()).map(|d| (d * 65535.0).round() as u16).collect();
         let frame = Frame {
             depth: DepthData::U16(&words),
             ..Frame::of(&frame)
@@ -649,10 +565,7 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
         // A step of 8 bits to the other side is worth more than rounding.
         let tolerance = if model.int8 { 0.02 } else { 0.003 };
         assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
-        assert!(
-            (report.scale - scale).abs() < tolerance * scale,
-            "{report:?} {scale}"
-        );
+        assert!((report.scale - scale).abs() < tolerance * scale, "{report:?} {scale}");
     }
 }
 
@@ -668,9 +581,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
     let frames: Vec<RgbdFrame> = (0..3)
         .map(|i| {
             let frame = rgbd(h, w);
-            let rgb = frame
-                .rgb()
-                .mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
+            let rgb = frame.rgb().mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
             RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
         })
         .collect();

@@ -1,5 +1,5 @@
-//! Sessions on the GPU beside sessions on the CPU: the same frames, nearly the same levels; what the GPU does not do; and
-//! devices that go. Any device there is will do, Mesa's driver in software too.
+//! Sessions on the GPU beside sessions on the CPU: the same frames, nearly the same levels; what the GPU does not do;
+//! and devices that go. Any device there is will do, Mesa's driver in software too.
 #![cfg(feature = "gpu")]
 #![allow(clippy::unwrap_used)]
 
@@ -23,10 +23,7 @@ const H: usize = 48;
 /// The options of the tests on the GPU; none where there is no driver, which is said.
 fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
     let open = |name| {
-        let device = DeviceOptions {
-            name,
-            programs: None,
-        };
+        let device = DeviceOptions { name, programs: None };
         phasefront::unstable::gpu::Device::open(&device).map(|_| device)
     };
     let device = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into()))))?;
@@ -60,11 +57,7 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
     };
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    for brightness in [
-        Brightness::Steady,
-        Brightness::Fixed(0.9),
-        Brightness::FrameMax,
-    ] {
+    for brightness in [Brightness::Steady, Brightness::Fixed(0.9), Brightness::FrameMax] {
         let (mut plain, mut gpu) = (plain.clone(), gpu.clone());
         (plain.encoder.brightness, gpu.encoder.brightness) = (brightness, brightness);
         if brightness == Brightness::FrameMax {
@@ -134,10 +127,7 @@ fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(W, H);
     let seeded = Network::from_onnx(include_bytes!("../../models/seeded-6.onnx")).unwrap();
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
-    for (method, word) in [
-        (sweep, "the sweep"),
-        (Method::Seeded(Arc::new(seeded)), "Layers"),
-    ] {
+    for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
         plain.ladder[0].method = method;
         let Some(mut gpu) = on_gpu(plain.clone()) else {
             return;
@@ -308,10 +298,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
         cases.push((either, "sharpness"));
         let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
-        let mut ten = SessionOptions::new(
-            Display::from_toml(text).unwrap(),
-            gpu.ladder[0].method.clone(),
-        );
+        let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
         (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
         cases.push((ten, "8 bits"));
         // A line that no workgroup's memory holds.

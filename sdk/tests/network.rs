@@ -14,10 +14,7 @@ const SIZES: [(usize, usize); 4] = [(1, 1), (7, 5), (2, 33), (61, 47)];
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     assert_eq!(a.len(), b.len());
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f32::max)
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
 fn run_stock(network: &Network, input: &[f32], height: usize, width: usize) -> Vec<f32> {
@@ -50,11 +47,7 @@ fn stock_tract_agrees_with_the_definition_in_f32() {
             let expected = reference::run(network.chain(), &input, height, width);
             let output = run_stock(&network, &input, height, width);
             let worst = largest_difference(&output, &expected);
-            assert!(
-                worst < 2e-5,
-                "{} layers, {width}×{height}: {worst}",
-                model.layers
-            );
+            assert!(worst < 2e-5, "{} layers, {width}×{height}: {worst}", model.layers);
         }
     }
 }
@@ -151,14 +144,8 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
                         .zip(&expected)
                         .filter(|(a, b)| (*a - *b).abs() > 1e-4)
                         .count();
-                    assert!(
-                        off * 50 <= output.len() && worst < 0.1,
-                        "{case}: {off} off, {worst}"
-                    );
-                    assert!(
-                        *first.get_or_insert(output.clone()) == output,
-                        "{case}: other bits"
-                    );
+                    assert!(off * 50 <= output.len() && worst < 0.1, "{case}: {off} off, {worst}");
+                    assert!(*first.get_or_insert(output.clone()) == output, "{case}: other bits");
                 } else {
                     assert!(worst < 2e-5, "{case}: {worst}");
                 }
@@ -332,19 +319,14 @@ fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
     ] {
         let network = Network::from_onnx(&model.bytes()).unwrap();
         let graph = network.tract_model().unwrap();
-        let operators: Vec<_> = graph
-            .nodes()
-            .iter()
-            .map(|node| node.op.name().to_string())
-            .collect();
+        let operators: Vec<_> = graph.nodes().iter().map(|node| node.op.name().to_string()).collect();
         assert_eq!(operators, ["Source", "HologramChain"]);
         let graph = graph.into_runnable().unwrap();
         for (height, width) in SIZES {
             let input = frame(4, height, width, 5);
             let plan = network.plan(height, width).unwrap();
             let mut expected = vec![0.0; 6 * height * width];
-            plan.run(&input, &mut expected, &mut plan.scratch())
-                .unwrap();
+            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
             let tensor = Tensor::from_shape(&[1, 4, height, width], &input).unwrap();
             let output = graph.run(tvec!(tensor.into())).unwrap();
             assert_eq!(output[0].shape(), [1, 6, height, width]);
@@ -359,11 +341,7 @@ fn chains_that_the_kernels_do_not_take_say_why_and_run_on_stock_tract() {
     let network = Network::from_onnx(&Model::new(3, 5).bytes()).unwrap();
     let plan = network.plan(4, 6).unwrap();
     assert_eq!(plan.engine().name, "tract");
-    assert!(
-        plan.engine().why.contains("5 filters"),
-        "{}",
-        plan.engine().why
-    );
+    assert!(plan.engine().why.contains("5 filters"), "{}", plan.engine().why);
     assert!(network.plan_on(Isa::Portable, 4, 6).is_err());
     assert!(network.tract_model().is_err());
     let input = frame(4, 4, 6, 1);
@@ -418,10 +396,7 @@ fn wrong_frames_are_refused() {
     let network = Network::from_onnx(&Model::new(2, 8).bytes()).unwrap();
     for (height, width) in [(0, 4), (4, 0), (usize::MAX, 2), (1 << 20, 1 << 20)] {
         assert!(network.plan(height, width).is_err(), "{width}×{height}");
-        assert!(
-            network.plan_on_stock_tract(height, width).is_err(),
-            "{width}×{height}"
-        );
+        assert!(network.plan_on_stock_tract(height, width).is_err(), "{width}×{height}");
     }
     let plan = network.plan(4, 4).unwrap();
     let mut scratch = plan.scratch();
@@ -461,10 +436,7 @@ fn check(model: &Model, spoil: impl Fn(&mut ModelProto), speaks_of: &[&str]) {
     spoil(&mut proto);
     let message = refusal(&proto);
     for part in speaks_of {
-        assert!(
-            message.contains(part),
-            "'{message}' should speak of '{part}'"
-        );
+        assert!(message.contains(part), "'{message}' should speak of '{part}'");
     }
 }
 
@@ -486,9 +458,7 @@ fn what_is_no_onnx_file_is_refused() {
         &whole[..whole.len() - 3],
         &[0xff; 100],
     ] {
-        let error = Network::from_onnx(bytes)
-            .expect_err("must be refused")
-            .to_string();
+        let error = Network::from_onnx(bytes).expect_err("must be refused").to_string();
         assert!(!error.contains('\n'), "{error}");
     }
 }
@@ -509,21 +479,9 @@ fn convolutions_of_another_kind_are_refused() {
         attribute("kernel_shape", &[5, 5]),
         &["'conv2' (Conv)", "kernel_shape [5, 5]", "[3, 3] is right"],
     );
-    check(
-        &model,
-        attribute("strides", &[2, 2]),
-        &["'conv2'", "strides"],
-    );
-    check(
-        &model,
-        attribute("dilations", &[1, 2]),
-        &["'conv2'", "dilations"],
-    );
-    check(
-        &model,
-        attribute("pads", &[0, 0, 0, 0]),
-        &["'conv2'", "pads"],
-    );
+    check(&model, attribute("strides", &[2, 2]), &["'conv2'", "strides"]);
+    check(&model, attribute("dilations", &[1, 2]), &["'conv2'", "dilations"]);
+    check(&model, attribute("pads", &[0, 0, 0, 0]), &["'conv2'", "pads"]);
     check(
         &model,
         |p| node(p, "conv2").attribute.retain(|a| a.name != "pads"),
@@ -605,11 +563,7 @@ fn graphs_of_another_shape_are_refused() {
         |p| p.graph.as_mut().unwrap().output[0].name = "sum3".into(),
         &["'sum3'", "last"],
     );
-    check(
-        &model,
-        |p| p.graph.as_mut().unwrap().node.clear(),
-        &["0 convolutions"],
-    );
+    check(&model, |p| p.graph.as_mut().unwrap().node.clear(), &["0 convolutions"]);
     check(&model, |p| p.graph = None, &["no graph"]);
     let reorder = |p: &mut ModelProto| p.graph.as_mut().unwrap().node.reverse();
     check(&model, reorder, &["no earlier node writes"]);
@@ -630,16 +584,8 @@ fn impossible_shapes_are_refused() {
         &["'conv1'", "(filters, 8, 3, 3) is right"],
     );
     check(&model, shape("w1", &[-8, 8, 3, 3]), &["'w1'", "negative"]);
-    check(
-        &model,
-        shape("w1", &[1_000_000, 8, 3, 3]),
-        &["'w1'", "values"],
-    );
-    check(
-        &model,
-        shape("w1", &[i64::MAX, i64::MAX, 3, 3]),
-        &["'w1'", "values"],
-    );
+    check(&model, shape("w1", &[1_000_000, 8, 3, 3]), &["'w1'", "values"]);
+    check(&model, shape("w1", &[i64::MAX, i64::MAX, 3, 3]), &["'w1'", "values"]);
     check(&model, shape("b1", &[4]), &["'b1'", "values"]);
     let million = |p: &mut ModelProto| {
         let tensors = &mut p.graph.as_mut().unwrap().initializer;
@@ -656,24 +602,15 @@ fn impossible_shapes_are_refused() {
         move |p: &mut ModelProto| {
             use tract_onnx::pb::{tensor_shape_proto::dimension::Value, type_proto};
             let input = &mut p.graph.as_mut().unwrap().input[0];
-            let Some(type_proto::Value::TensorType(t)) = &mut input.r#type.as_mut().unwrap().value
-            else {
+            let Some(type_proto::Value::TensorType(t)) = &mut input.r#type.as_mut().unwrap().value else {
                 panic!()
             };
             t.shape.as_mut().unwrap().dim[1].value = value.map(Value::DimValue);
         }
     };
-    check(
-        &model,
-        channels(Some(1_000_000)),
-        &["'rgbd'", "1000000 channels"],
-    );
+    check(&model, channels(Some(1_000_000)), &["'rgbd'", "1000000 channels"]);
     check(&model, channels(None), &["'rgbd'", "no channel count"]);
-    check(
-        &model,
-        channels(Some(5)),
-        &["'conv0'", "(filters, 5, 3, 3) is right"],
-    );
+    check(&model, channels(Some(5)), &["'conv0'", "(filters, 5, 3, 3) is right"]);
     assert!(refusal(&Model { inputs: 5, ..model }.proto()).contains("4 channels"));
 }
 
@@ -681,16 +618,8 @@ fn impossible_shapes_are_refused() {
 fn broken_numbers_are_refused() {
     let f32_model = Model::new(3, 8);
     for bad in [f32::NAN, f32::INFINITY] {
-        check(
-            &f32_model,
-            |p| set_f32(p, "w1", 5, bad),
-            &["'w1'", "finite"],
-        );
-        check(
-            &f32_model,
-            |p| set_f32(p, "b2", 0, bad),
-            &["'b2'", "finite"],
-        );
+        check(&f32_model, |p| set_f32(p, "w1", 5, bad), &["'w1'", "finite"]);
+        check(&f32_model, |p| set_f32(p, "b2", 0, bad), &["'b2'", "finite"]);
     }
     let model = Model::int8(5, 8);
     for bad in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e-42] {
@@ -715,12 +644,7 @@ fn broken_numbers_are_refused() {
     check(&model, zero_point, &["zero point 3", "0 is right"]);
     let bias = |p: &mut ModelProto| {
         let tensors = &mut p.graph.as_mut().unwrap().initializer;
-        tensors
-            .iter_mut()
-            .find(|t| t.name == "b1_q")
-            .unwrap()
-            .raw_data[..4]
-            .copy_from_slice(&i32::MAX.to_le_bytes());
+        tensors.iter_mut().find(|t| t.name == "b1_q").unwrap().raw_data[..4].copy_from_slice(&i32::MAX.to_le_bytes());
     };
     check(&model, bias, &["'conv1'", "overflows"]);
     check(

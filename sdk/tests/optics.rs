@@ -17,9 +17,7 @@ use phasefront::unstable::wave::{
     aperture::Aperture,
     asm::{self, Padding, Propagator},
 };
-use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target,
-};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
@@ -29,12 +27,7 @@ const SIZES: [(usize, usize); 5] = [(64, 64), (61, 47), (270, 480), (1, 1), (7, 
 const RED: f64 = 638e-9;
 const PITCH: f64 = 8e-6;
 
-fn propagated(
-    plane: &[Complex32],
-    (h, w): (usize, usize),
-    s: f64,
-    padding: Padding,
-) -> Vec<Complex32> {
+fn propagated(plane: &[Complex32], (h, w): (usize, usize), s: f64, padding: Padding) -> Vec<Complex32> {
     let plan = Propagator::new(h, w, PITCH, RED, s, padding).unwrap();
     let mut out = plane.to_vec();
     plan.propagate(&mut out, &mut plan.scratch());
@@ -77,8 +70,7 @@ fn propagation_agrees_with_equation_2() {
         let plane = test_plane(shape, 1);
         for distance in [3e-3, -1.7e-3, 0.0, 20e-3] {
             for padding in [Padding::Reach, Padding::Double, Padding::Circular] {
-                let padded =
-                    asm::padded_shape(shape.0, shape.1, PITCH, RED, distance, padding).unwrap();
+                let padded = asm::padded_shape(shape.0, shape.1, PITCH, RED, distance, padding).unwrap();
                 let wide = widen(&plane, shape);
                 let expected = reference::asm(&wide, PITCH, RED, distance, padded);
                 let carrier = asm::carrier(distance, RED);
@@ -110,22 +102,13 @@ fn the_naive_oracle_agrees_too() {
 fn colours_share_a_shape_and_agree_with_equation_2() {
     let shape = (61, 47);
     let lambdas = Display::default().wavelengths_m();
-    let plans =
-        Propagator::for_colours(shape.0, shape.1, PITCH, lambdas, 6e-3, Padding::Reach).unwrap();
+    let plans = Propagator::for_colours(shape.0, shape.1, PITCH, lambdas, 6e-3, Padding::Reach).unwrap();
     let mut scratch = plans[0].scratch();
     for (plan, lambda) in plans.iter().zip(lambdas) {
         let mut plane = test_plane(shape, 4);
-        let expected = reference::asm(
-            &widen(&plane, shape),
-            PITCH,
-            lambda,
-            6e-3,
-            plan.padded_shape(),
-        );
+        let expected = reference::asm(&widen(&plane, shape), PITCH, lambda, 6e-3, plan.padded_shape());
         plan.propagate(&mut plane, &mut scratch);
-        plane
-            .iter_mut()
-            .for_each(|v| *v *= asm::carrier(6e-3, lambda));
+        plane.iter_mut().for_each(|v| *v *= asm::carrier(6e-3, lambda));
         assert!(relative_error(&widen(&plane, shape), &expected) < 1e-4);
     }
 }
@@ -146,10 +129,7 @@ fn energy_is_kept_and_the_way_back_returns_the_field() {
     for shape in SIZES {
         let plane = test_plane(shape, 5);
         let there = propagated(&plane, shape, 2.5e-3, Padding::Circular);
-        assert!(
-            (energy(&there) / energy(&plane) - 1.0).abs() < 1e-4,
-            "{shape:?}"
-        );
+        assert!((energy(&there) / energy(&plane) - 1.0).abs() < 1e-4, "{shape:?}");
         let back = propagated(&there, shape, -2.5e-3, Padding::Circular);
         assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 1e-4);
     }
@@ -193,9 +173,7 @@ fn the_band_limit_keeps_a_far_field_from_wrapping_around() {
 #[test]
 fn distances_that_cannot_be_held_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, 1e3] {
-        let e = Propagator::new(64, 64, PITCH, RED, bad, Padding::Reach)
-            .err()
-            .unwrap();
+        let e = Propagator::new(64, 64, PITCH, RED, bad, Padding::Reach).err().unwrap();
         assert!(!e.to_string().contains('\n'), "{e}");
     }
     assert!(Propagator::new(0, 64, PITCH, RED, 1e-3, Padding::Reach).is_err());
@@ -207,10 +185,7 @@ fn double_phase_agrees_with_equation_7() {
         let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 10 + c)).collect();
         let wide = Array3::from_shape_vec(
             (3, h, w),
-            field
-                .iter()
-                .map(|v| Complex64::new(v.re.into(), v.im.into()))
-                .collect(),
+            field.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect(),
         )
         .unwrap();
         let brightest = wide.iter().map(|v| v.norm()).fold(0.0, f64::max);
@@ -222,18 +197,13 @@ fn double_phase_agrees_with_equation_7() {
             let expected = reference::double_phase(&wide, number);
             for (got, want) in phase.iter().zip(&expected) {
                 // acos is infinitely steep at the brightest pixels: compare the phasors.
-                let apart = (Complex64::from_polar(1.0, f64::from(*got))
-                    - Complex64::from_polar(1.0, *want))
-                .norm();
+                let apart = (Complex64::from_polar(1.0, f64::from(*got)) - Complex64::from_polar(1.0, *want)).norm();
                 assert!(apart < 1.5e-3, "{got} {want}");
             }
             let error: f64 = phase
                 .iter()
                 .zip(&expected)
-                .map(|(a, b)| {
-                    (Complex64::from_polar(1.0, f64::from(*a)) - Complex64::from_polar(1.0, *b))
-                        .norm_sqr()
-                })
+                .map(|(a, b)| (Complex64::from_polar(1.0, f64::from(*a)) - Complex64::from_polar(1.0, *b)).norm_sqr())
                 .sum();
             assert!((error / phase.len() as f64).sqrt() < 1e-4);
         }
@@ -250,20 +220,12 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         Complex32::from_polar(amplitude, 0.4 * (turn * (x + y)).sin())
     };
     let field = Array3::from_shape_fn((3, h, w), |(c, y, x)| smooth(c, y, x));
-    for encoding in [
-        Encoding::DoublePhase,
-        Encoding::ANTI_ALIAS,
-        Encoding::BAND_LIMIT,
-    ] {
+    for encoding in [Encoding::DoublePhase, Encoding::ANTI_ALIAS, Encoding::BAND_LIMIT] {
         let encoder = Encoder::new((h, w), &Target::default(), &encoding).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, None, &mut phase, &mut encoder.scratch());
-        assert!(
-            phase
-                .iter()
-                .all(|p| (0.0..std::f32::consts::TAU).contains(p))
-        );
+        assert!(phase.iter().all(|p| (0.0..std::f32::consts::TAU).contains(p)));
         let response = Response::linear(8).unwrap();
         let mut levels = vec![0; phase.len()];
         response.levels(&phase, 0, &mut levels);
@@ -384,18 +346,10 @@ fn a_correction_is_part_of_the_offset() {
         let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
         let given = field.clone();
         plan.propagate(&mut field, &mut plan.scratch());
-        let plans = Propagator::for_colours_corrected(
-            h,
-            w,
-            PITCH,
-            display.wavelengths_m(),
-            offset_m,
-            &a,
-            PITCH,
-        )
-        .unwrap();
-        // In the plan's own periodic plane, and with room for all that moves, so that nothing comes back around: tails of
-        // the kernel at the corner frequencies reach beyond what rays do.
+        let plans =
+            Propagator::for_colours_corrected(h, w, PITCH, display.wavelengths_m(), offset_m, &a, PITCH).unwrap();
+        // In the plan's own periodic plane, and with room for all that moves, so that nothing comes back around: tails
+        // of the kernel at the corner frequencies reach beyond what rays do.
         for ((ph, pw), most) in [(plans[0].padded_shape(), 1e-4), ((4 * h, 4 * w), 0.03)] {
             for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
                 let size = h * w;
@@ -405,16 +359,11 @@ fn a_correction_is_part_of_the_offset() {
                 let mut spectrum = reference::fft2(&plane, false);
                 for ((ky, kx), value) in spectrum.indexed_iter_mut() {
                     let bin = |k: usize, n: usize| {
-                        (if 2 * k < n {
-                            k as f64
-                        } else {
-                            k as f64 - n as f64
-                        }) / (n as f64 * PITCH)
+                        (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / (n as f64 * PITCH)
                     };
                     let (mu, nu) = (bin(kx, pw), bin(ky, ph));
                     let root = (lambda.powi(-2) - mu * mu - nu * nu).sqrt();
-                    let phase =
-                        2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
+                    let phase = 2.0 * PI * offset_m * (root - 1.0 / lambda) + a.phase(c, mu, nu, PITCH);
                     *value *= Complex64::from_polar(1.0, phase);
                 }
                 let expected = reference::fft2(&spectrum, true);
@@ -431,9 +380,7 @@ fn a_correction_is_part_of_the_offset() {
 fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     let display = Display::from_toml("width = 60\nheight = 50").unwrap();
     let (h, w) = (40, 33);
-    let beam = Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
-        1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
-    });
+    let beam = Array3::from_shape_fn((3, 4, 5), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
     let laser = Illumination::new(beam.view()).unwrap();
     let target = Target {
         illumination: Some(laser.clone()),
@@ -455,12 +402,7 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     laser.divide(&mut filtered, (h, w), (50, 60));
     let encoder = double_phase_encoder((h, w));
     let mut expected = vec![0; 3 * h * w];
-    encoder.encode_levels(
-        &mut filtered,
-        Some(2.5),
-        &mut expected,
-        &mut encoder.scratch(),
-    );
+    encoder.encode_levels(&mut filtered, Some(2.5), &mut expected, &mut encoder.scratch());
     assert_eq!(levels, expected);
 }
 
@@ -490,23 +432,18 @@ fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
                 levels
             })
         });
-        assert!(
-            levels[0] == levels[1],
-            "{w}×{h}: other bits on other threads"
-        );
+        assert!(levels[0] == levels[1], "{w}×{h}: other bits on other threads");
         assert!(h * w == 1 || levels[0].iter().any(|level| *level != levels[0][0]));
     }
     for side in [0, 1 << 14, 1 << 15, 1 << 40] {
         let why = pipeline(side, side).err().unwrap().to_string();
-        let named = ["empty", "too large", "over the"]
-            .iter()
-            .any(|word| why.contains(word));
+        let named = ["empty", "too large", "over the"].iter().any(|word| why.contains(word));
         assert!(!why.contains('\n') && named, "{why}");
     }
 }
 
-/// Stage after stage on whole planes: filter, light, largest amplitude, double phase, levels. The encoder does them row by
-/// row; the bits are the same, whatever the threads.
+/// Stage after stage on whole planes: filter, light, largest amplitude, double phase, levels. The encoder does them row
+/// by row; the bits are the same, whatever the threads.
 #[test]
 fn one_sweep_from_field_to_levels_is_stage_after_stage() {
     for ((h, w), more) in [
@@ -518,13 +455,10 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
         ((1, 40), (0, 0)),
     ] {
         let modulator = (h + more.0, w + more.1);
-        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| {
-            1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0)
-        });
+        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
         let laser = Illumination::new(beam.view()).unwrap();
         let (rows, columns) = per_pixel::nodes(modulator.0, modulator.1, 16);
-        let knots =
-            (0..3 * rows * columns * 9).map(|i| (i % 9) as f32 * (20.0 + (i / 9 % 11) as f32));
+        let knots = (0..3 * rows * columns * 9).map(|i| (i % 9) as f32 * (20.0 + (i / 9 % 11) as f32));
         let turns = vec![6.0; 3 * rows * columns];
         let knots = knots.collect::<Vec<_>>();
         let table = PerPixel::new(modulator.0, modulator.1, 16, 8, &knots, &turns).unwrap();
@@ -532,13 +466,7 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
         for (encoding, blur) in [
             (Encoding::DoublePhase, None),
             (Encoding::ANTI_ALIAS, Some((0.7, 3))),
-            (
-                Encoding::AntiAlias {
-                    sigma: 2.0,
-                    width: 9,
-                },
-                Some((2.0, 9)),
-            ),
+            (Encoding::AntiAlias { sigma: 2.0, width: 9 }, Some((2.0, 9))),
         ] {
             for (light, scale, response) in [
                 (None, None, Response::linear(8).unwrap()),
@@ -575,9 +503,7 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                     double_phase::encode_row(&field[row * w..][..w], row % h, used, out);
                 }
                 let values = phases.iter().enumerate();
-                let levels: Vec<_> = values
-                    .map(|(at, phase)| response.level(*phase, at))
-                    .collect();
+                let levels: Vec<_> = values.map(|(at, phase)| response.level(*phase, at)).collect();
 
                 for threads in [1, 3] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
@@ -585,12 +511,8 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                         let encoder = Encoder::new((h, w), &target, &encoding).unwrap();
                         let mut scratch = encoder.scratch();
                         let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
-                        let scaled =
-                            encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);
-                        assert!(
-                            (scaled, &got) == (used, &levels),
-                            "{w}×{h} {encoding:?} {scale:?}"
-                        );
+                        let scaled = encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);
+                        assert!((scaled, &got) == (used, &levels), "{w}×{h} {encoding:?} {scale:?}");
                         let (mut field, mut got) = (given.clone(), vec![0.0; 3 * h * w]);
                         encoder.encode(&mut field, scale, &mut got, &mut scratch);
                         assert!(got == phases, "{w}×{h} {encoding:?} {scale:?}");

@@ -5,8 +5,7 @@ mod camera;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
 use phasefront::input::{
-    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics,
-    Orientation, Plane, Rotation,
+    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{DropReason, Event, Quality, RunningMode, Submission, Thermal};
@@ -36,10 +35,7 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     assert_eq!(hologram.plane(2).unwrap(), &hologram.levels()[2 * H * W..]);
     assert!(hologram.plane(3).is_err());
     let (near, far) = hologram.range_m().unwrap();
-    assert!(
-        (near - 1.0).abs() < 0.01 && (far - 3.0).abs() < 0.05,
-        "{near} {far}"
-    );
+    assert!((near - 1.0).abs() < 0.01 && (far - 3.0).abs() < 0.05, "{near} {far}");
     assert_eq!(hologram.valid_depth(), 1.0);
     // A tap on the square focuses near, one on the wall's right end far.
     let display = &hologram.target().display;
@@ -48,15 +44,10 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     assert_eq!(hologram.z_at(-3.0, f64::NAN), hologram.z_at(0.0, 0.0));
     // The square is bright and yellow in the preview, the wall is not.
     let mut rgba = vec![0; 4 * 24 * 32];
-    hologram
-        .preview(hologram.z_at(0.3, 0.4), 24, 32, &mut rgba)
-        .unwrap();
+    hologram.preview(hologram.z_at(0.3, 0.4), 24, 32, &mut rgba).unwrap();
     let pixel = |x: usize, y: usize| &rgba[4 * (y * 32 + x)..][..4];
     let (square, wall) = (pixel(9, 9), pixel(25, 20));
-    assert!(
-        square[0] > 150 && square[2] < 130 && square[3] == 255,
-        "{square:?}"
-    );
+    assert!(square[0] > 150 && square[2] < 130 && square[3] == 255, "{square:?}");
     assert!(wall[0] < 100, "{wall:?}");
     assert!(hologram.preview(0.0, 24, 32, &mut rgba[1..]).is_err());
     let statistics = session.statistics();
@@ -95,8 +86,7 @@ fn frames_are_turned_upright_colour_and_depth_together() {
         values.chunks_exact(n).rev().flatten().copied().collect()
     };
     let (rgba, depth_bytes) = (turned(&scene.rgba, 4), turned(&metres, 4));
-    let colour =
-        ColourImage::new(ColourFormat::Rgba, W, H, &[Plane::new(&rgba, 4 * W, 4)]).unwrap();
+    let colour = ColourImage::new(ColourFormat::Rgba, W, H, &[Plane::new(&rgba, 4 * W, 4)]).unwrap();
     let depth = depth(&depth_bytes, DepthFormat::MetresF32, W, H);
     let mut half = CameraFrame::new(2, colour, depth);
     half.orientation = Orientation {
@@ -150,10 +140,7 @@ fn a_display_of_ten_bits_gets_words() {
     }
     let output = Output::new(&target, (H, W), Placement::centred(Layout::Grey16));
     let mut bytes = vec![0; 2 * W * H];
-    output
-        .unwrap()
-        .write(ten.output_levels(), 1, &mut bytes)
-        .unwrap();
+    output.unwrap().write(ten.output_levels(), 1, &mut bytes).unwrap();
     assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
     options.target.response = Response::lut([0; 256]);
     assert!(Session::new(options, RunningMode::Image).is_err());
@@ -315,51 +302,20 @@ fn modes_pause_and_close_are_kept_to() {
     let frame = |t| frame(t, &scene, &metres);
     let image = image_session();
     // Without a past, timestamps do not matter and equal frames are equal.
-    let (a, b) = (
-        image.process(&frame(9)).unwrap(),
-        image.process(&frame(3)).unwrap(),
-    );
+    let (a, b) = (image.process(&frame(9)).unwrap(), image.process(&frame(3)).unwrap());
     assert_eq!(a.levels(), b.levels());
-    assert!(
-        image
-            .submit(&frame(1))
-            .unwrap_err()
-            .to_string()
-            .contains("not live")
-    );
+    assert!(image.submit(&frame(1)).unwrap_err().to_string().contains("not live"));
     image.pause();
-    assert!(
-        image
-            .process(&frame(1))
-            .unwrap_err()
-            .to_string()
-            .contains("paused")
-    );
+    assert!(image.process(&frame(1)).unwrap_err().to_string().contains("paused"));
     image.resume();
     image.process(&frame(1)).unwrap();
     image.close();
-    assert!(
-        image
-            .process(&frame(1))
-            .unwrap_err()
-            .to_string()
-            .contains("closed")
-    );
+    assert!(image.process(&frame(1)).unwrap_err().to_string().contains("closed"));
     assert_eq!(a.levels().len(), 3 * W * H);
     let live = Session::new(options(W, H), RunningMode::Live(Box::new(|_| {}))).unwrap();
-    assert!(
-        live.process(&frame(1))
-            .unwrap_err()
-            .to_string()
-            .contains("live")
-    );
+    assert!(live.process(&frame(1)).unwrap_err().to_string().contains("live"));
     live.close();
-    assert!(
-        live.submit(&frame(1))
-            .unwrap_err()
-            .to_string()
-            .contains("closed")
-    );
+    assert!(live.submit(&frame(1)).unwrap_err().to_string().contains("closed"));
     live.close();
 }
 
@@ -386,10 +342,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     let blind = CameraFrame::new(6, scene.colour(), depth(&nan, DepthFormat::MetresF32, W, H));
     session.submit(&blind).unwrap();
     match events.recv().unwrap() {
-        Event::Failed {
-            timestamp_ns: 6,
-            error,
-        } => assert!(error.to_string().contains("no usable")),
+        Event::Failed { timestamp_ns: 6, error } => assert!(error.to_string().contains("no usable")),
         other => panic!("{other:?}"),
     }
     // Late ones are refused, and the next works.
@@ -438,10 +391,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     session.close();
     let statistics = session.statistics();
     assert_eq!(statistics.submitted, 5 + 1 + 2 + 1 + 93 + 1);
-    assert_eq!(
-        (statistics.refused, statistics.failed, statistics.pending),
-        (2, 1, 0)
-    );
+    assert_eq!((statistics.refused, statistics.failed, statistics.pending), (2, 1, 0));
     assert_eq!(statistics.dropped.superseded, superseded);
     let told = events.try_iter().count() as u64;
     assert_eq!(told, 1, "the last frame is answered or dropped, once");
@@ -495,10 +445,7 @@ fn options_that_cannot_be_meant_are_named() {
     refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
     refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
-    refuse(
-        &|o| o.encoder.brightness = Brightness::Fixed(0.0),
-        "full light",
-    );
+    refuse(&|o| o.encoder.brightness = Brightness::Fixed(0.0), "full light");
     refuse(&|o| o.depth.least_confidence = 2.0, "confidence");
     let session = image_session();
     assert!(session.set_quality(Quality::Fixed(7)).is_err());

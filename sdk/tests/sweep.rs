@@ -85,15 +85,7 @@ fn the_sweep_is_its_oracle() {
             0.0,
         ),
         (30, 1, sweep(), 0.0),
-        (
-            37,
-            35,
-            Sweep {
-                planes: 1,
-                ..sweep()
-            },
-            0.0,
-        ),
+        (37, 35, Sweep { planes: 1, ..sweep() }, 0.0),
         (
             37,
             35,
@@ -172,16 +164,8 @@ fn what_cannot_be_swept_is_named() {
     };
     let usual = Sweep::for_display(&Display::default());
     for (sweep, z_m, message) in [
-        (
-            Sweep { planes: 0, ..usual },
-            0.0,
-            "0 planes; 1 to 1024 are right",
-        ),
-        (
-            Sweep { taps: 8, ..usual },
-            0.0,
-            "an odd number from 3 to 63",
-        ),
+        (Sweep { planes: 0, ..usual }, 0.0, "0 planes; 1 to 1024 are right"),
+        (Sweep { taps: 8, ..usual }, 0.0, "an odd number from 3 to 63"),
         (
             Sweep {
                 taps: 3,
@@ -231,12 +215,7 @@ fn a_seeded_network_corrects_the_sweep() {
             ..model
         };
         let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
-        let mut input: Vec<f32> = frame
-            .rgb()
-            .iter()
-            .chain(frame.depth())
-            .map(|v| v - 0.5)
-            .collect();
+        let mut input: Vec<f32> = frame.rgb().iter().chain(frame.depth()).map(|v| v - 0.5).collect();
         input.extend(seed.iter().map(|u| 0.5 * (u.re - 0.5)));
         input.extend(seed.iter().map(|u| 0.5 * u.im));
         let output = network::reference::run(network.chain(), &input, height, width);
@@ -261,9 +240,7 @@ fn by_sharpness_each_frame_gets_what_suits_its_depth() {
     let usual = Sweep::for_display(&display);
     let square = |y: usize, x: usize| (10..30).contains(&y) && (15..40).contains(&x);
     let frame = |ramp: usize| {
-        let rgb = Array3::from_shape_fn((3, height, width), |(_, y, x)| {
-            0.2 + 0.6 * f32::from(square(y, x))
-        });
+        let rgb = Array3::from_shape_fn((3, height, width), |(_, y, x)| 0.2 + 0.6 * f32::from(square(y, x)));
         let depth = Array2::from_shape_fn((height, width), |(y, x)| {
             let inside = (0..ramp).filter(|i| square(y, x + i)).count();
             0.8 - 0.5 * inside as f32 / ramp as f32
@@ -293,10 +270,7 @@ fn tiles_are_the_whole_frame() {
             tile,
             ..Sweep::for_display(&display)
         };
-        run(
-            &SweepPlan::new(150, 170, &display, sweep, 0.0).unwrap(),
-            &frame,
-        )
+        run(&SweepPlan::new(150, 170, &display, sweep, 0.0).unwrap(), &frame)
     };
     let whole = of(512);
     for tile in [32, 64, 144] {
@@ -321,9 +295,7 @@ fn instruction_sets_give_the_same_bits() {
 #[test]
 fn hidden_surfaces_are_their_oracle() {
     for (height, width, reach) in [(70, 45, 7), (33, 64, 30), (1, 9, 3), (9, 1, 40)] {
-        let ragged = Array2::from_shape_fn((height, width), |(y, x)| {
-            ((x * 7 + y * 13 + x * y) % 17) as f32 / 16.0
-        });
+        let ragged = Array2::from_shape_fn((height, width), |(y, x)| ((x * 7 + y * 13 + x * y) % 17) as f32 / 16.0);
         for depth in [ragged, frame(height, width).depth().to_owned()] {
             let depth = depth.as_slice().unwrap();
             let plan = hidden::Hidden::new(height, width, reach);

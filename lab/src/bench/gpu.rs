@@ -5,8 +5,7 @@ use super::{median, named};
 use crate::error::Result;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
 use phasefront::unstable::gpu::{
-    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame,
-    GpuPipeline, Job, probe,
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
 };
 use phasefront::{Brightness, Method, StageTimes, Target};
 use serde::Serialize;
@@ -39,8 +38,8 @@ pub struct GpuRow {
     pub spread_ms: [f64; 2],
     /// Time a frame with several in flight whose levels stay on the GPU.
     pub flying_ms: f64,
-    /// What encoding through the per-pixel table takes longer than through none, of all stages, where there is one and the device
-    /// has time stamps.
+    /// What encoding through the per-pixel table takes longer than through none, of all stages, where there is one and
+    /// the device has time stamps.
     pub table_percent: Option<f64>,
     /// Frames that were measured one at a time.
     pub frames: usize,
@@ -52,8 +51,8 @@ pub struct GpuRow {
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures `method` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after one that is not
-/// counted; where the modulator has a table for each pixel, each frame once more through it.
+/// Measures `method` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after
+/// one that is not counted; where the modulator has a table for each pixel, each frame once more through it.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
@@ -127,8 +126,7 @@ pub fn measure(
         frames: totals.len(),
         gmac_per_s: mac_per_s.map(|rate| rate / 1e9),
         peak_percent: mac_per_s.map(|rate| 100.0 * rate / peak.mac_per_s),
-        bandwidth_percent: method_s
-            .map(|s| 100.0 * pipeline.method_bytes() as f64 / s / peak.bytes_per_s),
+        bandwidth_percent: method_s.map(|s| 100.0 * pipeline.method_bytes() as f64 / s / peak.bytes_per_s),
     })
 }
 

@@ -1,5 +1,5 @@
-//! Networks with random weights, for numbers of layers of which none comes along: what a network costs does not depend on
-//! its weights. Written as ONNX, so that they come the way of all others.
+//! Networks with random weights, for numbers of layers of which none comes along: what a network costs does not depend
+//! on its weights. Written as ONNX, so that they come the way of all others.
 
 use crate::error::Result;
 use phasefront::Network;
@@ -103,10 +103,7 @@ fn onnx(layers: usize) -> Vec<u8> {
         }
         read.push(at.clone());
         if last {
-            graph = graph.bytes(
-                1,
-                &node("Concat", &[&at, "rgbd"], "joined", &[("axis", &[1])]),
-            );
+            graph = graph.bytes(1, &node("Concat", &[&at, "rgbd"], "joined", &[("axis", &[1])]));
             at = "joined".into();
         }
         let inputs = match (i, last) {
@@ -157,9 +154,7 @@ fn onnx(layers: usize) -> Vec<u8> {
         ("volume_depth_mm", "6.0"),
         ("offset_mm", "0"),
     ] {
-        let entry = Message::default()
-            .text(1, &format!("phasefront.{key}"))
-            .text(2, value);
+        let entry = Message::default().text(1, &format!("phasefront.{key}")).text(2, value);
         model = model.bytes(14, &entry.0);
     }
     model.0
@@ -177,9 +172,7 @@ mod tests {
             assert_eq!((network.layers(), network.filters()), (layers, FILTERS));
             let plan = network.plan(9, 14).unwrap();
             assert!(plan.engine().isa.is_some(), "{:?}", plan.engine());
-            let input: Vec<f32> = (0..4 * 9 * 14)
-                .map(|i| (i % 7) as f32 / 6.0 - 0.5)
-                .collect();
+            let input: Vec<f32> = (0..4 * 9 * 14).map(|i| (i % 7) as f32 / 6.0 - 0.5).collect();
             let mut output = vec![0.0; 6 * 9 * 14];
             plan.run(&input, &mut output, &mut plan.scratch()).unwrap();
             let most = output.iter().fold(0.0f32, |most, v| most.max(v.abs()));

@@ -60,9 +60,7 @@ pub struct Map {
 /// # Errors
 /// A panel without a finite point, or a file that cannot be written.
 pub fn write_curves(path: &Path, panels: &[Panel], across: usize) -> Result<()> {
-    write(path, panels.len(), across, |area, i| {
-        curves(area, &panels[i])
-    })
+    write(path, panels.len(), across, |area, i| curves(area, &panels[i]))
 }
 
 /// Writes `maps` side by side, `across` a row, to `path`, an SVG.
@@ -75,24 +73,14 @@ pub fn write_maps(path: &Path, maps: &[Map], across: usize) -> Result<()> {
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-fn write(
-    path: &Path,
-    count: usize,
-    across: usize,
-    draw: impl Fn(&Area<'_>, usize) -> Drawn,
-) -> Result<()> {
+fn write(path: &Path, count: usize, across: usize, draw: impl Fn(&Area<'_>, usize) -> Drawn) -> Result<()> {
     let mut text = String::new();
     let rows = count.div_ceil(across);
     let mut all = || -> Drawn {
         let size = (PANEL.0 * across as u32, PANEL.1 * rows as u32);
         let root = SVGBackend::with_string(&mut text, size).into_drawing_area();
         root.fill(&WHITE)?;
-        for (i, area) in root
-            .split_evenly((rows, across))
-            .iter()
-            .take(count)
-            .enumerate()
-        {
+        for (i, area) in root.split_evenly((rows, across)).iter().take(count).enumerate() {
             draw(area, i)?;
         }
         root.present()?;
@@ -106,9 +94,7 @@ fn write(
 fn span(values: impl Iterator<Item = f64>) -> std::result::Result<(f64, f64), &'static str> {
     let (low, high) = values
         .filter(|v| v.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     match low <= high {
         true => Ok((low, high.max(low + 1e-9 + 1e-6 * low.abs()))),
         false => Err("nothing to draw"),
@@ -182,10 +168,7 @@ fn map(area: &Area<'_>, map: &Map) -> Drawn {
         };
         let t = (f64::from(*value) - low) / (high - low);
         let colour = shade(t);
-        area.draw(&Rectangle::new(
-            [corner(i, j), corner(i + 1, j + 1)],
-            colour.filled(),
-        ))?;
+        area.draw(&Rectangle::new([corner(i, j), corner(i + 1, j + 1)], colour.filled()))?;
     }
     Ok(())
 }
@@ -225,11 +208,7 @@ fn shrunk(values: ArrayView2<'_, f32>) -> Array2<f32> {
                 }
             }
         }
-        if count > 0 {
-            sum / count as f32
-        } else {
-            f32::NAN
-        }
+        if count > 0 { sum / count as f32 } else { f32::NAN }
     })
 }
 

@@ -6,10 +6,10 @@
 //! minimum, 2π − θₖ up to the next maximum, 2π + θₖ, and so on.
 //!
 //! # Then: what the light says
-//! Where the light is at its extremes acos makes noise large and biased. So the curve is fitted to the light
-//! itself: Iₖ = a + b·cos φ(k), with φ a cubic spline of 12 coefficients that do not fall (so nor does φ), φ(0) = 0, and a
-//! penalty on their third differences, which leaves what is straight or bowed as it is; by Gauss and Newton's method from the paper's curve, increments that
-//! would be negative held at 0.
+//! Where the light is at its extremes acos makes noise large and biased. So the curve is fitted to the light itself: Iₖ
+//! = a + b·cos φ(k), with φ a cubic spline of 12 coefficients that do not fall (so nor does φ), φ(0) = 0, and a penalty
+//! on their third differences, which leaves what is straight or bowed as it is; by Gauss and Newton's method from the
+//! paper's curve, increments that would be negative held at 0.
 //!
 //! # Ranges under 2π
 //! Below 2π nothing changes: b comes from what is seen. Below π the light never reaches its minimum, and a
@@ -27,15 +27,16 @@ const UNKNOWNS: usize = INCREMENTS + 2;
 const N: usize = COEFFICIENTS + 2;
 const A: usize = COEFFICIENTS;
 const B: usize = COEFFICIENTS + 1;
-/// The weight of the penalty against light of amplitude 1: as for noise of 1/30 and increments whose second differences are
-/// 0.2 rad.
+/// The weight of the penalty against light of amplitude 1: as for noise of 1/30 and increments whose second differences
+/// are 0.2 rad.
 const PENALTY: f64 = 0.03;
 /// The most steps of a fit.
 const STEPS: usize = 20;
-/// What the light must rise or fall by, of its range, before a turning point counts: what marks and code beside a pixel scatter
-/// into it is less.
+/// What the light must rise or fall by, of its range, before a turning point counts: what marks and code beside a pixel
+/// scatter into it is less.
 const TURN: f32 = 0.1;
-/// The same for a turn that is taken only if the curve that follows from it explains the light better: one just beyond π.
+/// The same for a turn that is taken only if the curve that follows from it explains the light better: one just beyond
+/// π.
 const FINE_TURN: f32 = 0.015;
 /// And of the noise that the mean of nine levels has.
 const FINE_TURN_NOISE: f32 = 4.0;
@@ -129,7 +130,8 @@ impl Basis {
         (fits.min_by(|a, b| a.1.total_cmp(&b.1))).map(|(fit, _)| fit)
     }
 
-    /// The fit that begins with phases of Eq. 12–13, and the sum of squares that it leaves of the light, with the penalty.
+    /// The fit that begins with phases of Eq. 12–13, and the sum of squares that it leaves of the light, with the
+    /// penalty.
     fn fit_from(
         &self,
         (phases, passed_minimum): &([f32; LEVELS], bool),
@@ -143,9 +145,7 @@ impl Basis {
         let scale = f64::from(most - if passed_minimum { least } else { dark }) / 2.0;
         let offset = f64::from(if passed_minimum { least } else { dark });
         // Light in units of its amplitude: I/scale = a + b·cos φ, a and b near 1.
-        let seen: Vec<f64> = (light.iter())
-            .map(|v| (f64::from(*v) - offset) / scale)
-            .collect();
+        let seen: Vec<f64> = (light.iter()).map(|v| (f64::from(*v) - offset) / scale).collect();
         let mut p = [0.0; UNKNOWNS];
         p[..INCREMENTS].copy_from_slice(&self.increments(phases));
         (p[INCREMENTS], p[INCREMENTS + 1]) = (1.0, 1.0);
@@ -197,11 +197,8 @@ impl Basis {
                 projected[first + i] += value * f64::from(*phase);
             }
         }
-        let c: [f64; COEFFICIENTS] = std::array::from_fn(|i| {
-            (0..COEFFICIENTS)
-                .map(|j| self.smoother[i][j] * projected[j])
-                .sum()
-        });
+        let c: [f64; COEFFICIENTS] =
+            std::array::from_fn(|i| (0..COEFFICIENTS).map(|j| self.smoother[i][j] * projected[j]).sum());
         std::array::from_fn(|i| (c[i + 1] - c[i].max(0.0)).max(0.0))
     }
 
@@ -216,11 +213,7 @@ impl Basis {
             .map(move |(first, values)| (values.iter().zip(&c[*first..])).map(|(v, c)| v * c).sum())
     }
 
-    fn residuals<'a>(
-        &'a self,
-        p: &[f64; UNKNOWNS],
-        seen: &'a [f64],
-    ) -> impl Iterator<Item = f64> + use<'a> {
+    fn residuals<'a>(&'a self, p: &[f64; UNKNOWNS], seen: &'a [f64]) -> impl Iterator<Item = f64> + use<'a> {
         let (a, b) = (p[INCREMENTS], p[INCREMENTS + 1]);
         (self.phases(p).zip(seen)).map(move |(phase, seen)| seen - a - b * phase.cos())
     }
@@ -305,10 +298,7 @@ impl Basis {
 
 /// Normal equations in increments, a and b, of those in coefficients: coefficient i is the sum of the increments below
 /// it, so sums from the end.
-fn of_increments(
-    mut gram: [[f64; N]; N],
-    mut right: [f64; N],
-) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
+fn of_increments(mut gram: [[f64; N]; N], mut right: [f64; N]) -> ([[f64; UNKNOWNS]; UNKNOWNS], [f64; UNKNOWNS]) {
     for i in 1..N {
         let (above, row) = gram.split_at_mut(i);
         for (j, above) in above.iter_mut().enumerate() {
@@ -356,11 +346,7 @@ fn non_negative(system: [[f64; UNKNOWNS]; UNKNOWNS], wanted: [f64; UNKNOWNS]) ->
 }
 
 /// Solves a symmetric positive system of the first `n` unknowns; directions without weight stay 0.
-pub(super) fn cholesky<const N: usize>(
-    mut m: [[f64; N]; N],
-    mut right: [f64; N],
-    n: usize,
-) -> [f64; N] {
+pub(super) fn cholesky<const N: usize>(mut m: [[f64; N]; N], mut right: [f64; N], n: usize) -> [f64; N] {
     for i in 0..n {
         for j in 0..=i {
             let sum = m[i][j] - (0..j).map(|k| m[i][k] * m[j][k]).sum::<f64>();
@@ -400,17 +386,11 @@ fn unfolded_fine(light: &[f32; LEVELS], dark: f32) -> Option<([f32; LEVELS], boo
     let bends = light.windows(3).map(|w| (w[0] - 2.0 * w[1] + w[2]).powi(2));
     let noise = (bends.sum::<f32>() / (6.0 * (LEVELS - 2) as f32)).sqrt() / 3.0;
     unfolded_at(light, dark, |range| {
-        (FINE_TURN * range)
-            .max(FINE_TURN_NOISE * noise)
-            .min(TURN * range)
+        (FINE_TURN * range).max(FINE_TURN_NOISE * noise).min(TURN * range)
     })
 }
 
-fn unfolded_at(
-    light: &[f32; LEVELS],
-    dark: f32,
-    turn: impl Fn(f32) -> f32,
-) -> Option<([f32; LEVELS], bool)> {
+fn unfolded_at(light: &[f32; LEVELS], dark: f32, turn: impl Fn(f32) -> f32) -> Option<([f32; LEVELS], bool)> {
     let smooth = smoothed(light);
     let least = smooth.iter().copied().fold(f32::INFINITY, f32::min);
     let most = smooth.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -423,11 +403,7 @@ fn unfolded_at(
     let mut turns = Vec::new();
     let (mut extreme, mut at, mut falls) = (smooth[0], 0, true);
     for (k, value) in smooth.iter().enumerate().take(LEVELS - 4) {
-        let beyond = if falls {
-            *value < extreme
-        } else {
-            *value > extreme
-        };
+        let beyond = if falls { *value < extreme } else { *value > extreme };
         // Minima lie low and maxima high; what turns elsewhere is noise where the light is flat.
         let is_low = extreme - least < 0.5 * range;
         if beyond {
@@ -438,16 +414,11 @@ fn unfolded_at(
         }
     }
     let passed_minimum = !turns.is_empty();
-    let least = if passed_minimum {
-        least
-    } else {
-        dark.min(least)
-    };
+    let least = if passed_minimum { least } else { dark.min(least) };
     let root = |v: f32| v.max(0.0).sqrt();
     let mut highest = 0.0f32;
     let phases = std::array::from_fn(|k| {
-        let part =
-            (root(light[k]) - root(least)) / (root(most) - root(least)).max(f32::MIN_POSITIVE);
+        let part = (root(light[k]) - root(least)) / (root(most) - root(least)).max(f32::MIN_POSITIVE);
         let theta = 2.0 * part.clamp(0.0, 1.0).acos();
         let folds = turns.iter().filter(|turn| k > **turn).count();
         let phase = match folds % 2 {
@@ -460,16 +431,15 @@ fn unfolded_at(
     Some((phases, passed_minimum))
 }
 
-/// The lowest level whose phase is nearest to each of 256 steps of 2π, by a `curve` that rises: a full table's row. A phase that
-/// lies beyond the curve's end has the end or level 0, whichever is nearer.
+/// The lowest level whose phase is nearest to each of 256 steps of 2π, by a `curve` that rises: a full table's row. A
+/// phase that lies beyond the curve's end has the end or level 0, whichever is nearer.
 pub fn inverse(curve: &[f32; LEVELS]) -> [u8; LEVELS] {
     use std::f32::consts::TAU;
     let last = curve[LEVELS - 1];
     let mut level = 0;
     std::array::from_fn(|step| {
         let phase = step as f32 / LEVELS as f32 * TAU;
-        while level + 1 < LEVELS && (curve[level + 1] - phase).abs() < (curve[level] - phase).abs()
-        {
+        while level + 1 < LEVELS && (curve[level + 1] - phase).abs() < (curve[level] - phase).abs() {
             level += 1;
         }
         match phase > last && phase > 0.5 * (last + TAU) {
@@ -542,9 +512,10 @@ mod tests {
     #[test]
     fn curves_of_all_ranges_come_back_from_noisy_light() {
         let basis = Basis::new();
-        // What noise allows: the light tells of the phase by sin φ, and so nothing where it is at an extreme. The covariance of the
-        // penalised least squares (the inverse of Fisher's information, the penalty added) says that 19 times in 20 the worst of 20 seeds
-        // stays below 0.043, 0.013, 0.011, 0.022, 0.028 and 0.016; a curve that ends at an extreme, at 2π or at π, is the hardest.
+        // What noise allows: the light tells of the phase by sin φ, and so nothing where it is at an extreme. The
+        // covariance of the penalised least squares (the inverse of Fisher's information, the penalty added) says that
+        // 19 times in 20 the worst of 20 seeds stays below 0.043, 0.013, 0.011, 0.022, 0.028 and 0.016; a curve that
+        // ends at an extreme, at 2π or at π, is the hardest.
         for (range, noise, most) in [
             (1.0, 0.0, 0.01),
             (1.02, 0.02, 0.045),
@@ -578,8 +549,8 @@ mod tests {
         }
     }
 
-    /// Eq. 12 takes differences of roots, which is exact where the light's minimum is 0; stray light below it, a sixtieth of the
-    /// maximum here, bends what it gives by 0.1 rad. The fit knows of stray light.
+    /// Eq. 12 takes differences of roots, which is exact where the light's minimum is 0; stray light below it, a
+    /// sixtieth of the maximum here, bends what it gives by 0.1 rad. The fit knows of stray light.
     #[test]
     fn equations_12_and_13_unfold_a_clean_curve() {
         let (curve, light) = pixel(1.3, 0.0, 0);

@@ -20,7 +20,8 @@ impl Homography {
         match solve(&mut rows) {
             Some(h) => Ok(Homography(h)),
             None => Err(Error::Input(
-                "the four marks are not the corners of a quadrangle; all of the modulator must be in the picture".into(),
+                "the four marks are not the corners of a quadrangle; all of the modulator must be in the picture"
+                    .into(),
             )),
         }
     }
@@ -29,10 +30,7 @@ impl Homography {
     pub fn map(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let h = &self.0;
         let w = h[6] * x + h[7] * y + 1.0;
-        [
-            (h[0] * x + h[1] * y + h[2]) / w,
-            (h[3] * x + h[4] * y + h[5]) / w,
-        ]
+        [(h[0] * x + h[1] * y + h[2]) / w, (h[3] * x + h[4] * y + h[5]) / w]
     }
 }
 
@@ -66,12 +64,7 @@ mod tests {
     #[test]
     fn four_points_go_where_they_shall_and_lines_stay_lines() {
         let from = [[0.0, 0.0], [1920.0, 0.0], [0.0, 1080.0], [1920.0, 1080.0]];
-        let to = [
-            [310.0, 205.0],
-            [5720.0, 260.5],
-            [290.0, 3390.0],
-            [5800.0, 3301.0],
-        ];
+        let to = [[310.0, 205.0], [5720.0, 260.5], [290.0, 3390.0], [5800.0, 3301.0]];
         let map = Homography::through(from, to).unwrap();
         for (a, b) in from.into_iter().zip(to) {
             let [x, y] = map.map(a);
@@ -80,12 +73,8 @@ mod tests {
         let [a, b, c] = [[100.0, 50.0], [500.0, 250.0], [1300.0, 650.0]].map(|p| map.map(p));
         let cross = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
         assert!(cross.abs() < 1e-4, "{cross}");
-        let back = Homography::through(to, from)
-            .unwrap()
-            .map(map.map([700.0, 300.0]));
+        let back = Homography::through(to, from).unwrap().map(map.map([700.0, 300.0]));
         assert!((back[0] - 700.0).abs() < 1e-8 && (back[1] - 300.0).abs() < 1e-8);
-        assert!(
-            Homography::through([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]], from).is_err()
-        );
+        assert!(Homography::through([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]], from).is_err());
     }
 }

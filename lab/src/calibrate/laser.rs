@@ -15,8 +15,8 @@ const HALF: usize = 2;
 /// The most Gaussians of a mixture.
 pub const MOST_GAUSSIANS: usize = 4;
 
-/// The amplitude at the nodes of a map, (Gh, Gw), of a (`height`, `width`) modulator, 1 at its brightest, from a photograph of the
-/// diffuser that `registration` places.
+/// The amplitude at the nodes of a map, (Gh, Gw), of a (`height`, `width`) modulator, 1 at its brightest, from a
+/// photograph of the diffuser that `registration` places.
 ///
 /// # Errors
 /// A photograph that is saturated or dark.
@@ -39,8 +39,8 @@ pub fn map(
     let (rows, columns) = (nodes(height), nodes(width));
     let step = |n: usize, nodes: usize| ((n - 1) as f64 / (nodes - 1) as f64).max(1.0);
     let (step_y, step_x) = (step(height, rows), step(width, columns));
-    // Into pixels at the rim the median, sampling and what registration is off bring the dark beside it: nodes there look at pixels
-    // a little further in, and follow their slope.
+    // Into pixels at the rim the median, sampling and what registration is off bring the dark beside it: nodes there
+    // look at pixels a little further in, and follow their slope.
     let reach = ((HALF as f64 + 1.0) / registration.zoom + 0.5).ceil();
     let window = |node: usize, step: f64, n: usize| {
         let quarter = (n - 1) as f64 / 4.0;
@@ -70,8 +70,8 @@ pub fn map(
     Ok(map / most)
 }
 
-/// The pixels of an axis that a node looks at, with their shares in the mean and in the way from the mean to the node by
-/// the slope.
+/// The pixels of an axis that a node looks at, with their shares in the mean and in the way from the mean to the node
+/// by the slope.
 struct Window {
     shares: Vec<(usize, [f64; 2])>,
 }
@@ -84,15 +84,8 @@ impl Window {
         let weight = |x: usize| 1.01 - (x as f64 - centre).abs() / half;
         let all: f64 = pixels.clone().map(weight).sum();
         let mean = pixels.clone().map(|x| weight(x) * x as f64).sum::<f64>() / all;
-        let spread: f64 = pixels
-            .clone()
-            .map(|x| weight(x) * (x as f64 - mean).powi(2))
-            .sum();
-        let slope = if spread > 0.0 {
-            (at - mean) / spread
-        } else {
-            0.0
-        };
+        let spread: f64 = pixels.clone().map(|x| weight(x) * (x as f64 - mean).powi(2)).sum();
+        let slope = if spread > 0.0 { (at - mean) / spread } else { 0.0 };
         let shares = pixels.map(|x| (x, [weight(x) / all, weight(x) * (x as f64 - mean) * slope]));
         Window {
             shares: shares.collect(),
@@ -148,9 +141,9 @@ impl Gaussian {
     }
 }
 
-/// Fits the intensity of `map`, amplitudes (Gh, Gw), by a sum of `count` Gaussian beams in the least squares, by Levenberg and
-/// Marquardt's method, one beam more at a time; gives the fit's amplitudes, its beams, and the root mean square that it leaves of
-/// the intensity.
+/// Fits the intensity of `map`, amplitudes (Gh, Gw), by a sum of `count` Gaussian beams in the least squares, by
+/// Levenberg and Marquardt's method, one beam more at a time; gives the fit's amplitudes, its beams, and the root mean
+/// square that it leaves of the intensity.
 ///
 /// # Errors
 /// No Gaussians or over [`MOST_GAUSSIANS`].
@@ -283,9 +276,7 @@ mod tests {
         let pattern = Pattern::new(120, 176).unwrap();
         let simulated = SimulatedDisplay::new(&display, 2.5, 3).unwrap();
         for colour in 0..3 {
-            let marked = simulated
-                .photograph(pattern.frame(0).view(), colour, 0.0, 0)
-                .unwrap();
+            let marked = simulated.photograph(pattern.frame(0).view(), colour, 0.0, 0).unwrap();
             let registration = marks::register(&marked, &pattern).unwrap();
             let photograph = simulated.photograph_diffuser(colour, 1).unwrap();
             let measured = map(&photograph, &registration, (120, 176)).unwrap();
@@ -300,19 +291,13 @@ mod tests {
             // Maps have no scale: by the best common factor.
             let rms = |map: &Array2<f32>| {
                 let dot = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-                    map.iter()
-                        .zip(&truth)
-                        .map(|(a, b)| f(f64::from(*a), *b))
-                        .sum()
+                    map.iter().zip(&truth).map(|(a, b)| f(f64::from(*a), *b)).sum()
                 };
                 let scale = dot(&|a, b| a * b) / dot(&|a, _| a * a);
                 (dot(&|a, b| (a * scale - b).powi(2)) / dot(&|_, b| b * b)).sqrt()
             };
             let (of_map, of_fit) = (rms(&measured), rms(&fitted));
-            assert!(
-                of_map < 0.02 && of_fit < 0.01,
-                "{colour}: {of_map} {of_fit}"
-            );
+            assert!(of_map < 0.02 && of_fit < 0.01, "{colour}: {of_map} {of_fit}");
         }
     }
 

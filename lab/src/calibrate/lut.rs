@@ -134,11 +134,7 @@ fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
 ///
 /// # Errors
 /// A file that is missing or cannot be read.
-pub fn read_capture(
-    folder: &Path,
-    colour: usize,
-    k: usize,
-) -> std::result::Result<Photograph, What> {
+pub fn read_capture(folder: &Path, colour: usize, k: usize) -> std::result::Result<Photograph, What> {
     let path = capture_path(folder, k).ok_or(What::Missing)?;
     Photograph::read(&path, colour).map_err(|e| match e {
         Error::File { reason, .. } => What::Unreadable(reason),
@@ -182,8 +178,7 @@ impl Stack {
         let mut light = vec![[0.0; LEVELS]; rows * width];
         for k in 0..PATTERNS {
             let start = 2 * (k * height + y) * width;
-            let read = (self.file.seek(SeekFrom::Start(start as u64)))
-                .and_then(|_| self.file.read_exact(&mut bytes));
+            let read = (self.file.seek(SeekFrom::Start(start as u64))).and_then(|_| self.file.read_exact(&mut bytes));
             read.map_err(|e| self.refuse(e))?;
             for (pixel, pair) in light.iter_mut().zip(bytes.chunks_exact(2)) {
                 pixel[k] = f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0;
@@ -305,13 +300,7 @@ struct Pixel {
     passed_minimum: bool,
 }
 
-fn fitted(
-    pattern: &Pattern,
-    colour: usize,
-    mut stack: Stack,
-    dark: f32,
-    progress: &dyn Fn(usize),
-) -> Result<Curves> {
+fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progress: &dyn Fn(usize)) -> Result<Curves> {
     let (height, width) = pattern.shape();
     let basis = Basis::new();
     let none = [f32::NAN; COEFFICIENTS];
@@ -422,25 +411,22 @@ pub fn spacing(height: usize, width: usize) -> usize {
     height.max(width).div_ceil(NODES)
 }
 
-/// The compact table of the curves of red, green and blue: its nodes' curves are those of a smooth surface through the pixels'
-/// ([`surface`]), which also takes the noise of single pixels away, and bridges marks and dust.
+/// The compact table of the curves of red, green and blue: its nodes' curves are those of a smooth surface through the
+/// pixels' ([`surface`]), which also takes the noise of single pixels away, and bridges marks and dust.
 ///
 /// # Errors
 /// Curves of different shapes, or without any.
 pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
     let (height, width) = curves[0].shape();
     if curves.iter().any(|c| c.shape() != (height, width)) {
-        return Err(Error::Input(
-            "curves of modulators of different sizes".into(),
-        ));
+        return Err(Error::Input("curves of modulators of different sizes".into()));
     }
     let spacing = spacing(height, width);
     let basis = Basis::new();
     let (mut levels, mut turns) = (Vec::new(), Vec::new());
     for curves in curves {
-        let nodes = surface::fit(curves.coefficients.view(), spacing).ok_or_else(|| {
-            Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour]))
-        })?;
+        let nodes = surface::fit(curves.coefficients.view(), spacing)
+            .ok_or_else(|| Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour])))?;
         for coefficients in &nodes {
             let mut highest = 0.0f32;
             // Where the surface goes on beyond the pixels a curve could fall.
@@ -453,9 +439,7 @@ pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
             turns.push(turn);
         }
     }
-    Ok(PerPixel::new(
-        height, width, spacing, INTERVALS, &levels, &turns,
-    )?)
+    Ok(PerPixel::new(height, width, spacing, INTERVALS, &levels, &turns)?)
 }
 
 /// The levels of the knots' phases by a node's curve, and the phase from which 0 is nearer than its end.
@@ -553,16 +537,14 @@ pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
     }
 }
 
-/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: for each pixel the level of each of 256 phase steps.
-/// Pixels without a curve have those of `table`.
+/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: for each pixel the level of each of 256
+/// phase steps. Pixels without a curve have those of `table`.
 ///
 /// # Errors
 /// What writing refuses.
 pub fn write_full(curves: &Curves, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
     let (height, width) = curves.shape();
-    let mut header = format!(
-        "{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}"
-    );
+    let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}");
     // Magic, version and length are 10 bytes; the whole is a multiple of 64 and ends with a line break.
     let padding = (10 + header.len() + 1).next_multiple_of(64) - (10 + header.len() + 1);
     header.push_str(&" ".repeat(padding));

@@ -71,9 +71,7 @@ impl Registration {
         let quarter = pattern.square() as f64 / 4.0;
         let brightness = |[x, y]: [f64; 2]| registration.mean(photograph, x, y, quarter);
         let bright: [f32; 4] = pattern.marks().map(brightness);
-        let ring = pattern
-            .marks()
-            .map(|[x, y]| brightness([x, y - 3.0 * quarter]));
+        let ring = pattern.marks().map(|[x, y]| brightness([x, y - 3.0 * quarter]));
         let light = |i: usize| bright[i] / ring[i].max(f32::MIN_POSITIVE);
         let corners = ["top left", "top right", "bottom left", "bottom right"];
         let holed = (0..4).max_by(|a, b| light(*a).total_cmp(&light(*b)));
@@ -121,29 +119,23 @@ impl Registration {
     }
 
     /// `photograph` on the modulator's pixels, (H, W), the mean over each, as parts of the sensor's range.
-    pub fn resample(
-        &self,
-        photograph: &Photograph,
-        (height, width): (usize, usize),
-    ) -> Array2<f32> {
+    pub fn resample(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
         let n = self.zoom.ceil().clamp(1.0, 8.0) as usize;
         let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
         let scale = 1.0 / (f32::from(photograph.full) * (n * n) as f32);
         let mut out = Array2::zeros((height, width));
         let rows = out.as_slice_mut().expect("standard layout");
-        rows.par_chunks_exact_mut(width)
-            .enumerate()
-            .for_each(|(y, row)| {
-                for (x, value) in row.iter_mut().enumerate() {
-                    for i in 0..n {
-                        for j in 0..n {
-                            let [u, v] = self.map.map([x as f64 + at(i), y as f64 + at(j)]);
-                            *value += photograph.sample(u, v);
-                        }
+        rows.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        let [u, v] = self.map.map([x as f64 + at(i), y as f64 + at(j)]);
+                        *value += photograph.sample(u, v);
                     }
-                    *value *= scale;
                 }
-            });
+                *value *= scale;
+            }
+        });
         out
     }
 
@@ -154,15 +146,10 @@ impl Registration {
         let mut values = Vec::new();
         for i in 0..=100 {
             let t = f64::from(i) / 100.0;
-            for point in [
-                [t * w, -out],
-                [t * w, h + out],
-                [-out, t * h],
-                [w + out, t * h],
-            ] {
+            for point in [[t * w, -out], [t * w, h + out], [-out, t * h], [w + out, t * h]] {
                 let [u, v] = self.map.map(point);
-                let inside = (0.0..photograph.width as f64).contains(&u)
-                    && (0.0..photograph.height as f64).contains(&v);
+                let inside =
+                    (0.0..photograph.width as f64).contains(&u) && (0.0..photograph.height as f64).contains(&v);
                 if inside {
                     values.push(photograph.sample(u, v) / f32::from(photograph.full));
                 }
@@ -181,10 +168,7 @@ struct Spot {
 }
 
 /// The centres of the four marks' dark squares, to a part of a pixel.
-fn find_marks(
-    photograph: &Photograph,
-    pattern: &Pattern,
-) -> std::result::Result<[[f64; 2]; 4], NoMarks> {
+fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<[[f64; 2]; 4], NoMarks> {
     let widest = photograph.width as f64 / pattern.shape().1 as f64;
     let side = widest * pattern.square() as f64;
     let factor = ((side / 14.0) as usize).max(1);
@@ -205,12 +189,8 @@ fn find_marks(
     let spots: Vec<_> = spots(&is_dark, height, width)
         .into_iter()
         .filter(|spot| {
-            let (w, h) = (
-                (spot.x[1] + 1 - spot.x[0]) as f64,
-                (spot.y[1] + 1 - spot.y[0]) as f64,
-            );
-            let inside =
-                spot.x[0] > 0 && spot.y[0] > 0 && spot.x[1] + 1 < width && spot.y[1] + 1 < height;
+            let (w, h) = ((spot.x[1] + 1 - spot.x[0]) as f64, (spot.y[1] + 1 - spot.y[0]) as f64);
+            let inside = spot.x[0] > 0 && spot.y[0] > 0 && spot.x[1] + 1 < width && spot.y[1] + 1 < height;
             inside
                 && is_framed(spot, &small, width, floor)
                 && (0.3 * side..1.4 * side).contains(&w.max(h))
@@ -240,19 +220,15 @@ fn find_marks(
         return Err(NoMarks::Count(distinct));
     }
     let areas = marks.map(|s| (s.x[1] + 1 - s.x[0]) * (s.y[1] + 1 - s.y[0]));
-    let (least, largest) = areas
-        .iter()
-        .fold((usize::MAX, 0), |(l, m), a| (l.min(*a), m.max(*a)));
+    let (least, largest) = areas.iter().fold((usize::MAX, 0), |(l, m), a| (l.min(*a), m.max(*a)));
     if largest > 3 * least {
-        return Err(NoMarks::Count(
-            areas.iter().filter(|a| 3 * **a >= largest).count(),
-        ));
+        return Err(NoMarks::Count(areas.iter().filter(|a| 3 * **a >= largest).count()));
     }
     Ok(marks.map(|spot| centre(photograph, spot, factor)))
 }
 
-/// Whether a spot has a bright frame: beyond each of its sides a band of a quarter of its size is brighter in the mean than half of
-/// what is in it, by far. Single pixels would not do: the frame is grainy, and a hole is bright.
+/// Whether a spot has a bright frame: beyond each of its sides a band of a quarter of its size is brighter in the mean
+/// than half of what is in it, by far. Single pixels would not do: the frame is grainy, and a hole is bright.
 fn is_framed(spot: &Spot, small: &[f32], width: usize, floor: f32) -> bool {
     let height = small.len() / width;
     let ([left, right], [top, bottom]) = (spot.x, spot.y);
@@ -334,9 +310,7 @@ fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Ve
     let along = |from: &[f32], length: usize, step: usize, start: usize, to: &mut [f32]| {
         for i in 0..length {
             let near = i.saturating_sub(radius)..(i + radius + 1).min(length);
-            to[start + i * step] = near
-                .map(|j| from[start + j * step])
-                .fold(f32::NEG_INFINITY, f32::max);
+            to[start + i * step] = near.map(|j| from[start + j * step]).fold(f32::NEG_INFINITY, f32::max);
         }
     };
     let mut rows = vec![0.0; plane.len()];
@@ -396,8 +370,7 @@ fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
 /// # Errors
 /// Marks that are not there, or not upright.
 pub fn register(photograph: &Photograph, pattern: &Pattern) -> Result<Registration> {
-    Registration::find(photograph, pattern)
-        .map_err(|e| crate::Error::Input(format!("the photograph {e}")))
+    Registration::find(photograph, pattern).map_err(|e| crate::Error::Input(format!("the photograph {e}")))
 }
 
 #[cfg(test)]
@@ -419,15 +392,13 @@ mod tests {
         .map(|(seed, (size, zoom))| {
             let display = Display::from_toml(size).unwrap();
             let pattern = Pattern::new(display.height(), display.width()).unwrap();
-            (
-                SimulatedDisplay::new(&display, zoom, seed as u64).unwrap(),
-                pattern,
-            )
+            (SimulatedDisplay::new(&display, zoom, seed as u64).unwrap(), pattern)
         })
         .collect()
     }
 
-    /// In some patterns, dark ones and bright ones, in all three colours; those in which red is darkest are the hardest.
+    /// In some patterns, dark ones and bright ones, in all three colours; those in which red is darkest are the
+    /// hardest.
     #[test]
     fn marks_are_found_to_a_part_of_a_pixel_and_codes_are_read() {
         for (display, pattern) in displays() {
@@ -455,9 +426,7 @@ mod tests {
     #[test]
     fn turned_and_empty_pictures_are_told() {
         let (display, pattern) = displays().remove(0);
-        let mut photo = display
-            .photograph(pattern.frame(0).view(), 1, 0.0, 0)
-            .unwrap();
+        let mut photo = display.photograph(pattern.frame(0).view(), 1, 0.0, 0).unwrap();
         photo.values.reverse();
         let told = Registration::find(&photo, &pattern).unwrap_err();
         assert_eq!(told, NoMarks::Turned("bottom right"));

@@ -3,10 +3,10 @@
 //! the cell's light is |1 + exp(iφₖ)|²/4.
 //!
 //! Every pattern carries what tells where it lies in a photograph and which one it is, whatever k: in each corner a
-//! dark square in a bright frame (the one at the top left has a bright hole), and beside the top left one
-//! ten dark or bright cells: one always dark, the eight bits of k (dark is 1, the highest first), and their parity.
-//! Dark is the checkerboard of level 0 and one that turns by about π: [`DARK`] does from 0.8·2π to 1.5·2π, another must be
-//! given for ranges beyond.
+//! dark square in a bright frame (the one at the top left has a bright hole), and beside the top left one ten dark or
+//! bright cells: one always dark, the eight bits of k (dark is 1, the highest first), and their parity. Dark is the
+//! checkerboard of level 0 and one that turns by about π: [`DARK`] does from 0.8·2π to 1.5·2π, another must be given
+//! for ranges beyond.
 
 use crate::error::{Error, Result};
 use ndarray::Array2;
@@ -68,12 +68,7 @@ impl Pattern {
     /// The centres (x, y) of the marks: top left, top right, bottom left, bottom right.
     pub fn marks(&self) -> [[f64; 2]; 4] {
         let (near, w, h) = (self.mark as f64, self.width as f64, self.height as f64);
-        [
-            [near, near],
-            [w - near, near],
-            [near, h - near],
-            [w - near, h - near],
-        ]
+        [[near, near], [w - near, near], [near, h - near], [w - near, h - near]]
     }
 
     /// The centres (x, y) of the code's cells, and of the bright places before, between and after them.
@@ -98,18 +93,10 @@ impl Pattern {
         let outside = |top: usize, left: usize, height: usize, width: usize| {
             beyond(y, top, top + height) || beyond(x, left, left + width)
         };
-        let (bottom, right) = (
-            self.height - inset - self.mark,
-            self.width - inset - self.mark,
-        );
-        [
-            (inset, inset),
-            (inset, right),
-            (bottom, inset),
-            (bottom, right),
-        ]
-        .into_iter()
-        .all(|(top, left)| outside(top, left, self.mark, self.mark))
+        let (bottom, right) = (self.height - inset - self.mark, self.width - inset - self.mark);
+        [(inset, inset), (inset, right), (bottom, inset), (bottom, right)]
+            .into_iter()
+            .all(|(top, left)| outside(top, left, self.mark, self.mark))
             && outside(inset, inset + self.mark, self.mark / 2, 11 * self.mark / 2)
     }
 
@@ -129,19 +116,13 @@ impl Pattern {
         let (m, inset) = (self.mark, self.mark / 2);
         let within = |n: usize, from: usize, length: usize| (from..from + length).contains(&n);
         let (bottom, right) = (self.height - inset - m, self.width - inset - m);
-        for (corner, (top, left)) in [
-            (inset, inset),
-            (inset, right),
-            (bottom, inset),
-            (bottom, right),
-        ]
-        .into_iter()
-        .enumerate()
+        for (corner, (top, left)) in [(inset, inset), (inset, right), (bottom, inset), (bottom, right)]
+            .into_iter()
+            .enumerate()
         {
             if within(y, top, m) && within(x, left, m) {
-                let square = |side: usize| {
-                    within(y, top + (m - side) / 2, side) && within(x, left + (m - side) / 2, side)
-                };
+                let square =
+                    |side: usize| within(y, top + (m - side) / 2, side) && within(x, left + (m - side) / 2, side);
                 return Some(square(m / 2) && !(corner == 0 && square(m / 4)));
             }
         }

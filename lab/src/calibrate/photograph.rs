@@ -53,8 +53,7 @@ impl Photograph {
             let values = every(bytes, channels, colour, u16::from);
             (values, 255)
         };
-        let sixteen =
-            |words: Vec<u16>, channels: usize| (every(words, channels, colour, |v| v), 65535);
+        let sixteen = |words: Vec<u16>, channels: usize| (every(words, channels, colour, |v| v), 65535);
         let (values, full) = match image {
             DynamicImage::ImageLuma8(i) => eight(i.into_raw(), 1),
             DynamicImage::ImageLumaA8(i) => eight(i.into_raw(), 2),
@@ -75,15 +74,11 @@ impl Photograph {
     }
 
     fn read_tiff(path: &Path, colour: usize) -> Result<Self> {
-        let file =
-            File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        let broken =
-            |e: tiff::TiffError| Error::file(path, format!("is not a whole TIFF image: {e}"));
+        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+        let broken = |e: tiff::TiffError| Error::file(path, format!("is not a whole TIFF image: {e}"));
         let mut limits = Limits::default();
         limits.decoding_buffer_size = 8 * MOST_PIXELS as usize;
-        let mut decoder = Decoder::new(BufReader::new(file))
-            .map_err(broken)?
-            .with_limits(limits);
+        let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?.with_limits(limits);
         let (width, height) = decoder.dimensions().map_err(broken)?;
         let colours = decoder.colortype().map_err(broken)?;
         let channels = match colours {
@@ -204,9 +199,7 @@ mod tests {
     use super::*;
 
     fn ramp(full: u16) -> Photograph {
-        let values = (0..12 * 9)
-            .map(|i| (i * 331 % 256) * (full / 255))
-            .collect();
+        let values = (0..12 * 9).map(|i| (i * 331 % 256) * (full / 255)).collect();
         Photograph {
             height: 9,
             width: 12,
@@ -245,12 +238,7 @@ mod tests {
         let green = Photograph::read(&colour, 1).unwrap();
         assert_eq!((green.values[0], green.values[1], green.full), (1, 4, 255));
         std::fs::write(&grey, b"II*\0 and nothing more").unwrap();
-        assert!(
-            Photograph::read(&grey, 0)
-                .unwrap_err()
-                .to_string()
-                .contains("g.tif")
-        );
+        assert!(Photograph::read(&grey, 0).unwrap_err().to_string().contains("g.tif"));
     }
 
     #[test]

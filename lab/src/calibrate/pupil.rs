@@ -1,8 +1,8 @@
 //! How sharp a spot is by what is left of its aberration, and what was left of it by how sharp spots were.
 //!
 //! The light in the focus is the Fourier transform of the pupil, exp(i·terms) over ρ ≤ 1, and sharpness is ΣI² over
-//! (ΣI)². From one photograph alone no sign can be told; but those of a search differ by steps that are known, focus among
-//! them, so that one aberration explains them all. [`explain`](Pupil::explain) finds it by Levenberg and
+//! (ΣI)². From one photograph alone no sign can be told; but those of a search differ by steps that are known, focus
+//! among them, so that one aberration explains them all. [`explain`](Pupil::explain) finds it by Levenberg and
 //! Marquardt's method, the scale of sharpness with it, which pixels and stray light decide.
 
 use ndarray::Array2;
@@ -74,7 +74,8 @@ impl Pupil {
         pupil
     }
 
-    /// How sharp the spot of a pupil with the terms `left` is, 1 without any; and how fast that changes with each of them.
+    /// How sharp the spot of a pupil with the terms `left` is, 1 without any; and how fast that changes with each of
+    /// them.
     fn sharpness(&self, left: &Coefficients, scratch: &mut Scratch) -> (f64, Coefficients) {
         let a = left.map(|a| a as f32);
         let mut plane = vec![Complex32::ZERO; PUPIL * PUPIL];
@@ -83,11 +84,7 @@ impl Pupil {
             let (sin, cos) = phase.sin_cos();
             plane[*at] = Complex32::new(cos, sin);
         }
-        let Scratch {
-            rows,
-            columns,
-            work,
-        } = scratch;
+        let Scratch { rows, columns, work } = scratch;
         self.fft.rows_forward(&plane, rows, work);
         self.fft.spectrum(rows, columns, |_, _, _| {}, work);
         // ΣI² = Σ|F|⁴; |F|²F brought back says how each sample of the pupil changes it.
@@ -108,7 +105,8 @@ impl Pupil {
         (sum / self.sharpest, slopes.map(|s| s / self.sharpest))
     }
 
-    /// The correction that explains `spots` best, of those that are found from each of `starts`. None where no spot has light.
+    /// The correction that explains `spots` best, of those that are found from each of `starts`. None where no spot has
+    /// light.
     pub fn explain(&self, spots: &[Spot], starts: &[Coefficients]) -> Option<Explained> {
         if spots.iter().all(|(_, sharp)| *sharp <= 0.0) {
             return None;
@@ -118,14 +116,9 @@ impl Pupil {
             .min_by(|a, b| a.residual.total_cmp(&b.residual))
     }
 
-    /// What each spot leaves by `correction`, at the scale that leaves least, and how fast that changes with its terms, the
-    /// scale following.
-    fn residuals(
-        &self,
-        spots: &[Spot],
-        correction: &Coefficients,
-        scratch: &mut Scratch,
-    ) -> (Vec<f64>, Array2<f64>) {
+    /// What each spot leaves by `correction`, at the scale that leaves least, and how fast that changes with its terms,
+    /// the scale following.
+    fn residuals(&self, spots: &[Spot], correction: &Coefficients, scratch: &mut Scratch) -> (Vec<f64>, Array2<f64>) {
         let mut models = Vec::with_capacity(spots.len());
         for (shown, _) in spots {
             let left = std::array::from_fn(|j| shown[j] - correction[j]);
@@ -135,8 +128,7 @@ impl Pupil {
         let product = models.iter().zip(spots).map(|((m, _), (_, s))| m * s);
         let scale = product.sum::<f64>() / own;
         let left = (models.iter().zip(spots)).map(|((m, _), (_, s))| s - scale * m);
-        let mut slopes =
-            Array2::from_shape_fn((spots.len(), TERMS), |(i, j)| scale * models[i].1[j]);
+        let mut slopes = Array2::from_shape_fn((spots.len(), TERMS), |(i, j)| scale * models[i].1[j]);
         for mut column in slopes.columns_mut() {
             let along: f64 = column.iter().zip(&models).map(|(c, (m, _))| c * m).sum();
             for (c, (m, _)) in column.iter_mut().zip(&models) {
@@ -214,9 +206,7 @@ mod tests {
             let plane = Array2::from_shape_fn((PLANE, PLANE), |(i, j)| {
                 let inside = i < PUPIL && j < PUPIL && at(i).powi(2) + at(j).powi(2) <= 1.0;
                 match inside {
-                    true => {
-                        num_complex::Complex64::from_polar(1.0, zernike::terms(a, at(j), at(i)))
-                    }
+                    true => num_complex::Complex64::from_polar(1.0, zernike::terms(a, at(j), at(i))),
                     false => num_complex::Complex64::ZERO,
                 }
             });

@@ -71,16 +71,12 @@ pub struct Outcome {
     pub photographs: usize,
 }
 
-/// Calibrates a simulated display into `folder`: the four files of a calibration, `outcome.json`, pictures and drawings.
-/// `progress` hears of the photographs and rows done, of all.
+/// Calibrates a simulated display into `folder`: the four files of a calibration, `outcome.json`, pictures and
+/// drawings. `progress` hears of the photographs and rows done, of all.
 ///
 /// # Errors
 /// A display too small for marks or whose sub-hologram does not fit; files that cannot be written.
-pub fn run(
-    rehearsal: &Rehearsal,
-    folder: &Path,
-    progress: &dyn Fn(usize, usize),
-) -> Result<Outcome> {
+pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)) -> Result<Outcome> {
     let display = &rehearsal.display;
     let stage = Stage {
         rehearsal,
@@ -181,14 +177,10 @@ impl Stage<'_> {
             let measured = lut::measure(&self.pattern, colour, &source, self.folder, &done);
             curves.push(measured.map_err(|refusal| match refusal {
                 Refusal::Other(e) => e,
-                Refusal::Problems(all) => {
-                    Error::Input(all.first().map_or_else(String::new, ToString::to_string))
-                }
+                Refusal::Problems(all) => Error::Input(all.first().map_or_else(String::new, ToString::to_string)),
             })?);
         }
-        curves
-            .try_into()
-            .map_err(|_| Error::Input("three colours".into()))
+        curves.try_into().map_err(|_| Error::Input("three colours".into()))
     }
 
     /// The laser's light, from a photograph of a diffuser a colour.
@@ -198,8 +190,7 @@ impl Stage<'_> {
         let frame = self.pattern.frame(0);
         let mut maps = Vec::new();
         for colour in 0..COLOURS.len() {
-            let marked =
-                (self.simulated).photograph(frame.view(), colour, display.offset_m(), 0)?;
+            let marked = (self.simulated).photograph(frame.view(), colour, display.offset_m(), 0)?;
             let registration = marks::register(&marked, &self.pattern)?;
             let photo = self.simulated.photograph_diffuser(colour, 1 << 20)?;
             if let Some(captures) = self.captures(colour) {
@@ -216,9 +207,7 @@ impl Stage<'_> {
     /// Searched on a focused spot: of the same lens for all colours, as path; its phase goes with 1/λ.
     fn aberrations(&self, calibrated: &Response) -> Result<Aberrations> {
         let Rehearsal {
-            display,
-            spot_z_m: z_m,
-            ..
+            display, spot_z_m: z_m, ..
         } = self.rehearsal;
         let mut dice = Dice::new(self.rehearsal.seed ^ 0xab);
         let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
@@ -331,12 +320,7 @@ impl Stage<'_> {
         })
     }
 
-    fn pictures(
-        &self,
-        calibrated: &Response,
-        laser_map: &Array3<f32>,
-        spots: &[Photograph; 2],
-    ) -> Result<()> {
+    fn pictures(&self, calibrated: &Response, laser_map: &Array3<f32>, spots: &[Photograph; 2]) -> Result<()> {
         let (folder, display) = (self.folder, &self.rehearsal.display);
         let side = (24.0 * self.rehearsal.zoom) as usize;
         let cropped = spots.each_ref().map(|photo| crop(photo, side));
@@ -346,8 +330,7 @@ impl Stage<'_> {
         black_pictures(&self.simulated, &factory, calibrated, folder)?;
         for k in [0usize, 128] {
             let frame = self.pattern.frame(k as u8);
-            let photo =
-                (self.simulated).photograph(frame.view(), 1, display.offset_m(), k as u64)?;
+            let photo = (self.simulated).photograph(frame.view(), 1, display.offset_m(), k as u64)?;
             photo.write(&folder.join(format!("capture_{k:03}.png")))?;
         }
         Ok(())
@@ -370,9 +353,7 @@ fn write_display(path: &Path, display: &Display) -> Result<()> {
     for (key, value) in values.as_object().into_iter().flatten() {
         text.push_str(&format!("{key} = {value}\n"));
     }
-    text.push_str(
-        "per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n",
-    );
+    text.push_str("per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n");
     files::write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
@@ -382,8 +363,7 @@ pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: us
     let (mut square, mut count) = (0.0, 0.0);
     for y in 0..h {
         for x in 0..w {
-            let curve: [f64; LEVELS] =
-                std::array::from_fn(|level| simulated.phase(colour, y, x, level as f64));
+            let curve: [f64; LEVELS] = std::array::from_fn(|level| simulated.phase(colour, y, x, level as f64));
             for step in 0..64 {
                 let phase = f64::from(step) / 64.0 * TAU;
                 if phase > curve[LEVELS - 1] {
@@ -400,12 +380,7 @@ pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: us
 }
 
 /// Levels, (H, W), of a double phase of `half` and −`half`.
-fn checkerboard(
-    simulated: &SimulatedDisplay,
-    response: &Response,
-    colour: usize,
-    half: f32,
-) -> Array2<u8> {
+fn checkerboard(simulated: &SimulatedDisplay, response: &Response, colour: usize, half: f32) -> Array2<u8> {
     let (h, w) = (simulated.display().height(), simulated.display().width());
     Array2::from_shape_fn((h, w), |(y, x)| {
         let phase = if (x + y) % 2 == 0 {
@@ -421,27 +396,21 @@ fn checkerboard(
 ///
 /// # Errors
 /// None that a simulated display meets.
-pub fn black_level(
-    simulated: &SimulatedDisplay,
-    response: &Response,
-    colour: usize,
-) -> Result<f64> {
+pub fn black_level(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> Result<f64> {
     let z_m = simulated.display().offset_m();
     let mean = |half: f32| -> Result<f64> {
         let levels = checkerboard(simulated, response, colour, half);
         let light = simulated.intensity(levels.view(), colour, z_m)?;
         let (h, w) = light.dim();
-        let inner = light.slice(s![
-            16.min(h / 4)..h - 16.min(h / 4),
-            16.min(w / 4)..w - 16.min(w / 4)
-        ]);
+        let inner = light.slice(s![16.min(h / 4)..h - 16.min(h / 4), 16.min(w / 4)..w - 16.min(w / 4)]);
         Ok(f64::from(inner.mean().unwrap_or(0.0)))
     };
     // A phase of 0 exactly would be 2π for the one half.
     Ok(10.0 * (mean(std::f32::consts::FRAC_PI_2)? / mean(1e-3)?).log10())
 }
 
-/// Photographs of black side by side, by the factory's table and by the calibrated one, ten times as bright as white is shown.
+/// Photographs of black side by side, by the factory's table and by the calibrated one, ten times as bright as white is
+/// shown.
 fn black_pictures(
     simulated: &SimulatedDisplay,
     factory: &Response,
@@ -462,7 +431,8 @@ fn black_pictures(
     write_pair(&folder.join("black.png"), &photos?)
 }
 
-/// How much the light of a flat half grey differs over the frame, away from the rim: its standard deviation over its mean.
+/// How much the light of a flat half grey differs over the frame, away from the rim: its standard deviation over its
+/// mean.
 fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Result<f64> {
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
     // Where the laser is weakest the modulator must be able to make up for it.
@@ -481,9 +451,7 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
     let plane = levels.index_axis(Axis(0), colour);
     let light = simulated.intensity(plane, colour, simulated.display().offset_m())?;
     let (h, w) = light.dim();
-    let inner = light
-        .slice(s![h / 8..h - h / 8, w / 8..w - w / 8])
-        .mapv(f64::from);
+    let inner = light.slice(s![h / 8..h - h / 8, w / 8..w - w / 8]).mapv(f64::from);
     Ok(inner.std(0.0) / inner.mean().unwrap_or(1.0))
 }
 
@@ -495,9 +463,7 @@ fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) ->
         .flat_map(|colour| {
             let found = map.index_axis(Axis(0), colour).to_owned();
             let truth = Array2::from_shape_fn((rows, columns), |(i, j)| {
-                let at = |node: usize, n: usize, nodes: usize| {
-                    node as f64 * (n - 1) as f64 / (nodes - 1) as f64
-                };
+                let at = |node: usize, n: usize, nodes: usize| node as f64 * (n - 1) as f64 / (nodes - 1) as f64;
                 simulated.laser(colour, at(i, h, rows), at(j, w, columns)) as f32
             });
             let most = |a: &Array2<f32>| a.iter().copied().fold(0.0, f32::max);
@@ -514,13 +480,8 @@ fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) ->
             ]
         })
         .collect();
-    let (amplitudes, off): (Vec<_>, Vec<_>) =
-        maps.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
-    let all: Vec<Map> = amplitudes
-        .into_iter()
-        .chain(off)
-        .map(|(_, map)| map)
-        .collect();
+    let (amplitudes, off): (Vec<_>, Vec<_>) = maps.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
+    let all: Vec<Map> = amplitudes.into_iter().chain(off).map(|(_, map)| map).collect();
     chart::write_maps(&folder.join("laser.svg"), &all, 3)
 }
 

@@ -58,20 +58,11 @@ pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
         let (sum, count) = residuals.fold((0.0, 0.0), |(s, n), r| (s + f64::from(r * r), n + 1.0));
         ColourReport {
             colour: COLOURS[curves.colour],
-            range_turns: [
-                ranges[0],
-                ranges[ranges.len() / 2],
-                ranges[ranges.len() - 1],
-            ],
+            range_turns: [ranges[0], ranges[ranges.len() / 2], ranges[ranges.len() - 1]],
             under_two_pi: under as f64 / ranges.len() as f64,
             under_pi: curves.under_pi,
             silent_pixels: curves.silent.len(),
-            silent_at: curves
-                .silent
-                .iter()
-                .take(20)
-                .map(|(y, x)| [*x, *y])
-                .collect(),
+            silent_at: curves.silent.iter().take(20).map(|(y, x)| [*x, *y]).collect(),
             residual: (sum / f64::max(count, 1.0)).sqrt(),
             zoom: curves.zoom,
             errors_rad: lut::errors(curves, table),
@@ -164,16 +155,8 @@ pub fn draw(curves: &[Curves; 3], folder: &Path) -> Result<()> {
             y,
             curves,
         };
-        fits.push(panel(
-            format!("{name}: Eq. 12–13 (dots) and fits"),
-            "phase, rad",
-            lines,
-        ));
-        residuals.push(panel(
-            format!("{name}: Eq. 12–13 less the fit"),
-            "phase, rad",
-            left,
-        ));
+        fits.push(panel(format!("{name}: Eq. 12–13 (dots) and fits"), "phase, rad", lines));
+        residuals.push(panel(format!("{name}: Eq. 12–13 less the fit"), "phase, rad", left));
         let range = Array2::from_shape_fn(curves.shape(), |at| {
             curves.coefficients[at].last().copied().unwrap_or(f32::NAN) / TAU
         });

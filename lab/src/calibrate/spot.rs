@@ -1,10 +1,11 @@
 //! The coefficients of an aberration from photographs of a focused spot, by search.
 //!
 //! A sub-hologram (Eq. 19) focuses light to a distance; the camera stands focused there. Each round shows the best
-//! coefficients so far, and steps to either side of them along five directions that are at right angles and turned from round
-//! to round. [`super::pupil`] finds the aberration that explains how sharp all spots of all rounds were; the next round
-//! begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is sharpest. Directions mix
-//! the terms because sharpness is the same for a pupil and its mirror images: steps of one term at a time hardly tell them apart.
+//! coefficients so far, and steps to either side of them along five directions that are at right angles and turned from
+//! round to round. [`super::pupil`] finds the aberration that explains how sharp all spots of all rounds were; the next
+//! round begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is sharpest.
+//! Directions mix the terms because sharpness is the same for a pupil and its mirror images: steps of one term at a
+//! time hardly tell them apart.
 
 use super::photograph::{Photograph, SATURATED_SHARE};
 use super::pupil::{Pupil, Spot};
@@ -99,8 +100,7 @@ fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
     let mut directions = [[0.0; TERMS.len()]; TERMS.len()];
     for n in 0..TERMS.len() {
         let mut new: Coefficients = std::array::from_fn(|_| dice.range(-1.0, 1.0));
-        let dot =
-            |a: &Coefficients, b: &Coefficients| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let dot = |a: &Coefficients, b: &Coefficients| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         for before in &directions[..n] {
             let along = dot(&new, before);
             (new.iter_mut().zip(before)).for_each(|(v, b)| *v -= along * b);
@@ -114,18 +114,12 @@ fn directions(seed: u64) -> [Coefficients; TERMS.len()] {
 /// The middle of the frame, as a place of a spot.
 pub const MIDDLE: [f64; 2] = [0.5, 0.5];
 
-/// The levels of `target`, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by the
-/// correction `a`: the sub-hologram around there, double phase for the dark around it.
+/// The levels of `target`, (H, W), that focus one colour's light to `z_m` at `place` (x and y, parts of the frame) by
+/// the correction `a`: the sub-hologram around there, double phase for the dark around it.
 ///
 /// # Errors
 /// A z at the modulator, or so far from it that the sub-hologram does not fit.
-pub fn levels(
-    target: &Target,
-    colour: usize,
-    z_m: f64,
-    place: [f64; 2],
-    a: &Coefficients,
-) -> Result<Array2<u8>> {
+pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coefficients) -> Result<Array2<u8>> {
     let display = &target.display;
     let (height, width) = (display.height(), display.width());
     let (pitch_m, wavelength_m) = (display.pitch_m(), display.wavelengths_m()[colour]);
@@ -169,8 +163,7 @@ fn outside([x, y]: [f64; 2], side: usize) -> Error {
 pub fn sharpness(photograph: &Photograph, side: usize) -> Result<f64> {
     if photograph.saturated() > SATURATED_SHARE / 100.0 {
         return Err(Error::Input(
-            "its spot is saturated; shorten the exposure and photograph the whole round again"
-                .into(),
+            "its spot is saturated; shorten the exposure and photograph the whole round again".into(),
         ));
     }
     let mut sorted = photograph.values.clone();
@@ -218,8 +211,8 @@ fn brightest(photograph: &Photograph) -> (usize, usize) {
     best.1
 }
 
-/// The exposure at which a spot without aberration fills 0.7 of the sensor, where a flat phase would fill all at 1: the spot is
-/// brighter by the square of the sub-hologram's Fresnel number times π.
+/// The exposure at which a spot without aberration fills 0.7 of the sensor, where a flat phase would fill all at 1: the
+/// spot is brighter by the square of the sub-hologram's Fresnel number times π.
 pub fn exposure(display: &Display, colour: usize, z_m: f64) -> f64 {
     let distance_m = z_m - display.offset_m();
     let wavelength_m = display.wavelengths_m()[colour];
@@ -228,8 +221,8 @@ pub fn exposure(display: &Display, colour: usize, z_m: f64) -> f64 {
     0.7 / (gain * gain).max(1.0)
 }
 
-/// Side of the square in which [`sharpness`] looks, pixels of a photograph that shows each of the modulator's with `zoom` of
-/// its own: the reach of aberrations that the search can find.
+/// Side of the square in which [`sharpness`] looks, pixels of a photograph that shows each of the modulator's with
+/// `zoom` of its own: the reach of aberrations that the search can find.
 pub fn window(zoom: f64) -> usize {
     (32.0 * zoom) as usize
 }
@@ -314,9 +307,7 @@ mod tests {
                     .map(|(i, trial)| {
                         let levels = levels(&target, colour, z_m, MIDDLE, trial).unwrap();
                         let shot = (search.round * TRIALS + i) as u64;
-                        let photo = simulated
-                            .photograph(levels.view(), colour, z_m, shot)
-                            .unwrap();
+                        let photo = simulated.photograph(levels.view(), colour, z_m, shot).unwrap();
                         sharpness(&photo, window(2.0)).unwrap()
                     })
                     .collect();
@@ -336,19 +327,9 @@ mod tests {
             values: (0..1600).map(|i| 100 + i * 7 % 13).collect(),
             full: 65535,
         };
-        assert!(
-            sharpness(&p, 20)
-                .unwrap_err()
-                .to_string()
-                .contains("no spot")
-        );
+        assert!(sharpness(&p, 20).unwrap_err().to_string().contains("no spot"));
         p.values[820] = 65535;
-        assert!(
-            sharpness(&p, 20)
-                .unwrap_err()
-                .to_string()
-                .contains("saturated")
-        );
+        assert!(sharpness(&p, 20).unwrap_err().to_string().contains("saturated"));
         p.values[820] = 60000;
         assert!(sharpness(&p, 20).unwrap() > 0.9);
     }

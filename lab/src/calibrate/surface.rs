@@ -1,5 +1,5 @@
-//! A smooth surface through what single pixels gave, at the nodes of a coarse grid: bilinear between nodes, nearest in the
-//! least squares to the pixels that gave something, with a penalty on its bending energy.
+//! A smooth surface through what single pixels gave, at the nodes of a coarse grid: bilinear between nodes, nearest in
+//! the least squares to the pixels that gave something, with a penalty on its bending energy.
 //!
 //! Nodes that stand in a hole (a mark, dust) or beyond the last pixel are where the surface bends least, which goes on
 //! with the slope around them.
@@ -13,12 +13,9 @@ const STIFFNESS: f64 = 1.0;
 /// Residual at which a surface is solved, as a part of the first one.
 const SOLVED: f64 = 1e-7;
 
-/// The values at the nodes every `spacing` pixels of the surfaces through the N numbers of each pixel of `seen`, NaN where a pixel
-/// gave none. None where none did.
-pub fn fit<const N: usize>(
-    seen: ArrayView2<'_, [f32; N]>,
-    spacing: usize,
-) -> Option<Array2<[f32; N]>> {
+/// The values at the nodes every `spacing` pixels of the surfaces through the N numbers of each pixel of `seen`, NaN
+/// where a pixel gave none. None where none did.
+pub fn fit<const N: usize>(seen: ArrayView2<'_, [f32; N]>, spacing: usize) -> Option<Array2<[f32; N]>> {
     let (height, width) = seen.dim();
     let shape = per_pixel::nodes(height, width, spacing);
     let system = System::of(seen, shape, spacing);
@@ -45,11 +42,7 @@ struct System {
 }
 
 impl System {
-    fn of<const N: usize>(
-        seen: ArrayView2<'_, [f32; N]>,
-        shape: (usize, usize),
-        spacing: usize,
-    ) -> Self {
+    fn of<const N: usize>(seen: ArrayView2<'_, [f32; N]>, shape: (usize, usize), spacing: usize) -> Self {
         let height = seen.nrows();
         let (rows, columns) = shape;
         const AROUND: usize = 9;
@@ -104,11 +97,7 @@ impl System {
             for j in 0..columns {
                 let around = self.gram.slice(ndarray::s![i, j, ..]);
                 let mut sum = 0.0;
-                for (n, share) in around
-                    .iter()
-                    .enumerate()
-                    .filter(|(_, share)| **share != 0.0)
-                {
+                for (n, share) in around.iter().enumerate().filter(|(_, share)| **share != 0.0) {
                     sum += share * from[(i + n / 3 - 1) * columns + j + n % 3 - 1];
                 }
                 to[i * columns + j] += sum;
@@ -142,12 +131,7 @@ impl System {
 
     /// The nodes of number `n`, by conjugate gradients.
     fn solve(&self, n: usize) -> Vec<f64> {
-        let right: Vec<f64> = self
-            .right
-            .slice(ndarray::s![.., .., n])
-            .iter()
-            .copied()
-            .collect();
+        let right: Vec<f64> = self.right.slice(ndarray::s![.., .., n]).iter().copied().collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         // From their mean on.
         let mean = right.iter().sum::<f64>() / self.pixels;

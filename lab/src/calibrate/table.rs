@@ -2,8 +2,8 @@
 //! aberrations.
 //!
 //! * The table is [`phasefront::unstable::slm::per_pixel`]'s bytes.
-//! * The laser map is an RGB PNG of 8 or 16 bits: the laser's amplitude at nodes spread evenly from the first to the last
-//!   pixel of each axis, each colour of any scale.
+//! * The laser map is an RGB PNG of 8 or 16 bits: the laser's amplitude at nodes spread evenly from the first to the
+//!   last pixel of each axis, each colour of any scale.
 //! * Aberrations are TOML, one `[[at]]` a calibrated distance, z ascending, with the coefficients a₃ to a₇ of the
 //!   correction in radians; `x` and `y`, from 0 to 1 over the frame, where they differ over it:
 //!
@@ -31,8 +31,7 @@ use std::path::Path;
 /// # Errors
 /// A file that is missing or no such table.
 pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
-    let bytes =
-        std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     PerPixel::from_bytes(&bytes).map_err(|e| Error::file(path, e))
 }
 
@@ -54,10 +53,7 @@ pub fn read_laser(path: &Path) -> Result<Illumination> {
         .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?
         .decode()
         .map_err(|e| Error::file(path, format!("is not a whole PNG image: {e}")))?;
-    if !matches!(
-        image,
-        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgb16(_)
-    ) {
+    if !matches!(image, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgb16(_)) {
         return Err(Error::file(
             path,
             format!("holds {:?} pixels; a laser map is RGB", image.color()),
@@ -66,9 +62,7 @@ pub fn read_laser(path: &Path) -> Result<Illumination> {
     let image = image.into_rgb32f();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = image.into_raw();
-    let amplitude = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-        pixels[3 * (y * width + x) + c]
-    });
+    let amplitude = Array3::from_shape_fn((3, height, width), |(c, y, x)| pixels[3 * (y * width + x) + c]);
     Illumination::new(amplitude.view()).map_err(|e| Error::file(path, e))
 }
 
@@ -185,10 +179,9 @@ impl AberrationFile {
 /// # Errors
 /// A file that is missing, or not of this kind.
 pub fn read_entries(path: &Path) -> Result<Vec<Entry>> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-    let parsed: AberrationToml = toml::from_str(&text)
-        .map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let parsed: AberrationToml =
+        toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
     Ok(parsed.at)
 }
 
@@ -207,16 +200,12 @@ pub fn read_aberrations(path: &Path) -> Result<AberrationFile> {
 pub fn aberrations(entries: &[Entry]) -> Result<AberrationFile> {
     let placed = entries.iter().filter(|e| e.x.is_some() && e.y.is_some());
     if placed.count() == 0 && entries.iter().all(|e| e.x.is_none() && e.y.is_none()) {
-        let at: phasefront::Result<Vec<_>> = (entries.iter())
-            .map(|e| Ok((e.z_mm / 1e3, e.aberration()?)))
-            .collect();
+        let at: phasefront::Result<Vec<_>> = (entries.iter()).map(|e| Ok((e.z_mm / 1e3, e.aberration()?))).collect();
         return Ok(AberrationFile::Uniform(Aberrations::new(at?)?));
     }
     let points: Option<Vec<_>> = entries.iter().map(|e| Some(([e.x?, e.y?], e))).collect();
     let points = points.ok_or_else(|| {
-        Error::Input(
-            "some places have x and y and some have not; give both to all or to none".into(),
-        )
+        Error::Input("some places have x and y and some have not; give both to all or to none".into())
     })?;
     let mut places: Vec<(_, Vec<(f64, Aberration)>)> = Vec::new();
     for (place, entry) in points {
@@ -247,11 +236,7 @@ pub fn write_aberrations(path: &Path, entries: &[Entry]) -> Result<()> {
                 text.push_str(&format!("{name} = {place:?}\n"));
             }
         }
-        for (name, a) in [
-            ("red", entry.red),
-            ("green", entry.green),
-            ("blue", entry.blue),
-        ] {
+        for (name, a) in [("red", entry.red), ("green", entry.green), ("blue", entry.blue)] {
             text.push_str(&format!("{name} = {a:?}\n"));
         }
         text.push('\n');
@@ -325,11 +310,6 @@ mod tests {
             assert!(e.contains(word), "{e}");
         }
         std::fs::write(&path, "[[at]]\nz_mm = 0\npink = [1]").unwrap();
-        assert!(
-            read_aberrations(&path)
-                .unwrap_err()
-                .to_string()
-                .contains("pink")
-        );
+        assert!(read_aberrations(&path).unwrap_err().to_string().contains("pink"));
     }
 }

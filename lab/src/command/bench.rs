@@ -70,67 +70,72 @@ impl Bench {
         {
             return Err(Error::file(path, "the name must end in .svg"));
         }
-        let file = self.display.read()?;
-        let target = file.target;
-        let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, Precision::Float32)?),
-            None => None,
-        };
+        let target = self.display.read()?.target;
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
-        let mut methods: Vec<_> = match &self.network {
-            Some(file) => vec![Method::trained(models::network(file, Precision::Float32)?)],
-            None => (self.come_along().into_iter())
-                .map(Method::trained)
-                .collect(),
-        };
-        if self.network.is_none() && self.layers.is_none_or(|layers| layers == 0) {
+        let device = self.backend.device()?;
+        let methods = self.methods(&target, device.is_some())?;
+        let sizes = self
+            .size
+            .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| vec![size]);
+        match device {
+            Some(options) => self.on_gpu(&methods, &sizes, &target, &options, budget, json),
+            None => self.on_cpu(&methods, &sizes, &target, threads, budget, json),
+        }
+    }
+
+    /// What is asked for, or all that comes along.
+    fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
+        if let Some(file) = &self.network {
+            let network = models::network(file, Precision::Float32)?;
+            return Ok(vec![Method::trained(network)]);
+        }
+        let mut methods: Vec<_> = (self.come_along().into_iter()).map(Method::trained).collect();
+        if self.layers.is_none_or(|layers| layers == 0) {
             methods.push(Method::Sweep(Sweep::for_display(&target.display)));
         }
-        let device = self.backend.device()?;
         // What a GPU is judged by, unless it comes along.
-        let made = match self.layers {
+        let random = match self.layers {
             Some(layers) => Some(layers).filter(|&layers| layers > 0),
-            None => device.is_some().then_some(DEEPEST),
+            None => on_gpu.then_some(DEEPEST),
         };
-        if let Some(layers) = made
-            && self.network.is_none()
-            && self
-                .precision
-                .is_none_or(|p| p.precision() == Precision::Float32)
+        if let Some(layers) = random
+            && (self.precision).is_none_or(|p| p.precision() == Precision::Float32)
             && methods.is_empty()
         {
             methods.push(Method::Network(bench::random::network(layers)?));
         }
         if methods.is_empty() {
             return Err(Error::Input(
-                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do".into(),
+                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do"
+                    .into(),
             ));
         }
-        let sizes = self
-            .size
-            .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| {
-                vec![size]
-            });
-        if let Some(options) = device {
-            if self.plot.is_some() || self.prefilter.is_some() {
-                return Err(Error::Input(
-                    "--plot and --prefilter go with --backend cpu".into(),
-                ));
-            }
-            return self.on_gpu(&methods, &sizes, &target, &options, json);
-        }
+        Ok(methods)
+    }
+
+    fn on_cpu(
+        &self,
+        methods: &[Method],
+        sizes: &[(usize, usize)],
+        target: &Target,
+        threads: Option<usize>,
+        budget: Duration,
+        json: bool,
+    ) -> Result<()> {
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(models::network(file, Precision::Float32)?),
+            None => None,
+        };
         let machine = Machine::this();
-        let threads = threads.map_or_else(
-            || match machine.cores {
-                1 => vec![1],
-                cores => vec![1, cores],
-            },
-            |threads| vec![threads],
-        );
+        let threads = match threads {
+            Some(threads) => vec![threads],
+            None if machine.cores == 1 => vec![1],
+            None => vec![1, machine.cores],
+        };
         let mut cases = Vec::new();
-        for method in &methods {
-            for &size in &sizes {
+        for method in methods {
+            for &size in sizes {
                 cases.extend(threads.iter().map(|&threads| Case {
                     method,
                     size,
@@ -142,7 +147,7 @@ impl Bench {
         let bar = progress_bar(cases.len() as u64, "combinations");
         let mut rows = Vec::new();
         for case in &cases {
-            rows.push(bench::measure(case, &target, budget)?);
+            rows.push(bench::measure(case, target, budget)?);
             bar.inc(1);
         }
         bar.finish_and_clear();
@@ -156,15 +161,11 @@ impl Bench {
         );
         Ok(())
     }
-}
 
-impl Bench {
     /// The networks that come along, of the layers and numbers that are asked for.
     fn come_along(&self) -> Vec<Arc<Network>> {
         let precisions = [Precision::Float32, Precision::Int8];
-        let wanted = |precision: &Precision| {
-            (self.precision).is_none_or(|asked| asked.precision() == *precision)
-        };
+        let wanted = |precision: &Precision| (self.precision).is_none_or(|asked| asked.precision() == *precision);
         let networks = phasefront_models::NETWORKS.iter().flat_map(|model| {
             let precisions = precisions.iter().filter(|p| wanted(p));
             precisions.filter_map(|precision| model.network(*precision))
@@ -180,8 +181,12 @@ impl Bench {
         sizes: &[(usize, usize)],
         target: &Target,
         options: &DeviceOptions,
+        budget: Duration,
         json: bool,
     ) -> Result<()> {
+        if self.plot.is_some() || self.prefilter.is_some() {
+            return Err(Error::Input("--plot and --prefilter go with --backend cpu".into()));
+        }
         let device = Arc::new(Device::open(options)?);
         let fusions = match self.fusion {
             Some(FusionName::Layers) => vec![Fusion::Layers],
@@ -207,10 +212,7 @@ impl Bench {
                 for &float in &floats {
                     for &fusion in fusions {
                         let chain = ChainOptions { float, fusion };
-                        let budget = Duration::from_secs_f64(self.seconds);
-                        rows.push(bench::gpu::measure(
-                            method, size, &device, target, chain, budget,
-                        )?);
+                        rows.push(bench::gpu::measure(method, size, &device, target, chain, budget)?);
                     }
                 }
             }

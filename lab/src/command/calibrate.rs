@@ -41,8 +41,9 @@ impl Calibrate {
 
 /// Find each pixel's phase curve: write the 256 patterns, or read their photographs
 ///
-/// First `--patterns DIR`; show each on the modulator, focus on it, photograph it in each colour, linear, none saturated, the
-/// camera fixed, as red/capture_000.png (or .tif) … blue/capture_255.png. Then `--captures DIR -o table.pfp`.
+/// First `--patterns DIR`; show each on the modulator, focus on it, photograph it in each colour, linear, none
+/// saturated, the camera fixed, as red/capture_000.png (or .tif) … blue/capture_255.png. Then `--captures DIR -o
+/// table.pfp`.
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("step").required(true))]
 pub(crate) struct Lut {
@@ -118,11 +119,7 @@ impl Lut {
             full(colour).map_or(Ok(()), |path| keep(&path, self.force))?;
         }
         let drawings = ["curves.svg", "residuals.svg", "maps.svg"];
-        for (folder, name) in self
-            .report
-            .iter()
-            .flat_map(|f| drawings.map(|name| (f, name)))
-        {
+        for (folder, name) in self.report.iter().flat_map(|f| drawings.map(|name| (f, name))) {
             keep(&folder.join(name), self.force)?;
         }
         let spool = match output.parent() {
@@ -191,8 +188,8 @@ impl Lut {
 
 /// Find the laser's amplitude over the modulator, from photographs of a diffuser in its place
 ///
-/// CAPTURES has folders red, green and blue, in each diffuser.png (or .tif) and capture_000.png, a photograph of pattern 0 by
-/// the camera where it stands, which tells where the modulator is.
+/// CAPTURES has folders red, green and blue, in each diffuser.png (or .tif) and capture_000.png, a photograph of
+/// pattern 0 by the camera where it stands, which tells where the modulator is.
 #[derive(Args)]
 pub(crate) struct Laser {
     /// Folder with the folders red, green and blue
@@ -242,10 +239,9 @@ impl Laser {
                     ),
                 ));
             }
-            let registration = marks::Registration::find(&marked, &pattern)
-                .map_err(|e| Error::file(&marked_path, e))?;
-            let map =
-                laser::map(&photo, &registration, shape).map_err(|e| Error::file(&path, e))?;
+            let registration =
+                marks::Registration::find(&marked, &pattern).map_err(|e| Error::file(&marked_path, e))?;
+            let map = laser::map(&photo, &registration, shape).map_err(|e| Error::file(&path, e))?;
             let map = match self.gaussians {
                 None => map,
                 Some(count) => {
@@ -283,8 +279,8 @@ impl Laser {
 /// Find the coefficients of an aberration from photographs of a focused spot, round by round
 ///
 /// Focus the camera at --z-mm and run: DIR/round_0 gets trial_00.png to trial_10.png. Show and photograph each as
-/// capture_00.png … in the same folder, run again for the next round, and so on; the last run writes the coefficients of that colour
-/// and z into FILE. Coefficients found by hand can be written there directly.
+/// capture_00.png … in the same folder, run again for the next round, and so on; the last run writes the coefficients
+/// of that colour and z into FILE. Coefficients found by hand can be written there directly.
 #[derive(Args)]
 pub(crate) struct Aberration {
     /// Folder of the search
@@ -296,8 +292,8 @@ pub(crate) struct Aberration {
     /// Whose light it is
     #[arg(long, value_enum)]
     colour: ColourName,
-    /// Where in the frame the spot is, from its left and top, 0 to 1, for aberrations that differ over it [default: the middle, for
-    /// all]
+    /// Where in the frame the spot is, from its left and top, 0 to 1, for aberrations that differ over it [default: the
+    /// middle, for all]
     #[arg(long, value_name = "X,Y", value_parser = parse_place)]
     at: Option<[f64; 2]>,
     #[command(flatten)]
@@ -372,10 +368,9 @@ impl Aberration {
                 }
             }
             true => {
-                let text = std::fs::read_to_string(&state)
-                    .map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
-                let now: SearchFile =
-                    serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
+                let text =
+                    std::fs::read_to_string(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
+                let now: SearchFile = serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
                 if (now.z_mm, now.colour, now.at) != (self.z_mm, self.colour, self.at) {
                     return Err(Error::file(
                         &state,
@@ -450,19 +445,12 @@ impl Aberration {
                 ));
             }
             let zoom = photo.width as f64 / display.width() as f64;
-            *value =
-                spot::sharpness(&photo, spot::window(zoom)).map_err(|e| Error::file(&path, e))?;
+            *value = spot::sharpness(&photo, spot::window(zoom)).map_err(|e| Error::file(&path, e))?;
         }
         Ok(sharpness)
     }
 
-    fn finish(
-        &self,
-        json: bool,
-        now: &SearchFile,
-        entries: Vec<Entry>,
-        state: &Path,
-    ) -> Result<()> {
+    fn finish(&self, json: bool, now: &SearchFile, entries: Vec<Entry>, state: &Path) -> Result<()> {
         let mut entries = entries;
         let mut entry = self.entry(&entries).unwrap_or(Entry {
             z_mm: self.z_mm,
@@ -477,21 +465,14 @@ impl Aberration {
         entries.push(entry);
         entries.sort_by(|a, b| a.z_mm.total_cmp(&b.z_mm));
         if let AberrationFile::Spatial(_) = table::aberrations(&entries)? {
-            log::info!(
-                "aberrations that differ over the frame are corrected by --method layers alone"
-            );
+            log::info!("aberrations that differ over the frame are corrected by --method layers alone");
         }
         table::write_aberrations(&self.output, &entries)?;
-        std::fs::remove_file(state)
-            .map_err(|e| Error::file(state, format!("cannot be removed: {e}")))?;
+        std::fs::remove_file(state).map_err(|e| Error::file(state, format!("cannot be removed: {e}")))?;
         super::print(
             json,
             &json!({"output": self.output, "coefficients_rad": now.search.best}),
-            format!(
-                "{}: coefficients {:.3?} rad",
-                self.output.display(),
-                now.search.best
-            ),
+            format!("{}: coefficients {:.3?} rad", self.output.display(), now.search.best),
         );
         Ok(())
     }
@@ -545,12 +526,7 @@ pub(crate) struct Rehearse {
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
     /// z of the focused spot, mm
-    #[arg(
-        long,
-        value_name = "Z",
-        default_value_t = 12.0,
-        allow_negative_numbers = true
-    )]
+    #[arg(long, value_name = "Z", default_value_t = 12.0, allow_negative_numbers = true)]
     spot_z_mm: f64,
     /// Keep all photographs, to run `calibrate lut` and `calibrate laser` on
     #[arg(long)]
@@ -586,28 +562,17 @@ impl Rehearse {
                 let all: Vec<_> = values.iter().map(|v| format!("{v:.digits$}")).collect();
                 all.join(" / ")
             };
-            format!(
-                "{what:<34}{:>24}   {:>24}",
-                list(&of.before),
-                list(&of.after)
-            )
+            format!("{what:<34}{:>24}   {:>24}", list(&of.before), list(&of.after))
         };
         let text = [
-            format!(
-                "{:<34}{:>24}   {:>24}",
-                "red / green / blue", "before", "after"
-            ),
+            format!("{:<34}{:>24}   {:>24}", "red / green / blue", "before", "after"),
             line("phase error, rad RMS", &outcome.phase_error_rad, 3),
             line("black against white, dB", &outcome.black_db, 1),
             line("unevenness of flat grey", &outcome.unevenness, 3),
             line("Strehl ratio of the spot", &outcome.strehl, 3),
             String::new(),
             outcome.lut.text(),
-            format!(
-                "{} photographs; {}",
-                outcome.photographs,
-                self.output.display()
-            ),
+            format!("{} photographs; {}", outcome.photographs, self.output.display()),
         ];
         let value = serde_json::to_value(&outcome).map_err(|e| Error::file(&self.output, e))?;
         super::print(json, &value, text.join("\n"));
@@ -618,10 +583,7 @@ impl Rehearse {
 /// Refuses a file that is there, unless it may be written over.
 fn keep(path: &Path, force: bool) -> Result<()> {
     match path.exists() && !force {
-        true => Err(Error::file(
-            path,
-            "is there already; --force writes over it",
-        )),
+        true => Err(Error::file(path, "is there already; --force writes over it")),
         false => Ok(()),
     }
 }

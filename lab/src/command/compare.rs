@@ -14,12 +14,7 @@ pub(crate) struct Compare {
     /// What to compare it with
     b: PathBuf,
     /// Focus for holograms, mm from the middle of the volume, positive toward the viewer
-    #[arg(
-        long,
-        value_name = "Z",
-        allow_negative_numbers = true,
-        default_value_t = 0.0
-    )]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true, default_value_t = 0.0)]
     z_mm: f64,
 }
 
@@ -31,15 +26,9 @@ impl Compare {
         let mut text = String::from("        PSNR dB    SSIM");
         let colours = ["red", "green", "blue"];
         for (i, colour) in colours.iter().enumerate() {
-            text += &format!(
-                "\n{colour:7} {:7.2}  {:6.4}",
-                result.psnr[i], result.ssim[i]
-            );
+            text += &format!("\n{colour:7} {:7.2}  {:6.4}", result.psnr[i], result.ssim[i]);
         }
-        text += &format!(
-            "\noverall {:7.2}  {:6.4}",
-            result.psnr_overall, result.ssim_overall
-        );
+        text += &format!("\noverall {:7.2}  {:6.4}", result.psnr_overall, result.ssim_overall);
         super::print(json, &json!(result), text);
         Ok(())
     }
@@ -47,9 +36,7 @@ impl Compare {
     fn amplitude(&self, path: &Path) -> Result<Array3<f32>> {
         if files::is_hologram(path)? {
             let hologram = files::read_hologram(path)?;
-            let mut views = hologram
-                .views(&[self.z_mm / 1e3])
-                .map_err(|e| Error::file(path, e))?;
+            let mut views = hologram.views(&[self.z_mm / 1e3]).map_err(|e| Error::file(path, e))?;
             return Ok(views.remove(0));
         }
         files::read_rgb(path)

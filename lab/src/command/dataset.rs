@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 /// Make a data set: random scenes as layered depth images and their holograms
 ///
-/// Made again into the same folder it goes on where it was stopped. Where the display's file names an aberration, the holograms
-/// correct it.
+/// Made again into the same folder it goes on where it was stopped. Where the display's file names an aberration, the
+/// holograms correct it.
 #[derive(Args)]
 pub(crate) struct Dataset {
     /// Pairs to make
@@ -73,9 +73,7 @@ impl Dataset {
         }
         let textures = match &self.textures {
             Some(_) if self.scenes_like == Like::Objects => {
-                return Err(Error::Input(
-                    "--textures is for --scenes-like photographs".into(),
-                ));
+                return Err(Error::Input("--textures is for --scenes-like photographs".into()));
             }
             Some(folder) => scene::read_photographs(folder)?,
             None => Vec::new(),
@@ -84,16 +82,9 @@ impl Dataset {
             Like::Objects => Look::Objects,
             Like::Photographs => Look::photographs(&textures),
         };
-        let manifest = Manifest::new(
-            self.scenes,
-            self.size,
-            self.planes,
-            self.ldi_layers,
-            self.seed,
-            display,
-        )?
-        .looking(look)
-        .correcting(file.aberration.as_ref());
+        let manifest = Manifest::new(self.scenes, self.size, self.planes, self.ldi_layers, self.seed, display)?
+            .looking(look)
+            .correcting(file.aberration.as_ref());
         let shard = self.shard.unwrap_or((0, 1));
         let mine = self.scenes.saturating_sub(shard.0).div_ceil(shard.1);
         let bar = progress_bar(mine as u64, "pairs");

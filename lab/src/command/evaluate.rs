@@ -97,9 +97,7 @@ impl Evaluate {
             Split::Validation => ("validation", manifest.splits.validation),
             Split::Test => ("test", manifest.splits.test),
         };
-        let scenes: Vec<usize> = (start..end)
-            .take(self.scenes.unwrap_or(usize::MAX))
-            .collect();
+        let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
         let methods = self.methods(&manifest)?;
         let mut shown = vec![Shown::complex()];
         for encoder in &self.encoder {
@@ -118,15 +116,9 @@ impl Evaluate {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }
         let bar = progress_bar(scenes.len() as u64, "scenes");
-        let rows = evaluate::evaluate(
-            &manifest,
-            &self.data,
-            &scenes,
-            &methods,
-            &shown,
-            self.seed,
-            &|| bar.inc(1),
-        )?;
+        let rows = evaluate::evaluate(&manifest, &self.data, &scenes, &methods, &shown, self.seed, &|| {
+            bar.inc(1)
+        })?;
         bar.finish_and_clear();
         if let Some(dir) = &self.pictures {
             for (way, row) in rows.iter().enumerate() {
@@ -138,14 +130,7 @@ impl Evaluate {
                         row.shown,
                         rank + 1
                     );
-                    evaluate::write_picture(
-                        &dir.join(name),
-                        &manifest,
-                        &self.data,
-                        index,
-                        method,
-                        shown,
-                    )?;
+                    evaluate::write_picture(&dir.join(name), &manifest, &self.data, index, method, shown)?;
                 }
             }
         }
@@ -178,9 +163,7 @@ impl Evaluate {
                     MethodName::Rgb => Method::rgb(),
                     MethodName::Visible => Method::visible(display, planes),
                     MethodName::Filled => Method::filled(display, planes),
-                    MethodName::Sweep => {
-                        Method::sweep(manifest.size, display, self.sweep(display))?
-                    }
+                    MethodName::Sweep => Method::sweep(manifest.size, display, self.sweep(display))?,
                     MethodName::Layers => Method::layers(display, planes),
                     MethodName::Points => Method::points(display, planes),
                 })

@@ -68,8 +68,8 @@ impl EncoderFlags {
         })
     }
 
-    /// The network called `network`, and the encoder that belongs to it or is asked for: with neither named, the pair that
-    /// comes along for `display`.
+    /// The network called `network`, and the encoder that belongs to it or is asked for: with neither named, the pair
+    /// that comes along for `display`.
     pub(crate) fn with_network(
         &self,
         network: Option<&str>,
@@ -85,9 +85,7 @@ impl EncoderFlags {
                 return Ok((pair.hologram, Encoder { encoding, name }));
             }
             if by_name || self.encoder.is_some() {
-                let offsets = phasefront_models::PAIRS
-                    .iter()
-                    .map(|pair| pair.offset_mm.to_string());
+                let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
                 return Err(Error::Input(format!(
                     "networks for the deep encoder come along for offsets of {} mm and the usual display; train a pair for this one, or take --network 8 --encoder anti-alias",
                     offsets.collect::<Vec<_>>().join(", ")
@@ -99,10 +97,7 @@ impl EncoderFlags {
                 models::DEEP
             )));
         }
-        Ok((
-            models::network(network.unwrap_or("8"), precision)?,
-            self.read()?,
-        ))
+        Ok((models::network(network.unwrap_or("8"), precision)?, self.read()?))
     }
 }
 
@@ -151,12 +146,7 @@ impl EncoderName {
 #[derive(Args)]
 pub(crate) struct FrameFlags {
     /// Colour image, PNG or JPEG
-    #[arg(
-        long,
-        value_name = "FILE",
-        requires = "depth",
-        required_unless_present = "ldi"
-    )]
+    #[arg(long, value_name = "FILE", requires = "depth", required_unless_present = "ldi")]
     rgb: Option<PathBuf>,
     /// Depth image: grey PNG of 8 or 16 bits, or .npy
     #[arg(long, value_name = "FILE", requires = "rgb")]
@@ -269,7 +259,5 @@ pub(crate) fn parse_size(text: &str) -> std::result::Result<(usize, usize), Stri
 pub(crate) fn progress_bar(total: u64, what: &str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {elapsed} {eta} left")
         .expect("a well-formed template");
-    ProgressBar::new(total)
-        .with_style(style)
-        .with_message(what.to_owned())
+    ProgressBar::new(total).with_style(style).with_message(what.to_owned())
 }

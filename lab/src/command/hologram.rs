@@ -32,7 +32,8 @@ pub(crate) struct Hologram {
     /// How the midpoint hologram is made [default: network; layers with --ldi and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder); seeded-6 with --method seeded]
+    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder); seeded-6 with --method
+    /// seeded]
     #[arg(long, value_name = "ddpm-8|8|15|seeded-6|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
@@ -122,11 +123,7 @@ impl PrecisionName {
 const DEFAULT_PLANES: usize = 256;
 
 /// The sweep that suits `display`, with these planes and taps where given.
-pub(super) fn sweep_for(
-    display: &phasefront::Display,
-    planes: Option<usize>,
-    taps: Option<usize>,
-) -> Sweep {
+pub(super) fn sweep_for(display: &phasefront::Display, planes: Option<usize>, taps: Option<usize>) -> Sweep {
     let usual = match planes {
         Some(planes) => Sweep::of_planes(display, planes),
         None => Sweep::for_display(display),
@@ -153,22 +150,24 @@ impl Hologram {
             if let Some(path) = path
                 && !files::has_extension(path, extension)
             {
-                return Err(Error::file(
-                    path,
-                    format!("the name must end in .{extension}"),
-                ));
+                return Err(Error::file(path, format!("the name must end in .{extension}")));
             }
         }
         let display = self.display.read()?;
+        let made = self.make(&display)?;
+        self.write(&display, &made)?;
+        self.report(json, &made);
+        Ok(())
+    }
+
+    fn make(&self, display: &DisplayFile) -> Result<Made> {
         let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
             (Some(_), None) => Method::Layers,
             _ => Method::Network,
         });
         let device = self.backend.device()?;
         if device.is_some()
-            && (matches!(method, Method::Layers | Method::Points)
-                || self.complex.is_some()
-                || self.ldi.is_some())
+            && (matches!(method, Method::Layers | Method::Points) || self.complex.is_some() || self.ldi.is_some())
         {
             return Err(Error::Input(
                 "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex; the rest is the CPU's"
@@ -182,42 +181,43 @@ impl Hologram {
             },
             (method, _) => method,
         };
-        let made = match (method, &self.ldi) {
+        match (method, &self.ldi) {
             (Method::Network, None) => {
                 let precision = self.precision.precision();
                 let name = self.network.as_deref();
                 let (network, encoder) =
                     (self.encoder).with_network(name, precision, &display.target.display)?;
                 let method = phasefront::Method::trained(network);
-                self.by_core("network", method, &display, encoder, device.as_ref())?
+                self.by_core("network", method, display, encoder, device.as_ref())
             }
             (Method::Seeded, None) => {
                 let name = self.network.as_deref().unwrap_or(models::SEEDED);
                 let network = models::network(name, self.precision.precision())?;
                 let method = phasefront::Method::Seeded(network);
                 let encoder = self.encoder.read()?;
-                self.by_core("seeded", method, &display, encoder, device.as_ref())?
+                self.by_core("seeded", method, display, encoder, device.as_ref())
             }
             (Method::Sweep, None) => {
                 let sweep = sweep_for(&display.target.display, self.planes, self.taps);
                 let method = phasefront::Method::Sweep(sweep);
                 let encoder = self.encoder.read()?;
-                self.by_core("sweep", method, &display, encoder, device.as_ref())?
+                self.by_core("sweep", method, display, encoder, device.as_ref())
             }
-            (Method::Auto, _) | (Method::Sweep | Method::Seeded, Some(_)) => {
-                return Err(Error::Input(
-                    "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
-                        .into(),
-                ));
-            }
+            (Method::Auto, _) | (Method::Sweep | Method::Seeded, Some(_)) => Err(Error::Input(
+                "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
+                    .into(),
+            )),
             (Method::Layers | Method::Points | Method::Network, source) => {
                 let ldi = match source {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
                 };
-                self.by_layers(method, &ldi, &display, self.encoder.read()?)?
+                self.by_layers(method, &ldi, display, self.encoder.read()?)
             }
-        };
+        }
+    }
+
+    fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
         let info = HologramInfo {
             calibrated: display.calibrated(true),
             display: display.target.display.clone(),
@@ -235,9 +235,7 @@ impl Hologram {
             };
             files::write_complex(path, field.view(), &info)?;
         }
-        files::write_phase_only(&self.output, made.levels.view(), &info)?;
-        self.report(json, &made);
-        Ok(())
+        files::write_phase_only(&self.output, made.levels.view(), &info)
     }
 
     /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
@@ -327,13 +325,7 @@ impl Hologram {
     }
 
     /// The methods for layered depth images.
-    fn by_layers(
-        &self,
-        method: Method,
-        ldi: &Ldi,
-        file: &DisplayFile,
-        encoder: Encoder,
-    ) -> Result<Made> {
+    fn by_layers(&self, method: Method, ldi: &Ldi, file: &DisplayFile, encoder: Encoder) -> Result<Made> {
         let (height, width) = ldi.shape();
         // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
         let (target, varying) = match (method, file.corrected()) {
@@ -407,14 +399,9 @@ impl Hologram {
     }
 
     /// The network of --network, which must take layers and be for `display`.
-    fn network_for_layers(
-        &self,
-        display: &phasefront::Display,
-    ) -> Result<Arc<phasefront::Network>> {
+    fn network_for_layers(&self, display: &phasefront::Display) -> Result<Arc<phasefront::Network>> {
         let name = self.network.as_deref().ok_or_else(|| {
-            Error::Input(
-                "--method network with --ldi needs a --network for layered depth images".into(),
-            )
+            Error::Input("--method network with --ldi needs a --network for layered depth images".into())
         })?;
         let network = models::network(name, self.precision.precision())?;
         if !matches!(network.input(), InputKind::Ldi { .. }) {
@@ -450,11 +437,7 @@ impl Hologram {
                 "output": self.output, "complex": self.complex, "width": width, "height": height,
                 "encoder": made.encoder, "scale": made.scale, "engine": made.engine, "stage_ms": stages, "total_ms": ms(&total),
             }),
-            format!(
-                "{}: {width}×{height}, {}",
-                self.output.display(),
-                list.join(", ")
-            ),
+            format!("{}: {width}×{height}, {}", self.output.display(), list.join(", ")),
         );
     }
 }
@@ -463,10 +446,7 @@ fn described(engine: &Engine) -> String {
     format!("{} ({})", engine.name, engine.why)
 }
 
-fn slices<'a>(
-    field: &'a mut Array3<Complex32>,
-    levels: &'a mut Array3<u8>,
-) -> (&'a mut [Complex32], &'a mut [u8]) {
+fn slices<'a>(field: &'a mut Array3<Complex32>, levels: &'a mut Array3<u8>) -> (&'a mut [Complex32], &'a mut [u8]) {
     (
         field.as_slice_mut().expect("standard layout"),
         levels.as_slice_mut().expect("standard layout"),

@@ -44,8 +44,7 @@ impl Occlusion {
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
-        std::fs::create_dir_all(&self.output)
-            .map_err(|e| Error::file(&self.output, format!("cannot be made: {e}")))?;
+        std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, format!("cannot be made: {e}")))?;
         if self.ldi.is_none() {
             ldi.write(&self.output.join("two_bars"))?;
         }
@@ -121,11 +120,7 @@ fn table(study: &Study) -> String {
     );
     let or_dash = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:.4}"));
     for (i, outcome) in study.outcomes.iter().enumerate() {
-        let (front, rear, found) = (
-            outcome.front_quality,
-            outcome.rear_quality,
-            outcome.artefacts,
-        );
+        let (front, rear, found) = (outcome.front_quality, outcome.rear_quality, outcome.artefacts);
         text += &format!(
             "\n{} {:33}{:7.2} {:7.4}  {:7.2} {:7.4}  {:>8} {:>8} {:>8} {:>9}",
             i + 1,

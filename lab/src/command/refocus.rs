@@ -70,15 +70,8 @@ impl Refocus {
                 written.push(path);
             }
         }
-        let names: Vec<_> = written
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect();
-        super::print(
-            json,
-            &json!({"z_mm": z_mm, "files": written}),
-            names.join("\n"),
-        );
+        let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+        super::print(json, &json!({"z_mm": z_mm, "files": written}), names.join("\n"));
         Ok(())
     }
 }
@@ -92,12 +85,8 @@ fn write_gif(path: &Path, views: &[Array3<f32>]) -> Result<()> {
         let back = views.iter().skip(1).rev().skip(1);
         for view in views.iter().chain(back) {
             let (_, height, width) = view.dim();
-            let image = RgbImage::from_raw(
-                width as u32,
-                height as u32,
-                files::amplitude_bytes(view.view()),
-            )
-            .expect("three bytes a pixel");
+            let image = RgbImage::from_raw(width as u32, height as u32, files::amplitude_bytes(view.view()))
+                .expect("three bytes a pixel");
             let image = image::DynamicImage::ImageRgb8(image).into_rgba8();
             let delay = Delay::from_numer_denom_ms(100, 1);
             encoder

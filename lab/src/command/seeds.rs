@@ -35,14 +35,7 @@ impl Seeds {
         let sweep = sweep_for(&manifest.display, self.planes, self.taps);
         let bar = progress_bar(manifest.scenes as u64, "scenes");
         let made = || bar.inc(1);
-        seeds::make(
-            &manifest,
-            &self.data,
-            &self.output,
-            sweep,
-            self.refined,
-            &made,
-        )?;
+        seeds::make(&manifest, &self.data, &self.output, sweep, self.refined, &made)?;
         bar.finish_and_clear();
         super::print(
             json,

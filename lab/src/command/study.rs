@@ -26,7 +26,8 @@ pub(crate) struct Study {
     /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768
     #[arg(long, value_name = "PX", default_value_t = 384, value_parser = clap::value_parser!(u16).range(1..=4096))]
     size: u16,
-    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays 200]
+    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays
+    /// 200]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
     /// Layers of a layered depth image in the study of planes
@@ -82,17 +83,10 @@ impl Study {
         let done = |planes: usize| bar.inc(planes as u64);
         let (name, rows) = match of_layers {
             true => ("layers", study::layers(&scenes, planes, &done)?),
-            false => (
-                "planes",
-                study::planes(&scenes, self.ldi_layers.into(), planes, &done)?,
-            ),
+            false => ("planes", study::planes(&scenes, self.ldi_layers.into(), planes, &done)?),
         };
         bar.finish_and_clear();
-        let finest = if of_layers {
-            study::FINEST_LAYERS
-        } else {
-            planes
-        };
+        let finest = if of_layers { study::FINEST_LAYERS } else { planes };
         let result = json!({
             "study": name, "finest": finest, "planes": planes,
             "ldi_layers": if of_layers { study::FINEST_LAYERS } else { self.ldi_layers.into() },
@@ -124,10 +118,7 @@ impl Study {
     fn sweep(&self, json: bool) -> Result<()> {
         let scenes = self.scenes()?;
         let planes = self.planes.unwrap_or(SWEEP_PLANES) as usize;
-        let bar = progress_bar(
-            sweep_study::ablation_work(&scenes, planes) as u64,
-            "holograms",
-        );
+        let bar = progress_bar(sweep_study::ablation_work(&scenes, planes) as u64, "holograms");
         let rows = sweep_study::ablation(&scenes, planes, &|| bar.inc(1))?;
         bar.finish_and_clear();
         let result = json!({
@@ -144,12 +135,7 @@ impl Study {
             let time = row.ns_per_pixel.map_or("–".into(), |ns| format!("{ns:.1}"));
             text += &format!(
                 "\n{:8} {:48}  {:13.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
-                row.part,
-                row.setting,
-                row.clean.psnr,
-                row.clean.ssim,
-                row.degraded.psnr,
-                row.degraded.ssim
+                row.part, row.setting, row.clean.psnr, row.clean.ssim, row.degraded.psnr, row.degraded.ssim
             );
         }
         super::print(json, &result, text);
@@ -170,12 +156,7 @@ impl Study {
             points
         };
         let clean: Figure = |row| row.clean.psnr;
-        let panel = |title, x, y, points| Panel {
-            title,
-            x,
-            y,
-            points,
-        };
+        let panel = |title, x, y, points| Panel { title, x, y, points };
         plot::write_svg(
             &self.output.join("sweep.svg"),
             &[
@@ -224,10 +205,7 @@ impl Study {
         );
         for row in &rows {
             let DisplayRow {
-                display,
-                planes,
-                taps,
-                ..
+                display, planes, taps, ..
             } = row;
             let name = if display.is_empty() { "usual" } else { display };
             text += &format!(
@@ -261,17 +239,14 @@ impl Study {
         }
         let scenes = usize::from(self.scenes);
         let bar = progress_bar(depth_study::work(scenes, methods.len()) as u64, "holograms");
-        let rows = depth_study::study(scenes, self.seed, planes, &display, &methods, &|| {
-            bar.inc(1)
-        })?;
+        let rows = depth_study::study(scenes, self.seed, planes, &display, &methods, &|| bar.inc(1))?;
         bar.finish_and_clear();
         let result = json!({
             "study": "depth", "planes": planes, "scenes": self.scenes, "seed": self.seed, "display": display,
             "rows": rows,
         });
         self.write_json("depth", &result)?;
-        let mut text =
-            "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
+        let mut text = "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
         for row in &rows {
             let depth = format!("{}, {}", row.degradation, row.depth);
             text += &format!(
@@ -290,19 +265,13 @@ impl Study {
         /// Of each scene.
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
-        let display = self
-            .display
-            .read()?
-            .target
-            .display
-            .with_size(height, width)?;
+        let display = self.display.read()?.target.display.with_size(height, width)?;
         let method = Method::Network(models::network("8", Precision::Int8)?);
         let scenes = usize::from(self.scenes);
         let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
         let mut rows: Vec<flicker::Row> = Vec::new();
         for scene in 0..u64::from(self.scenes) {
-            let of_scene =
-                flicker::study(self.seed + scene, FRAMES, &display, &method, &|| bar.inc(1))?;
+            let of_scene = flicker::study(self.seed + scene, FRAMES, &display, &method, &|| bar.inc(1))?;
             match rows.is_empty() {
                 true => rows = of_scene,
                 false => {

@@ -1,8 +1,6 @@
 //! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
 
-use super::flags::{
-    BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar,
-};
+use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use ndarray::ArrayView3;
@@ -66,12 +64,7 @@ pub(crate) struct Video {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     repeat: u32,
     /// Write a preview of each hologram too, focused at this z
-    #[arg(
-        long,
-        value_name = "MM",
-        allow_negative_numbers = true,
-        requires = "output"
-    )]
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
     preview_mm: Option<f64>,
     /// Folder of what comes out: phase_000000.png …, preview_000000.png …, statistics.json
     #[arg(short, value_name = "DIR")]
@@ -170,8 +163,8 @@ impl Sink {
             return Ok(());
         };
         let (height, width) = hologram.shape();
-        let levels = ArrayView3::from_shape((3, height, width), hologram.levels())
-            .map_err(|e| Error::Input(e.to_string()))?;
+        let levels =
+            ArrayView3::from_shape((3, height, width), hologram.levels()).map_err(|e| Error::Input(e.to_string()))?;
         let info = HologramInfo {
             scale: Some(hologram.scale()),
             ..self.info.clone()
@@ -187,8 +180,8 @@ impl Sink {
     }
 }
 
-/// A session that is warm. Where the GPU was asked for and does not serve, that is said; where it does, what was compiled
-/// for it is kept.
+/// A session that is warm. Where the GPU was asked for and does not serve, that is said; where it does, what was
+/// compiled for it is kept.
 fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
     let asked = options.backend;
     let session = Session::new(options, mode)?;
@@ -232,13 +225,7 @@ impl Video {
         };
         let seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
-        self.report(
-            json,
-            &statistics,
-            seconds,
-            &sink.scales,
-            [memory, memory_mb()],
-        )
+        self.report(json, &statistics, seconds, &sink.scales, [memory, memory_mb()])
     }
 
     fn source(&self, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
@@ -261,9 +248,7 @@ impl Video {
             return Ok((Source::Pipe { raw, first }, (height, width)));
         }
         if self.raw.is_some() {
-            return Err(Error::Input(
-                "--raw is for frames on stdin; give - as input".into(),
-            ));
+            return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
         }
         let paths = video::frames_of_folder(&self.input)?;
         let shape = video::read_frame(&paths[0].0, &paths[0].1, unit)?.shape();
@@ -332,9 +317,7 @@ impl Video {
             (None, None) => DepthRange::Percentiles,
             (Some(near_m), Some(far_m)) => DepthRange::Fixed { near_m, far_m },
             _ => {
-                return Err(Error::Input(
-                    "video needs both --near and --far, or neither".into(),
-                ));
+                return Err(Error::Input("video needs both --near and --far, or neither".into()));
             }
         };
         if let Some(device) = self.backend.device()? {
@@ -405,18 +388,14 @@ impl Video {
                     let _ = sender.send(hologram);
                 }
                 Event::Dropped { .. } => bar.inc(1),
-                Event::Failed {
-                    timestamp_ns,
-                    error,
-                } => {
+                Event::Failed { timestamp_ns, error } => {
                     bar.inc(1);
                     let mut failure = failure.lock().unwrap_or_else(|e| e.into_inner());
                     failure.get_or_insert((timestamp_ns, error));
                 }
-                Event::QualityChanged { change, .. } => bar.println(format!(
-                    "rung {} to {}: {:?}",
-                    change.from, change.to, change.reason
-                )),
+                Event::QualityChanged { change, .. } => {
+                    bar.println(format!("rung {} to {}: {:?}", change.from, change.to, change.reason))
+                }
                 _ => {}
             }
         };
@@ -441,9 +420,7 @@ impl Video {
         });
         written.map_err(|_| Error::Input("the writer of results panicked".into()))??;
         let statistics = submitted?;
-        if let Some((timestamp_ns, error)) =
-            failure.lock().unwrap_or_else(|e| e.into_inner()).take()
-        {
+        if let Some((timestamp_ns, error)) = failure.lock().unwrap_or_else(|e| e.into_inner()).take() {
             log::warn!(
                 "{} frames failed, the first at {timestamp_ns} ns: {error}",
                 statistics.failed
@@ -482,9 +459,7 @@ impl Video {
             .map(|(stage, time)| (stage.to_owned(), json!(ms(time))))
             .collect();
         let s = statistics;
-        let change = scales
-            .windows(2)
-            .map(|pair| f64::from(pair[1] / pair[0] - 1.0).powi(2));
+        let change = scales.windows(2).map(|pair| f64::from(pair[1] / pair[0] - 1.0).powi(2));
         let change = (change.sum::<f64>() / (scales.len().max(2) - 1) as f64).sqrt();
         let result = json!({
             "output": self.output, "submitted": s.submitted, "processed": s.processed, "failed": s.failed,

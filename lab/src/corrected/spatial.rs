@@ -1,5 +1,5 @@
-//! Aberrations that differ over the frame: calibrated at a grid of points (the paper has 15 in mind) and interpolated, and
-//! corrected by a convolution in space, as no filter in the Fourier domain can (Methods).
+//! Aberrations that differ over the frame: calibrated at a grid of points (the paper has 15 in mind) and interpolated,
+//! and corrected by a convolution in space, as no filter in the Fourier domain can (Methods).
 //!
 //! # The convolution
 //! Each pixel's light spreads by the point spread function of its place. Point spread functions are those of nodes
@@ -65,9 +65,7 @@ impl SpatialAberrations {
             .flat_map(|y| x.iter().map(move |x| find(*x, *y).map(|(_, a)| a.clone())))
             .collect();
         match at {
-            Some(at) if !at.is_empty() && at.len() == points.len() => {
-                Ok(SpatialAberrations { x, y, at })
-            }
+            Some(at) if !at.is_empty() && at.len() == points.len() => Ok(SpatialAberrations { x, y, at }),
             _ => Err(Error::Input(format!(
                 "{} calibrated points in {} columns and {} rows; every column must have a point in every row, once",
                 points.len(),
@@ -87,18 +85,12 @@ impl SpatialAberrations {
     /// The correction at (`x`, `y`), parts of the frame, and `z_m`.
     pub fn at(&self, x: f64, y: f64, z_m: f64) -> Aberration {
         let split = |axis: &[f64], v: f64| {
-            let next = axis
-                .partition_point(|a| *a <= v)
-                .clamp(1, axis.len().max(2) - 1);
+            let next = axis.partition_point(|a| *a <= v).clamp(1, axis.len().max(2) - 1);
             match axis.get(next) {
                 None => (0, 0, 0.0),
                 Some(end) => {
                     let begin = axis[next - 1];
-                    (
-                        next - 1,
-                        next,
-                        ((v - begin) / (end - begin)).clamp(0.0, 1.0),
-                    )
+                    (next - 1, next, ((v - begin) / (end - begin)).clamp(0.0, 1.0))
                 }
             }
         };
@@ -162,11 +154,7 @@ impl Place<'_> {
     fn kernel(&self, aberration: &Aberration, n: usize, kx: usize, ky: usize) -> Complex32 {
         let pitch = self.display.pitch_m();
         let frequency = |k: usize| {
-            let k = if 2 * k < n {
-                k as f64
-            } else {
-                k as f64 - n as f64
-            };
+            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
             k / (n as f64 * pitch)
         };
         let phase = aberration.phase(self.colour, frequency(kx), frequency(ky), pitch);
@@ -243,10 +231,7 @@ pub fn convolve(field: &Array2<Complex32>, place: Place<'_>) -> Array2<Complex32
         for ((i, j), plane) in some.iter().zip(&spread) {
             let Some(plane) = plane else { continue };
             for v in 0..side {
-                let Some(y) = (v + i * NODE)
-                    .checked_sub(NODE + reach)
-                    .filter(|y| *y < height)
-                else {
+                let Some(y) = (v + i * NODE).checked_sub(NODE + reach).filter(|y| *y < height) else {
                     continue;
                 };
                 for u in 0..side {
@@ -308,8 +293,8 @@ pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2
     out.mapv(|v| Complex32::new(v.re as f32, v.im as f32))
 }
 
-/// The midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes, each corrected from place to place. `progress`
-/// hears of the propagations done, of all.
+/// The midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes, each corrected from place to place.
+/// `progress` hears of the propagations done, of all.
 ///
 /// # Errors
 /// No planes, or more propagations than [`MAX_PROPAGATIONS`] a colour.
@@ -349,15 +334,12 @@ pub fn hologram(
     let step_m = display.volume_depth_m() / planes as f64;
     let mut done = 0;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
-        let transfer =
-            |distance_m| Transfer::new(shape, pitch_m, wavelength_m, distance_m, |_, _| true);
+        let transfer = |distance_m| Transfer::new(shape, pitch_m, wavelength_m, distance_m, |_, _| true);
         sum.fill(Complex32::ZERO);
         for first in 0..count {
             let (k, points) = &scene.occupied[first];
             let points = &scene.points[points.clone()];
-            place(points, &mut plane, padded_width, |point| {
-                point.rgb[colour].into()
-            });
+            place(points, &mut plane, padded_width, |point| point.rgb[colour].into());
             fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
             let mut at = *k;
             for (next, points) in &scene.occupied[first + 1..] {
@@ -406,8 +388,7 @@ fn spread(fft: &Fft2, scratch: &mut Scratch, back: &Transfer, here: Place<'_>) {
         &mut scratch.work,
     );
     fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
-    let field = Array2::from_shape_vec(fft.padded_shape(), scratch.rows.clone())
-        .expect("a plane of the padded shape");
+    let field = Array2::from_shape_vec(fft.padded_shape(), scratch.rows.clone()).expect("a plane of the padded shape");
     let field = convolve(&field, here);
     let field = field.as_slice().expect("standard layout");
     fft.rows_forward(field, &mut scratch.rows, &mut scratch.work);

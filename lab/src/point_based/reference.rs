@@ -16,12 +16,7 @@ type Point = ([i64; 2], usize, [f32; 3]);
 ///
 /// # Errors
 /// No planes.
-pub fn hologram(
-    ldi: &Ldi,
-    display: &Display,
-    planes: usize,
-    occlusion: Occlusion,
-) -> Result<Array3<Complex64>> {
+pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusion) -> Result<Array3<Complex64>> {
     check_planes(planes)?;
     let (height, width) = ldi.shape();
     let mut points: Vec<Point> = Vec::new();
@@ -45,8 +40,7 @@ pub fn hologram(
             let radius = radius_px(z_m, lambda, display.pitch_m()) as i64;
             for ((i, j), value) in pattern.indexed_iter() {
                 let (dy, dx) = (i as i64 - radius, j as i64 - radius);
-                let inside =
-                    (0..height as i64).contains(&(y + dy)) && (0..width as i64).contains(&(x + dx));
+                let inside = (0..height as i64).contains(&(y + dy)) && (0..width as i64).contains(&(x + dx));
                 let geometric = occlusion == Occlusion::Geometric;
                 if inside && !(geometric && blocked(point, [dy, dx], &points, planes)) {
                     let pixel = (c, (y + dy) as usize, (x + dx) as usize);

@@ -33,8 +33,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
             check_uri(uri)?;
         }
     }
-    let buffers = gltf::import_buffers(&document, Some(folder), blob)
-        .map_err(|e| format!("its buffers: {}", one_line(&e)))?;
+    let buffers =
+        gltf::import_buffers(&document, Some(folder), blob).map_err(|e| format!("its buffers: {}", one_line(&e)))?;
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next())
@@ -82,16 +82,12 @@ impl Reader<'_> {
                 self.primitive(&primitive, matrix)?;
             }
         }
-        node.children()
-            .try_for_each(|child| self.node(&child, matrix, budget))
+        node.children().try_for_each(|child| self.node(&child, matrix, budget))
     }
 
     fn primitive(&mut self, primitive: &Primitive, matrix: Matrix) -> Result<()> {
         let mode = primitive.mode();
-        if !matches!(
-            mode,
-            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-        ) {
+        if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
             log::warn!("points and lines of a model are left out");
             return Ok(());
         }
@@ -101,31 +97,23 @@ impl Reader<'_> {
         let count = positions.count();
         check(&positions, &[DataType::F32], &[Dimensions::Vec3])?;
         let corners = primitive.indices().map_or(count, |indices| indices.count());
-        self.triangles = self.triangles.saturating_add(if mode == Mode::Triangles {
-            corners / 3
-        } else {
-            corners
-        });
+        self.triangles = self
+            .triangles
+            .saturating_add(if mode == Mode::Triangles { corners / 3 } else { corners });
         check_count(self.triangles.max(count / 3))?;
 
         let buffers = &self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
         let missing = |what: &str| format!("{what} lie outside their buffer");
         let mut part = Part {
-            positions: reader
-                .read_positions()
-                .ok_or_else(|| missing("positions"))?
-                .collect(),
+            positions: reader.read_positions().ok_or_else(|| missing("positions"))?.collect(),
             ..Part::default()
         };
         let indices = self.indices(primitive, part.positions.len())?;
         part.triangles = triangles(&indices, mode);
         if let Some(normals) = primitive.get(&Semantic::Normals) {
             check(&normals, &[DataType::F32], &[Dimensions::Vec3])?;
-            part.normals = reader
-                .read_normals()
-                .ok_or_else(|| missing("normals"))?
-                .collect();
+            part.normals = reader.read_normals().ok_or_else(|| missing("normals"))?.collect();
         }
         if let Some(colours) = primitive.get(&Semantic::Colors(0)) {
             check(
@@ -133,10 +121,7 @@ impl Reader<'_> {
                 &[DataType::F32, DataType::U8, DataType::U16],
                 &[Dimensions::Vec3, Dimensions::Vec4],
             )?;
-            let colours = reader
-                .read_colors(0)
-                .ok_or_else(|| missing("colours"))?
-                .into_rgb_f32();
+            let colours = reader.read_colors(0).ok_or_else(|| missing("colours"))?.into_rgb_f32();
             part.colour = colours.map(|rgb| rgb.map(coded)).collect();
         }
         self.material(primitive, &mut part)?;
@@ -145,7 +130,9 @@ impl Reader<'_> {
             .into_iter()
             .all(same)
         {
-            return Err("a surface whose vertices and their normals, colours or texture coordinates differ in number".into());
+            return Err(
+                "a surface whose vertices and their normals, colours or texture coordinates differ in number".into(),
+            );
         }
         transform(&mut part, matrix);
         self.parts.push(part);
@@ -164,14 +151,10 @@ impl Reader<'_> {
         )?;
         let buffers = &self.buffers;
         let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
-        let indices = reader
-            .read_indices()
-            .ok_or("indices lie outside their buffer")?;
+        let indices = reader.read_indices().ok_or("indices lie outside their buffer")?;
         let indices: Vec<u32> = indices.into_u32().collect();
         match indices.iter().find(|&&index| index as usize >= count) {
-            Some(index) => Err(format!(
-                "a triangle names vertex {index}, but there are {count}"
-            )),
+            Some(index) => Err(format!("a triangle names vertex {index}, but there are {count}")),
             None => Ok(indices),
         }
     }
@@ -185,23 +168,16 @@ impl Reader<'_> {
         if let Some(info) = base.base_color_texture() {
             let set = info.tex_coord();
             if let Some(uv) = primitive.get(&Semantic::TexCoords(set)) {
-                check(
-                    &uv,
-                    &[DataType::F32, DataType::U8, DataType::U16],
-                    &[Dimensions::Vec2],
-                )?;
+                check(&uv, &[DataType::F32, DataType::U8, DataType::U16], &[Dimensions::Vec2])?;
                 let buffers = &self.buffers;
-                let reader =
-                    primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
+                let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|data| &data[..]));
                 let uv = reader
                     .read_tex_coords(set)
                     .ok_or("texture coordinates lie outside their buffer")?;
                 part.uv = uv.into_f32().collect();
                 image = Some(info.texture().source());
             } else {
-                log::warn!(
-                    "a surface of a model has a texture but no texture coordinates: its plain colour is used"
-                );
+                log::warn!("a surface of a model has a texture but no texture coordinates: its plain colour is used");
             }
         }
         let cut = match material.alpha_mode() {
@@ -224,8 +200,7 @@ impl Reader<'_> {
         };
         let factor = [0, 1, 2].map(|c| coded(key.factor[c]));
         let texels = texels.into_iter().map(|[r, g, b, a]| {
-            let [r, g, b] =
-                [(r, 0), (g, 1), (b, 2)].map(|(v, c)| (f32::from(v) * factor[c]).round() as u8);
+            let [r, g, b] = [(r, 0), (g, 1), (b, 2)].map(|(v, c)| (f32::from(v) * factor[c]).round() as u8);
             // Where the file's surface begins ours must, at one half.
             let alpha = f32::from(a) / 255.0 * key.factor[3];
             let alpha = key.cut.map_or(1.0, |cut| {
@@ -237,8 +212,7 @@ impl Reader<'_> {
             });
             [r, g, b, (alpha * 255.0).round() as u8]
         });
-        let texture =
-            Arc::new(Texture::new(width, height, texels.collect()).map_err(|e| e.to_string())?);
+        let texture = Arc::new(Texture::new(width, height, texels.collect()).map_err(|e| e.to_string())?);
         self.textures.push((key, texture.clone()));
         part.texture = Some(texture);
         Ok(())
@@ -251,10 +225,7 @@ impl Reader<'_> {
             Source::Uri { uri, .. } => check_uri(uri)?,
             Source::View { view, .. } => {
                 let end = view.offset().checked_add(view.length());
-                let held = self
-                    .buffers
-                    .get(view.buffer().index())
-                    .map_or(0, |data| data.len());
+                let held = self.buffers.get(view.buffer().index()).map_or(0, |data| data.len());
                 if end.is_none_or(|end| end > held) {
                     return Err(format!("picture {} lies outside its buffer", image.index()));
                 }
@@ -279,11 +250,7 @@ impl Reader<'_> {
             }
         };
         // Of 16 bits, in this machine's order, the upper 8 are enough.
-        let upper = if cfg!(target_endian = "little") {
-            bytes - 1
-        } else {
-            0
-        };
+        let upper = if cfg!(target_endian = "little") { bytes - 1 } else { 0 };
         let texel = |pixel: &[u8]| {
             let at = |c: usize| pixel[c * bytes + upper];
             match channels {
@@ -293,11 +260,7 @@ impl Reader<'_> {
                 _ => [at(0), at(1), at(2), at(3)],
             }
         };
-        let texels = data
-            .pixels
-            .chunks_exact(channels * bytes)
-            .map(texel)
-            .collect();
+        let texels = data.pixels.chunks_exact(channels * bytes).map(texel).collect();
         Ok((data.width as usize, data.height as usize, texels))
     }
 }
@@ -317,14 +280,9 @@ fn triangles(indices: &[u32], mode: Mode) -> Vec<[u32; 3]> {
         }
         Mode::TriangleFan => {
             let rim = indices.get(1..).unwrap_or_default();
-            rim.windows(2)
-                .map(|pair| [indices[0], pair[0], pair[1]])
-                .collect()
+            rim.windows(2).map(|pair| [indices[0], pair[0], pair[1]]).collect()
         }
-        _ => indices
-            .chunks_exact(3)
-            .map(|t| [t[0], t[1], t[2]])
-            .collect(),
+        _ => indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
     }
 }
 
@@ -378,9 +336,7 @@ fn check_names(root: &gltf::json::Root) -> Result<()> {
         None => image.uri.is_some(),
     };
     match root.images.iter().position(|image| !placed(image)) {
-        Some(index) => Err(format!(
-            "picture {index} does not say where it is, or of which kind"
-        )),
+        Some(index) => Err(format!("picture {index} does not say where it is, or of which kind")),
         None => Ok(()),
     }
 }
@@ -398,16 +354,11 @@ fn check(accessor: &Accessor, types: &[DataType], shapes: &[Dimensions]) -> Resu
             3 * MAX_MODEL_TRIANGLES
         ));
     }
-    let overlaps = |view: Option<buffer::View>, size: usize| {
-        view.and_then(|v| v.stride()).is_some_and(|s| s < size)
-    };
+    let overlaps = |view: Option<buffer::View>, size: usize| view.and_then(|v| v.stride()).is_some_and(|s| s < size);
     let sparse_overlaps = accessor.sparse().is_some_and(|sparse| {
         sparse.count() == 0
             || overlaps(Some(sparse.values().view()), accessor.size())
-            || overlaps(
-                Some(sparse.indices().view()),
-                sparse.indices().index_type().size(),
-            )
+            || overlaps(Some(sparse.indices().view()), sparse.indices().index_type().size())
     });
     if overlaps(accessor.view(), accessor.size()) || sparse_overlaps {
         return bad("its items overlap");
@@ -440,9 +391,5 @@ fn check_uri(uri: &str) -> Result<()> {
 
 /// The crate's message, on one line.
 fn one_line(error: &gltf::Error) -> String {
-    error
-        .to_string()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

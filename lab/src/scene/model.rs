@@ -47,9 +47,7 @@ pub(super) struct Part {
 /// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
     let fail = |reason: String| Error::file(path, reason);
-    let size = std::fs::metadata(path)
-        .map_err(|e| fail(e.to_string()))?
-        .len();
+    let size = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.len();
     if size > MAX_MODEL_BYTES {
         return Err(fail(format!(
             "{size} bytes; a model may have {MAX_MODEL_BYTES} at most"
@@ -68,10 +66,7 @@ pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>
     let parts = parts.map_err(fail)?;
     let frame = Frame::around(&parts, height, width).map_err(fail)?;
     let scene = Scene {
-        meshes: parts
-            .into_iter()
-            .flat_map(|part| sides(part, &frame, light))
-            .collect(),
+        meshes: parts.into_iter().flat_map(|part| sides(part, &frame, light)).collect(),
     };
     scene.check().map_err(|e| fail(e.to_string()))?;
     Ok(scene)
@@ -100,12 +95,9 @@ impl Frame {
     fn around(parts: &[Part], height: usize, width: usize) -> std::result::Result<Self, String> {
         let (mut low, mut high) = ([f64::MAX; 3], [f64::MIN; 3]);
         // Only what a triangle names is seen.
-        let corners = parts.iter().flat_map(|part| {
-            part.triangles
-                .iter()
-                .flatten()
-                .map(|&i| part.positions[i as usize])
-        });
+        let corners = parts
+            .iter()
+            .flat_map(|part| part.triangles.iter().flatten().map(|&i| part.positions[i as usize]));
         for p in corners {
             if !p.iter().all(|v| v.is_finite()) {
                 return Err(format!("vertex {p:?} is not finite"));
@@ -132,11 +124,7 @@ impl Frame {
                 extent[0], extent[1]
             ));
         }
-        let deep = if extent[2] > 0.0 {
-            DEPTH_FILL / extent[2]
-        } else {
-            0.0
-        };
+        let deep = if extent[2] > 0.0 { DEPTH_FILL / extent[2] } else { 0.0 };
         let at = [width as f64 / 2.0, height as f64 / 2.0];
         Ok(Self {
             middle: std::array::from_fn(|i| (low[i] + high[i]) / 2.0),
@@ -146,8 +134,7 @@ impl Frame {
     }
 
     fn place(&self, p: [f32; 3]) -> [f32; 3] {
-        let moved: [f64; 3] =
-            std::array::from_fn(|i| (f64::from(p[i]) - self.middle[i]) * self.scale[i]);
+        let moved: [f64; 3] = std::array::from_fn(|i| (f64::from(p[i]) - self.middle[i]) * self.scale[i]);
         [moved[0] + self.at[0], moved[1] + self.at[1], moved[2]].map(|v| v as f32)
     }
 }
@@ -181,9 +168,7 @@ fn sides(part: Part, frame: &Frame, light: Option<Light>) -> Vec<Mesh> {
         } else {
             part.uv
         },
-        texture: part
-            .texture
-            .unwrap_or_else(|| Arc::new(Texture::plain([1.0; 3]))),
+        texture: part.texture.unwrap_or_else(|| Arc::new(Texture::plain([1.0; 3]))),
     };
     let back = part.two_sided.then(|| Mesh {
         triangles: front.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect(),

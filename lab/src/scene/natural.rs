@@ -55,10 +55,7 @@ impl Ground {
     fn depths(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
         // A plane by its depth at the frame's middle and what it gains toward the edge in a direction.
         let plane = |dice: &mut Dice, middle: [f64; 2], slope: [f64; 2], angle: f64| {
-            let (middle, slope) = (
-                dice.range(middle[0], middle[1]),
-                dice.range(slope[0], slope[1]),
-            );
+            let (middle, slope) = (dice.range(middle[0], middle[1]), dice.range(slope[0], slope[1]));
             let (sin, cos) = libm::sincos(angle);
             move |u: f64, v: f64| middle + slope * (cos * (2.0 * u - 1.0) + sin * (2.0 * v - 1.0))
         };
@@ -87,11 +84,7 @@ impl Ground {
                 let block = dice.chance(0.3);
                 Box::new(move |u, v| {
                     let [a, b, c] = [&walls[0], &walls[1], &walls[2]].map(|wall| wall(u, v));
-                    if block {
-                        a.max(b).max(c) - 0.25
-                    } else {
-                        a.min(b).min(c)
-                    }
+                    if block { a.max(b).max(c) - 0.25 } else { a.min(b).min(c) }
                 })
             }
             _ => {
@@ -133,13 +126,7 @@ struct Maker<'a> {
 }
 
 impl<'a> Maker<'a> {
-    fn new(
-        mut dice: Dice,
-        height: f64,
-        width: f64,
-        ground: Ground,
-        photographs: &'a [Texture],
-    ) -> Self {
+    fn new(mut dice: Dice, height: f64, width: f64, ground: Ground, photographs: &'a [Texture]) -> Self {
         let [x, y, z] = dice.direction();
         let toward = z.abs() + 0.5;
         let length = (x * x + y * y + toward * toward).sqrt();
@@ -204,16 +191,12 @@ impl<'a> Maker<'a> {
         let thickness = self.dice.range(0.08, 0.25) as f32;
         let strokes = Pattern::strokes(size, lines, thickness, &mut self.dice);
         let mut colours = [self.colour(), self.colour()];
-        let (dark, bright) = (
-            self.dice.range(0.0, 0.35) as f32,
-            self.dice.range(0.8, 1.4) as f32,
-        );
+        let (dark, bright) = (self.dice.range(0.0, 0.35) as f32, self.dice.range(0.8, 1.4) as f32);
         let inverse = self.dice.chance(0.4);
-        for (colour, gain) in colours.iter_mut().zip(if inverse {
-            [dark, bright]
-        } else {
-            [bright, dark]
-        }) {
+        for (colour, gain) in colours
+            .iter_mut()
+            .zip(if inverse { [dark, bright] } else { [bright, dark] })
+        {
             *colour = colour.map(|v| (v * gain).min(1.0));
         }
         let [paper, ink] = colours;
@@ -242,11 +225,7 @@ impl<'a> Maker<'a> {
         let drop = self.dice.range(-0.5, 0.5) * self.dice.unit();
         let thread = Shape::grid(24, 1, |u, v| {
             let hang = sag * (4.0 * u * (u - 1.0) + 0.5);
-            [
-                length * (u - 0.5),
-                hang + half * (2.0 * v - 1.0),
-                drop * (u - 0.5),
-            ]
+            [length * (u - 0.5), hang + half * (2.0 * v - 1.0), drop * (u - 0.5)]
         });
         self.thin(thread, turn([0.0, 0.0, 1.0], angle), at, from)
     }
@@ -262,11 +241,7 @@ impl<'a> Maker<'a> {
         while let Some((from, angle, length, half)) = tips.pop() {
             let (sin, cos) = libm::sincos(angle);
             let lean = self.dice.range(-0.03, 0.03);
-            let to = [
-                from[0] - sin * length,
-                from[1] + cos * length,
-                from[2] + lean,
-            ];
+            let to = [from[0] - sin * length, from[1] + cos * length, from[2] + lean];
             let middle = std::array::from_fn(|i| 0.5 * (from[i] + to[i]));
             let along = turn([0.0, 0.0, 1.0], angle);
             shape.append(&Shape::sheet().moved([half, 0.5 * length, 1.0], along, middle));
@@ -292,10 +267,7 @@ impl<'a> Maker<'a> {
             colour = colour.map(|v| 0.25 * v);
         }
         let texture = Arc::new(Texture::plain(colour));
-        settle(
-            shape.place(&self.place([1.0; 3], rotation, 1.0, at), texture),
-            depth,
-        )
+        settle(shape.place(&self.place([1.0; 3], rotation, 1.0, at), texture), depth)
     }
 
     fn radius(&mut self) -> f64 {
@@ -317,13 +289,7 @@ impl<'a> Maker<'a> {
         }
     }
 
-    fn place(
-        &self,
-        scale_px: [f64; 3],
-        rotation: [[f64; 3]; 3],
-        depth_per_px: f64,
-        at: [f64; 2],
-    ) -> Place {
+    fn place(&self, scale_px: [f64; 3], rotation: [[f64; 3]; 3], depth_per_px: f64, at: [f64; 2]) -> Place {
         Place {
             scale_px,
             rotation,
@@ -349,9 +315,7 @@ impl<'a> Maker<'a> {
             }
         }
         let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-        let texels = surface
-            .into_iter()
-            .map(|[r, g, b]| [byte(r), byte(g), byte(b), 255]);
+        let texels = surface.into_iter().map(|[r, g, b]| [byte(r), byte(g), byte(b), 255]);
         Texture::sized(size.0, size.1, texels.collect())
     }
 
@@ -404,9 +368,7 @@ fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture
     let (width, height) = (photograph.width(), photograph.height());
     let largest = (width / size.0).min(height / size.1).max(1);
     let square = dice.integer(1, largest);
-    let corner = |dice: &mut Dice, whole: usize, part: usize| {
-        dice.integer(0, whole.saturating_sub(part * square))
-    };
+    let corner = |dice: &mut Dice, whole: usize, part: usize| dice.integer(0, whole.saturating_sub(part * square));
     let (left, top) = (corner(dice, width, size.0), corner(dice, height, size.1));
     let mean = |x: usize, y: usize| {
         let mut sum = [0u32; 3];
@@ -446,9 +408,7 @@ mod tests {
     #[test]
     fn a_seed_is_one_scene_on_every_machine() {
         let photographs = [gradient(150, 90), gradient(20, 30)];
-        let of = |seed, photographs: &[Texture]| {
-            format!("{:016x}", fingerprint(&rendered(seed, 96, photographs)))
-        };
+        let of = |seed, photographs: &[Texture]| format!("{:016x}", fingerprint(&rendered(seed, 96, photographs)));
         assert_eq!(
             [of(3, &[]), of(4, &[]), of(3, &photographs)],
             ["e48e8ddd55bf67de", "0bc8a2f21e96a15a", "fa42d97255cb3f1b"]
@@ -482,23 +442,15 @@ mod tests {
             // Steps between neighbours beyond what slanted planes have, a decade of size each.
             for pair in front.depth.windows((1, 2)) {
                 let step = (pair[(0, 1)] - pair[(0, 0)]).abs();
-                let class = [0.01, 0.03, 0.1, 0.3]
-                    .iter()
-                    .rposition(|&least| step > least);
+                let class = [0.01, 0.03, 0.1, 0.3].iter().rposition(|&least| step > least);
                 class.into_iter().for_each(|class| steps[class] += 1);
             }
         }
         let mean = means.iter().sum::<f64>() / means.len() as f64;
         assert!((0.4..0.5).contains(&mean), "mean amplitude {mean:.3}");
         let share = |is: &dyn Fn(f64) -> bool| means.iter().filter(|&&m| is(m)).count();
-        assert!(
-            share(&|m| m < 0.3) >= 6 && share(&|m| m > 0.6) >= 6,
-            "{means:.2?}"
-        );
-        assert!(
-            deciles.iter().all(|d| (0.02..0.25).contains(d)),
-            "{deciles:.3?}"
-        );
+        assert!(share(&|m| m < 0.3) >= 6 && share(&|m| m > 0.6) >= 6, "{means:.2?}");
+        assert!(deciles.iter().all(|d| (0.02..0.25).contains(d)), "{deciles:.3?}");
         assert!(steps.iter().all(|&count| count > 3000), "{steps:?}");
     }
 }

@@ -25,12 +25,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         );
         Vec::new()
     });
-    check_count(
-        models
-            .iter()
-            .map(|model| model.mesh.indices.len() / 3)
-            .sum(),
-    )?;
+    check_count(models.iter().map(|model| model.mesh.indices.len() / 3).sum())?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let textures = materials
         .iter()
@@ -43,11 +38,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
 }
 
 /// A model's part; `textures` are those of `materials`.
-fn part(
-    model: tobj::Model,
-    materials: &[Material],
-    textures: &[Option<Arc<Texture>>],
-) -> Result<Part> {
+fn part(model: tobj::Model, materials: &[Material], textures: &[Option<Arc<Texture>>]) -> Result<Part> {
     let mesh = model.mesh;
     let mut part = Part {
         positions: triples(&mesh.positions),
@@ -55,11 +46,7 @@ fn part(
         normals: triples(&mesh.normals),
         colour: triples(&mesh.vertex_color),
         // OBJ counts from the picture's bottom.
-        uv: mesh
-            .texcoords
-            .chunks_exact(2)
-            .map(|t| [t[0], 1.0 - t[1]])
-            .collect(),
+        uv: mesh.texcoords.chunks_exact(2).map(|t| [t[0], 1.0 - t[1]]).collect(),
         ..Part::default()
     };
     let count = part.positions.len();
@@ -79,9 +66,7 @@ fn part(
         ));
     }
     let number = mesh.material_id;
-    if let Some((material, texture)) =
-        number.and_then(|id| Some((materials.get(id)?, textures.get(id)?)))
-    {
+    if let Some((material, texture)) = number.and_then(|id| Some((materials.get(id)?, textures.get(id)?))) {
         clothe(&mut part, material, texture, &model.name);
     }
     if part.uv.len() != count {
@@ -94,15 +79,10 @@ fn part(
 fn clothe(part: &mut Part, material: &Material, texture: &Option<Arc<Texture>>, name: &str) {
     let pictured = texture.is_some() && part.uv.len() == part.positions.len();
     if texture.is_some() && !pictured {
-        log::warn!(
-            "object {name} has a texture but no texture coordinates: its plain colour is used"
-        );
+        log::warn!("object {name} has a texture but no texture coordinates: its plain colour is used");
     }
     part.texture = texture.clone().filter(|_| pictured);
-    let diffuse = material
-        .diffuse
-        .unwrap_or([1.0; 3])
-        .map(|v| v.clamp(0.0, 1.0));
+    let diffuse = material.diffuse.unwrap_or([1.0; 3]).map(|v| v.clamp(0.0, 1.0));
     // A picture stands for the diffuse colour, which many files leave black beside one.
     if !pictured {
         part.texture = Some(Arc::new(Texture::plain(diffuse)));
@@ -129,8 +109,7 @@ fn texture(folder: &Path, material: &Material) -> Result<Option<Arc<Texture>>> {
         .to_rgba8();
     let (width, height) = image.dimensions();
     let texels = image.pixels().map(|pixel| pixel.0).collect();
-    let texture =
-        Texture::new(width as usize, height as usize, texels).map_err(|e| e.to_string())?;
+    let texture = Texture::new(width as usize, height as usize, texels).map_err(|e| e.to_string())?;
     Ok(Some(Arc::new(texture)))
 }
 

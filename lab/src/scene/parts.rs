@@ -22,36 +22,22 @@ pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
         1 => (Shape::ball(detail, |_| 1.0), false),
         2 => (Shape::torus(detail, dice.range(0.12, 0.45)), false),
         3 => {
-            let waves = [0; 3].map(|_| {
-                (
-                    dice.direction(),
-                    dice.range(1.5, 6.0),
-                    dice.range(0.05, 0.22),
-                )
-            });
+            let waves = [0; 3].map(|_| (dice.direction(), dice.range(1.5, 6.0), dice.range(0.05, 0.22)));
             let bumpy = move |p: [f64; 3]| {
                 let bump = |(d, rate, height): ([f64; 3], f64, f64)| {
-                    height
-                        * libm::sin(rate * (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) + 7.0 * d[0])
+                    height * libm::sin(rate * (p[0] * d[0] + p[1] * d[1] + p[2] * d[2]) + 7.0 * d[0])
                 };
                 0.8 + waves.into_iter().map(bump).sum::<f64>()
             };
             (Shape::ball(detail, bumpy), false)
         }
-        4 => (
-            Shape::cylinder(detail, dice.pick(&[1.0, 1.0, 0.5, 0.0])),
-            false,
-        ),
+        4 => (Shape::cylinder(detail, dice.pick(&[1.0, 1.0, 0.5, 0.0])), false),
         5 => {
             let points = dice.integer(2, 9);
             let thickness = dice.range(0.05, 0.5);
             let outline = star(points, dice.range(0.3, 1.0));
             (
-                Shape::prism(&outline).moved(
-                    [1.0, 1.0, thickness],
-                    turn([0.0, 0.0, 1.0], 0.0),
-                    [0.0; 3],
-                ),
+                Shape::prism(&outline).moved([1.0, 1.0, thickness], turn([0.0, 0.0, 1.0], 0.0), [0.0; 3]),
                 false,
             )
         }
@@ -82,10 +68,7 @@ pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {
                 let r = 1.0 - wide + wide * cos_b;
                 [r * cos_a, r * sin_a, wide * sin_b]
             };
-            (
-                Shape::loop_tube(3 * detail, dice.range(0.05, 0.14), curve),
-                false,
-            )
+            (Shape::loop_tube(3 * detail, dice.range(0.05, 0.14), curve), false)
         }
         _ => {
             // A swarm: leaves, confetti, gravel.
@@ -108,10 +91,7 @@ pub(super) fn turned(dice: &mut Dice, flat: bool) -> [[f64; 3]; 3] {
     if flat {
         let (sin, cos) = libm::sincos(TAU * dice.unit());
         let tilt = dice.range(0.0, 1.4);
-        multiply(
-            turn([cos, sin, 0.0], tilt),
-            turn([0.0, 0.0, 1.0], TAU * dice.unit()),
-        )
+        multiply(turn([cos, sin, 0.0], tilt), turn([0.0, 0.0, 1.0], TAU * dice.unit()))
     } else {
         let [x, y, z] = dice.direction();
         let (sin, cos) = libm::sincos(TAU * 0.5 * dice.unit());
@@ -138,9 +118,7 @@ pub(super) fn stretch(dice: &mut Dice, radius: f64, flat: bool) -> [f64; 3] {
 /// ends of the volume its nearest or farthest point touches them.
 pub(super) fn settle(mut mesh: Mesh, depth: f64) -> Mesh {
     let heights = || mesh.positions.iter().map(|p| f64::from(p[2]));
-    let (low, high) = heights().fold((f64::MAX, f64::MIN), |(low, high), z| {
-        (low.min(z), high.max(z))
-    });
+    let (low, high) = heights().fold((f64::MAX, f64::MIN), |(low, high), z| (low.min(z), high.max(z)));
     let room = 1.0 - 2.0 * MARGIN;
     let press = (0.9 * room / (high - low).max(1e-9)).min(1.0);
     let half = 0.5 * press * (high - low);
@@ -164,28 +142,14 @@ pub(super) fn pattern(dice: &mut Dice, size: (usize, usize)) -> Pattern {
         0 => {
             let cells = repeats(dice);
             let stretch = dice.pick(&[1, 1, 1, 4]);
-            Pattern::noise(
-                size,
-                (cells, cells * stretch),
-                6,
-                dice.range(0.35, 0.85) as f32,
-                dice,
-            )
+            Pattern::noise(size, (cells, cells * stretch), 6, dice.range(0.35, 0.85) as f32, dice)
         }
         1 => {
             let waves = (
                 repeats(dice) as i32,
-                if dice.chance(0.5) {
-                    0
-                } else {
-                    repeats(dice) as i32
-                },
+                if dice.chance(0.5) { 0 } else { repeats(dice) as i32 },
             );
-            let waves = if dice.chance(0.5) {
-                (waves.1, -waves.0)
-            } else {
-                waves
-            };
+            let waves = if dice.chance(0.5) { (waves.1, -waves.0) } else { waves };
             let bend = dice.pick(&[0.0, 0.0, 0.5, 2.0]) as f32;
             let softness = dice.range(0.1, 1.0) as f32;
             Pattern::stripes(size, waves, bend, softness, dice)
@@ -223,11 +187,8 @@ pub(super) fn holes(dice: &mut Dice, size: (usize, usize)) -> Pattern {
         0 => Pattern::stripes(size, (count as i32, 0), 0.0, 0.2, dice),
         1 => {
             let bars = dice.range(0.15, 0.4) as f32;
-            let inside =
-                |x: usize, n: usize| ((x as f32 + 0.5) / n as f32 * count as f32).fract() < bars;
-            Pattern::from_fn(size, |x, y| {
-                f32::from(u8::from(inside(x, size.0) || inside(y, size.1)))
-            })
+            let inside = |x: usize, n: usize| ((x as f32 + 0.5) / n as f32 * count as f32).fract() < bars;
+            Pattern::from_fn(size, |x, y| f32::from(u8::from(inside(x, size.0) || inside(y, size.1))))
         }
         2 => Pattern::spots(size, count, dice.range(0.2, 0.45) as f32, dice),
         3 => Pattern::strokes(size, count.min(4), dice.range(0.1, 0.25) as f32, dice),

@@ -14,19 +14,12 @@ pub struct Pattern {
 
 impl Pattern {
     /// The pattern whose texel at (x, y), in texels, is `value(x, y)`, held to [0, 1]. Neither size may be zero.
-    pub fn from_fn(
-        (width, height): (usize, usize),
-        mut value: impl FnMut(usize, usize) -> f32,
-    ) -> Self {
+    pub fn from_fn((width, height): (usize, usize), mut value: impl FnMut(usize, usize) -> f32) -> Self {
         let mut values = Vec::with_capacity(width * height);
         for y in 0..height {
             values.extend((0..width).map(|x| value(x, y).clamp(0.0, 1.0)));
         }
-        Self {
-            width,
-            height,
-            values,
-        }
+        Self { width, height, values }
     }
 
     /// The value at column `x` and row `y`.
@@ -36,13 +29,7 @@ impl Pattern {
 
     /// Value noise of several octaves, stretched to span [0, 1]: `cells` lattice cells across and down in the first
     /// octave, twice as many in each next one, whose weight is `roughness` of the one before.
-    pub fn noise(
-        size: (usize, usize),
-        cells: (usize, usize),
-        octaves: u32,
-        roughness: f32,
-        dice: &mut Dice,
-    ) -> Self {
+    pub fn noise(size: (usize, usize), cells: (usize, usize), octaves: u32, roughness: f32, dice: &mut Dice) -> Self {
         let (width, height) = size;
         let mut values = vec![0.0f32; width * height];
         let mut weight = 1.0;
@@ -51,9 +38,7 @@ impl Pattern {
             let count = |cells: usize, size: usize| (cells << octave).clamp(1, size);
             let (across, down) = (count(cells.0, width), count(cells.1, height));
             let lattice: Vec<f32> = (0..across * down).map(|_| dice.unit() as f32).collect();
-            let columns: Vec<_> = (0..width)
-                .map(|x| lattice_place(x, width, across))
-                .collect();
+            let columns: Vec<_> = (0..width).map(|x| lattice_place(x, width, across)).collect();
             for y in 0..height {
                 let (top, bottom, t) = lattice_place(y, height, down);
                 blended.clear();
@@ -61,9 +46,7 @@ impl Pattern {
                     let (a, b) = (lattice[top * across + i], lattice[bottom * across + i]);
                     a + (b - a) * t
                 }));
-                for (value, &(left, right, t)) in
-                    values[y * width..][..width].iter_mut().zip(&columns)
-                {
+                for (value, &(left, right, t)) in values[y * width..][..width].iter_mut().zip(&columns) {
                     *value += weight * (blended[left] + (blended[right] - blended[left]) * t);
                 }
             }
@@ -72,33 +55,20 @@ impl Pattern {
                 break;
             }
         }
-        let (low, high) = values.iter().fold((f32::MAX, f32::MIN), |(low, high), &v| {
-            (low.min(v), high.max(v))
-        });
+        let (low, high) = values
+            .iter()
+            .fold((f32::MAX, f32::MIN), |(low, high), &v| (low.min(v), high.max(v)));
         let span = (high - low).max(1e-6);
         values.iter_mut().for_each(|v| *v = (*v - low) / span);
-        Self {
-            width,
-            height,
-            values,
-        }
+        Self { width, height, values }
     }
 
     /// Stripes, `waves` of them across and down together, bent by `bend` of a stripe times noise. `softness` in
     /// (0, 1]: the part of a stripe that its edge takes.
-    pub fn stripes(
-        size: (usize, usize),
-        waves: (i32, i32),
-        bend: f32,
-        softness: f32,
-        dice: &mut Dice,
-    ) -> Self {
+    pub fn stripes(size: (usize, usize), waves: (i32, i32), bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
-            let (u, v) = (
-                (x as f32 + 0.5) / size.0 as f32,
-                (y as f32 + 0.5) / size.1 as f32,
-            );
+            let (u, v) = ((x as f32 + 0.5) / size.0 as f32, (y as f32 + 0.5) / size.1 as f32);
             let bent = noise.as_ref().map_or(0.0, |noise| bend * noise.at(x, y));
             wave(u * waves.0 as f32 + v * waves.1 as f32 + bent, softness)
         })
@@ -113,16 +83,8 @@ impl Pattern {
 
     /// A wall: `courses` rows of `bricks`, every second row set off by half a brick, each brick of its own tone in
     /// [0.35, 1], joints of `joint` of a course at value 0.
-    pub fn bricks(
-        size: (usize, usize),
-        bricks: usize,
-        courses: usize,
-        joint: f32,
-        dice: &mut Dice,
-    ) -> Self {
-        let tones: Vec<f32> = (0..bricks * courses)
-            .map(|_| dice.range(0.35, 1.0) as f32)
-            .collect();
+    pub fn bricks(size: (usize, usize), bricks: usize, courses: usize, joint: f32, dice: &mut Dice) -> Self {
+        let tones: Vec<f32> = (0..bricks * courses).map(|_| dice.range(0.35, 1.0) as f32).collect();
         // A joint is as wide across as down.
         let aspect = (size.0 as f32 / bricks as f32) / (size.1 as f32 / courses as f32);
         Self::from_fn(size, |x, y| {
@@ -138,13 +100,11 @@ impl Pattern {
         })
     }
 
-    /// Discs on a jittered grid of `count` a side, value 1 on 0, their radius `radius` of a grid cell give or take half.
+    /// Discs on a jittered grid of `count` a side, value 1 on 0, their radius `radius` of a grid cell give or take
+    /// half.
     pub fn spots(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
         let points = jittered(dice, count);
-        let radii: Vec<f32> = points
-            .iter()
-            .map(|_| radius * dice.range(0.5, 1.5) as f32)
-            .collect();
+        let radii: Vec<f32> = points.iter().map(|_| radius * dice.range(0.5, 1.5) as f32).collect();
         // A texel's width in cells: the discs' edges are one texel soft.
         let soft = count as f32 / size.0.min(size.1) as f32;
         Self::from_fn(size, |x, y| {
@@ -174,13 +134,7 @@ impl Pattern {
     }
 
     /// Rings about the middle, `count` of them to the edge, bent by `bend` of a ring times noise: wood, targets.
-    pub fn rings(
-        size: (usize, usize),
-        count: f32,
-        bend: f32,
-        softness: f32,
-        dice: &mut Dice,
-    ) -> Self {
+    pub fn rings(size: (usize, usize), count: f32, bend: f32, softness: f32, dice: &mut Dice) -> Self {
         let noise = (bend > 0.0).then(|| Self::noise(size, (3, 3), 3, 0.5, dice));
         Self::from_fn(size, |x, y| {
             let u = 2.0 * (x as f32 + 0.5) / size.0 as f32 - 1.0;
@@ -193,8 +147,8 @@ impl Pattern {
     /// A smooth run there and back, `turns` (across, down) times.
     pub fn gradient(size: (usize, usize), turns: (i32, i32)) -> Self {
         Self::from_fn(size, |x, y| {
-            let t = (x as f32 + 0.5) / size.0 as f32 * turns.0 as f32
-                + (y as f32 + 0.5) / size.1 as f32 * turns.1 as f32;
+            let t =
+                (x as f32 + 0.5) / size.0 as f32 * turns.0 as f32 + (y as f32 + 0.5) / size.1 as f32 * turns.1 as f32;
             (2.0 * (t - t.floor()) - 1.0).abs()
         })
     }
@@ -213,15 +167,9 @@ impl Pattern {
                 // Strokes join points of a grid of 3 by 3, each starting where the last one ended.
                 let mut from = (dice.integer(0, 2), dice.integer(0, 2));
                 for _ in 0..dice.integer(2, 4) {
-                    let to = (
-                        (from.0 + dice.integer(0, 2)) % 3,
-                        (from.1 + dice.integer(1, 2)) % 3,
-                    );
+                    let to = ((from.0 + dice.integer(0, 2)) % 3, (from.1 + dice.integer(1, 2)) % 3);
                     let place = |(i, j): (usize, usize)| {
-                        [
-                            left + i as f32 * 0.5 * glyph_width,
-                            top + j as f32 * 0.5 * glyph_height,
-                        ]
+                        [left + i as f32 * 0.5 * glyph_width, top + j as f32 * 0.5 * glyph_height]
                     };
                     pattern.stroke(place(from), place(to), pen);
                     from = to;
@@ -264,21 +212,12 @@ impl Pattern {
     pub fn texture(&self, ramp: [[f32; 3]; 3]) -> Texture {
         let texel = |&value: &f32| {
             let upper = value >= 0.5;
-            let (from, to) = if upper {
-                (ramp[1], ramp[2])
-            } else {
-                (ramp[0], ramp[1])
-            };
+            let (from, to) = if upper { (ramp[1], ramp[2]) } else { (ramp[0], ramp[1]) };
             let t = 2.0 * value - f32::from(u8::from(upper));
-            let [r, g, b] =
-                std::array::from_fn(|c| ((from[c] + (to[c] - from[c]) * t) * 255.0 + 0.5) as u8);
+            let [r, g, b] = std::array::from_fn(|c| ((from[c] + (to[c] - from[c]) * t) * 255.0 + 0.5) as u8);
             [r, g, b, 255]
         };
-        Texture::sized(
-            self.width,
-            self.height,
-            self.values.iter().map(texel).collect(),
-        )
+        Texture::sized(self.width, self.height, self.values.iter().map(texel).collect())
     }
 
     /// `texture` with holes where the value is below one half; the pattern repeats where it is smaller.
@@ -297,11 +236,7 @@ impl Pattern {
 fn lattice_place(x: usize, size: usize, count: usize) -> (usize, usize, f32) {
     let position = (x as f32 + 0.5) * count as f32 / size as f32;
     let below = position as usize;
-    (
-        below % count,
-        (below + 1) % count,
-        smooth(position - below as f32),
-    )
+    (below % count, (below + 1) % count, smooth(position - below as f32))
 }
 
 /// 0 to 1 with level ends.

@@ -28,8 +28,8 @@ type Vertex = [f32; 8];
 ///
 /// Where the driver keeps 8 bits of subpixel precision, as all known ones do, coverage is the reference's; depths and
 /// colours differ in their last bits, so that a layer's holes, and the order of surfaces that touch, may differ in
-/// single pixels (measured on lavapipe: 19 of 7.4 million). On a software driver the reference is the faster of the two:
-/// five layers of a random scene of 384 x 384 take it 43 ms of processor time, depth peeling on lavapipe 76 ms.
+/// single pixels (measured on lavapipe: 19 of 7.4 million). On a software driver the reference is the faster of the
+/// two: five layers of a random scene of 384 x 384 take it 43 ms of processor time, depth peeling on lavapipe 76 ms.
 #[derive(Debug)]
 pub struct DepthPeeler {
     device: wgpu::Device,
@@ -75,16 +75,9 @@ impl DepthPeeler {
             required_limits: adapter.limits(),
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|e| {
-                Error::Input(format!(
-                    "the GPU {} cannot be opened: {}",
-                    info.name,
-                    one_line(&e)
-                ))
-            })?;
-        let (previous_layout, picture_layout, first, later) =
-            guarded(&device, || pipelines(&device))?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|e| Error::Input(format!("the GPU {} cannot be opened: {}", info.name, one_line(&e))))?;
+        let (previous_layout, picture_layout, first, later) = guarded(&device, || pipelines(&device))?;
         let adapter = format!("{} ({:?})", info.name, info.backend);
         Ok(Self {
             device,
@@ -111,15 +104,11 @@ impl DepthPeeler {
         check_size(height, width, layers)?;
         let most = self.device.limits().max_texture_dimension_2d as usize;
         if height.max(width) > most {
-            return Err(self.too_large(format!(
-                "a frame of {width}x{height} pixels; it takes {most} a side"
-            )));
+            return Err(self.too_large(format!("a frame of {width}x{height} pixels; it takes {most} a side")));
         }
         let scene = self.upload(scene, height, width)?;
         let row = (width * PIXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as usize);
-        let results = guarded(&self.device, || {
-            self.passes(&scene, height, width, layers, row)
-        })?;
+        let results = guarded(&self.device, || self.passes(&scene, height, width, layers, row))?;
         let mut ldi = Vec::with_capacity(layers);
         for buffer in results {
             ldi.push(self.read_layer(&buffer, height, width, row)?);
@@ -162,28 +151,13 @@ impl DepthPeeler {
                 let [u, v] = mesh.uv[index];
                 let [r, g, b] = mesh.colour.get(index).copied().unwrap_or([1.0; 3]);
                 // To 1/256 pixel, as the reference has it.
-                let clip = |v: f32, size: usize| {
-                    2.0 * (f64::from(v) * 256.0).round() / 256.0 / size as f64 - 1.0
-                };
-                [
-                    clip(x, width) as f32,
-                    -clip(y, height) as f32,
-                    0.5 - z,
-                    u,
-                    v,
-                    r,
-                    g,
-                    b,
-                ]
+                let clip = |v: f32, size: usize| 2.0 * (f64::from(v) * 256.0).round() / 256.0 / size as f64 - 1.0;
+                [clip(x, width) as f32, -clip(y, height) as f32, 0.5 - z, u, v, r, g, b]
             }));
             let bytes = (size_of_val(&vertices[..]) as u64).max(size_of_val(&indices[..]) as u64);
-            if bytes > limits.max_buffer_size
-                || indices.len() > u32::MAX as usize
-                || vertices.len() > i32::MAX as usize
+            if bytes > limits.max_buffer_size || indices.len() > u32::MAX as usize || vertices.len() > i32::MAX as usize
             {
-                return Err(
-                    self.too_large(format!("a scene of {} vertices and more", vertices.len()))
-                );
+                return Err(self.too_large(format!("a scene of {} vertices and more", vertices.len())));
             }
             draws.push(Draw {
                 indices: first as u32..indices.len() as u32,
@@ -220,9 +194,9 @@ impl DepthPeeler {
         };
         let texels = bytemuck::cast_slice(texture.texels());
         let order = wgpu::util::TextureDataOrder::LayerMajor;
-        let uploaded =
-            self.device
-                .create_texture_with_data(&self.queue, &descriptor, order, texels);
+        let uploaded = self
+            .device
+            .create_texture_with_data(&self.queue, &descriptor, order, texels);
         self.bind(&self.picture_layout, &uploaded)
     }
 
@@ -239,14 +213,7 @@ impl DepthPeeler {
     }
 
     /// Algorithm 1: the passes, each one's picture copied to a buffer of rows of `row` bytes.
-    fn passes(
-        &self,
-        scene: &Uploaded,
-        height: usize,
-        width: usize,
-        layers: usize,
-        row: usize,
-    ) -> Vec<wgpu::Buffer> {
+    fn passes(&self, scene: &Uploaded, height: usize, width: usize, layers: usize, row: usize) -> Vec<wgpu::Buffer> {
         let texture = |format, usage| {
             self.device.create_texture(&wgpu::TextureDescriptor {
                 label: None,
@@ -262,8 +229,7 @@ impl DepthPeeler {
         let target = texture(TARGET, wgpu::TextureUsages::COPY_SRC);
         let depths = [0; 2].map(|_| texture(DEPTH, wgpu::TextureUsages::TEXTURE_BINDING));
         let bound = [0, 1].map(|i| self.bind(&self.previous_layout, &depths[i]));
-        let view =
-            |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let (target_view, depth_views) = (view(&target), [view(&depths[0]), view(&depths[1])]);
 
         let mut encoder = self
@@ -306,15 +272,8 @@ impl DepthPeeler {
         results
     }
 
-    fn read_layer(
-        &self,
-        buffer: &wgpu::Buffer,
-        height: usize,
-        width: usize,
-        row: usize,
-    ) -> Result<LdiLayer> {
-        let failed =
-            |what: String| Error::Input(format!("{} failed to render: {what}", self.adapter));
+    fn read_layer(&self, buffer: &wgpu::Buffer, height: usize, width: usize, row: usize) -> Result<LdiLayer> {
+        let failed = |what: String| Error::Input(format!("{} failed to render: {what}", self.adapter));
         let (send, receive) = mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
             // The receiver waits below.
@@ -327,9 +286,7 @@ impl DepthPeeler {
             .recv()
             .map_err(|e| failed(one_line(&e)))?
             .map_err(|e| failed(one_line(&e)))?;
-        let bytes = buffer
-            .get_mapped_range(..)
-            .map_err(|e| failed(one_line(&e)))?;
+        let bytes = buffer.get_mapped_range(..).map_err(|e| failed(one_line(&e)))?;
         let mut layer = LdiLayer {
             rgb: Array3::zeros((3, height, width)),
             depth: Array2::from_elem((height, width), f32::NAN),
@@ -444,20 +401,13 @@ fn guarded<T>(device: &wgpu::Device, work: impl FnOnce() -> T) -> Result<T> {
     // Scopes are popped last in, first out.
     let errors = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
     match errors.into_iter().flatten().next() {
-        Some(error) => Err(Error::Input(format!(
-            "the GPU refused: {}",
-            one_line(&error)
-        ))),
+        Some(error) => Err(Error::Input(format!("the GPU refused: {}", one_line(&error)))),
         None => Ok(done),
     }
 }
 
 fn one_line(error: &impl std::fmt::Display) -> String {
-    error
-        .to_string()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Begins a pass that paints over an empty `target`, tested against an empty `depth`.

@@ -7,9 +7,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::dice::Dice;
-use super::parts::{
-    DEPTH_PER_PX, MARGIN, MAX_TEXELS, holes, pattern, settle, shape, stretch, turned,
-};
+use super::parts::{DEPTH_PER_PX, MARGIN, MAX_TEXELS, holes, pattern, settle, shape, stretch, turned};
 use super::pattern::Pattern;
 use super::shapes::{Light, Place, Shape, turn};
 use super::{Mesh, Scene, Texture};
@@ -97,11 +95,7 @@ impl Maker {
         let (middle, slope, bumps) = match style {
             1 => (dice.range(0.62, 1.0), dice.range(0.02, 0.35), 0.0),
             2 => (dice.range(0.5, 0.7), dice.range(0.3, 0.5), 0.0),
-            _ => (
-                dice.range(0.55, 0.9),
-                dice.range(0.0, 0.2),
-                dice.range(0.1, 0.5),
-            ),
+            _ => (dice.range(0.55, 0.9), dice.range(0.0, 0.2), dice.range(0.1, 0.5)),
         };
         let (sin, cos) = libm::sincos(TAU * dice.unit());
         let pieces = if bumps > 0.0 { 24 } else { 1 };
@@ -114,19 +108,12 @@ impl Maker {
         let reach = sin.abs() + cos.abs();
         let depth_at = |u: f64, v: f64| {
             let tilt = slope * (cos * (2.0 * u - 1.0) + sin * (2.0 * v - 1.0)) / reach;
-            let (i, j) = (
-                (u * pieces as f64 + 0.5) as usize,
-                (v * pieces as f64 + 0.5) as usize,
-            );
+            let (i, j) = ((u * pieces as f64 + 0.5) as usize, (v * pieces as f64 + 0.5) as usize);
             (middle + tilt + bumps * (f64::from(relief.at(i, j)) - 0.5)).clamp(0.01, 1.0 - MARGIN)
         };
         let sheet = Shape::grid(pieces, pieces, |u, v| {
             let (w, h) = (1.02 * self.width, 1.02 * self.height);
-            [
-                w * (u - 0.5),
-                h * (v - 0.5),
-                (0.5 - depth_at(u, v)) / DEPTH_PER_PX,
-            ]
+            [w * (u - 0.5), h * (v - 0.5), (0.5 - depth_at(u, v)) / DEPTH_PER_PX]
         });
         Some(sheet.place(
             &self.place([1.0; 3], turn([0.0, 0.0, 1.0], 0.0), 1.0, [0.5, 0.5, 0.0]),
@@ -150,10 +137,7 @@ impl Maker {
             .round()
             .clamp(4.0, MAX_TEXELS / 2.0) as usize
             * 2;
-        let mut texture = self.texture(
-            (size, size),
-            &[0.0, 0.15, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0],
-        );
+        let mut texture = self.texture((size, size), &[0.0, 0.15, 0.5, 0.5, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
         if self.dice.chance(if flat { 0.35 } else { 0.06 }) {
             texture = holes(&mut self.dice, (size, size)).cut(&texture);
         }
@@ -178,16 +162,12 @@ impl Maker {
     fn texture(&mut self, size: (usize, usize), contrasts: &[f32]) -> Texture {
         let ramp = [0; 3].map(|_| self.palette.colour(&mut self.dice));
         let contrast = self.dice.pick(contrasts);
-        let ramp = ramp.map(|colour| {
-            std::array::from_fn(|c| ramp[1][c] + (colour[c] - ramp[1][c]) * contrast)
-        });
+        let ramp = ramp.map(|colour| std::array::from_fn(|c| ramp[1][c] + (colour[c] - ramp[1][c]) * contrast));
         let pattern = pattern(&mut self.dice, size);
         let dice = &mut self.dice;
         if dice.chance(0.5) {
             let grain = Pattern::noise(size, (size.0 / 4, size.1 / 4), 2, 0.7, dice);
-            return pattern
-                .mixed(&grain, dice.range(0.05, 0.3) as f32)
-                .texture(ramp);
+            return pattern.mixed(&grain, dice.range(0.05, 0.3) as f32).texture(ramp);
         }
         pattern.texture(ramp)
     }
@@ -278,10 +258,7 @@ pub(super) mod tests {
         }
         let total: f64 = deciles.iter().sum();
         let shares = deciles.map(|count| count / total);
-        assert!(
-            shares.iter().all(|share| (0.05..=0.16).contains(share)),
-            "{shares:.3?}"
-        );
+        assert!(shares.iter().all(|share| (0.05..=0.16).contains(share)), "{shares:.3?}");
         // The paper: valid pixels become few with each layer; the fifth still has some.
         assert!(
             layers

@@ -29,12 +29,7 @@ struct Hit {
 /// depth count once, for the triangle that comes first in the scene: as depth peeling (Algorithm 1) has it.
 ///
 /// An error if the frame or `layers` is zero or too large, or if the scene fails [`Scene::check`].
-pub fn render_ldi_reference(
-    scene: &Scene,
-    height: usize,
-    width: usize,
-    layers: usize,
-) -> Result<Ldi> {
+pub fn render_ldi_reference(scene: &Scene, height: usize, width: usize, layers: usize) -> Result<Ldi> {
     scene.check()?;
     check_size(height, width, layers)?;
     let nothing = Hit {
@@ -57,9 +52,7 @@ pub fn render_ldi_reference(
 
 /// An error if a rendering of that size has nothing in it or too much.
 pub(super) fn check_size(height: usize, width: usize, layers: usize) -> Result<()> {
-    let count = height
-        .checked_mul(width)
-        .and_then(|pixels| pixels.checked_mul(layers));
+    let count = height.checked_mul(width).and_then(|pixels| pixels.checked_mul(layers));
     if !count.is_some_and(|count| (1..=MAX_HITS).contains(&count)) {
         return Err(Error::Input(format!(
             "cannot render {layers} layers of {width}x{height} pixels: at least one of each, and {MAX_HITS} pixels in all at most"
@@ -82,34 +75,28 @@ impl Frame {
             let [x, y, _] = mesh.positions[index as usize];
             [x, y].map(|v| (f64::from(v) * SUBPIXEL as f64).round() as i64)
         };
-        // With y down, a front face has negative area; taken the other way round its edge functions are positive inside.
+        // With y down, a front face has negative area; taken the other way round its edge functions are positive
+        // inside.
         let corners = [a, c, b];
         let p = corners.map(fixed);
         let area = edge(p[0], p[1], p[2]);
         if area <= 0 {
             return;
         }
-        let values =
-            |value: &dyn Fn(usize) -> f32| corners.map(|index| f64::from(value(index as usize)));
+        let values = |value: &dyn Fn(usize) -> f32| corners.map(|index| f64::from(value(index as usize)));
         let depths = values(&|index| 0.5 - mesh.positions[index][2]);
-        let [nearest, farthest] = [f64::min, f64::max]
-            .map(|end: fn(f64, f64) -> f64| end(end(depths[0], depths[1]), depths[2]));
+        let [nearest, farthest] =
+            [f64::min, f64::max].map(|end: fn(f64, f64) -> f64| end(end(depths[0], depths[1]), depths[2]));
         let uvs = [0, 1].map(|i| values(&|index| mesh.uv[index][i]));
-        let tints = [0, 1, 2]
-            .map(|i| values(&|index| mesh.colour.get(index).map_or(1.0, |colour| colour[i])));
-        let included = [(p[1], p[2]), (p[2], p[0]), (p[0], p[1])]
-            .map(|(from, to)| i64::from(!is_top_left(from, to)));
+        let tints = [0, 1, 2].map(|i| values(&|index| mesh.colour.get(index).map_or(1.0, |colour| colour[i])));
+        let included = [(p[1], p[2]), (p[2], p[0]), (p[0], p[1])].map(|(from, to)| i64::from(!is_top_left(from, to)));
 
         let span = |axis: usize, size: usize| {
             let low = p.iter().map(|p| p[axis]).min().unwrap_or(0);
             let high = p.iter().map(|p| p[axis]).max().unwrap_or(0);
             // Pixel i's centre is at i + ½: the first and the last centre within [low, high].
-            let first = (low - SUBPIXEL / 2 + SUBPIXEL - 1)
-                .div_euclid(SUBPIXEL)
-                .max(0);
-            let last = (high - SUBPIXEL / 2)
-                .div_euclid(SUBPIXEL)
-                .min(size as i64 - 1);
+            let first = (low - SUBPIXEL / 2 + SUBPIXEL - 1).div_euclid(SUBPIXEL).max(0);
+            let last = (high - SUBPIXEL / 2).div_euclid(SUBPIXEL).min(size as i64 - 1);
             first..last + 1
         };
         for y in span(1, self.height) {
@@ -146,9 +133,7 @@ impl Frame {
                 if texel[3] < ALPHA_CUT {
                     continue;
                 }
-                let rgb = std::array::from_fn(|i| {
-                    (texel[i] * at_centre(tints[i]) as f32).clamp(0.0, 1.0)
-                });
+                let rgb = std::array::from_fn(|i| (texel[i] * at_centre(tints[i]) as f32).clamp(0.0, 1.0));
                 hits[place..].rotate_right(1);
                 hits[place] = Hit { depth, rgb };
             }
@@ -237,10 +222,7 @@ mod tests {
             .map(|&(d, rgb)| wall([0., 9.], [0., 6.], [d, d], rgb))
             .collect();
         let ldi = render(meshes.clone(), 4);
-        for (layer, (d, rgb)) in [(0.2, GREEN), (0.5, BLUE), (0.7, RED)]
-            .into_iter()
-            .enumerate()
-        {
+        for (layer, (d, rgb)) in [(0.2, GREEN), (0.5, BLUE), (0.7, RED)].into_iter().enumerate() {
             assert_eq!(colour(&ldi, layer, 3, 4), rgb);
             assert!((ldi.layers[layer].depth[[3, 4]] - d).abs() < 1e-6);
         }
@@ -296,10 +278,7 @@ mod tests {
         assert_eq!(colour(&ldi, 1, 5, 2), BLUE);
         assert_eq!(colour(&ldi, 0, 5, 6), BLUE);
         let seen = colour(&ldi, 0, 5, 2);
-        assert!(
-            (seen[0] - 100.0 / 255.0).abs() < 1e-6 && seen[2] == 0.0,
-            "{seen:?}"
-        );
+        assert!((seen[0] - 100.0 / 255.0).abs() < 1e-6 && seen[2] == 0.0, "{seen:?}");
         assert!(ldi.layers[0].rgb.iter().all(|v| (0.0..=1.0).contains(v)));
     }
 
@@ -345,30 +324,17 @@ mod tests {
         for mesh in &scene.meshes {
             for t in &mesh.triangles {
                 let [a, b, c] = t.map(|i| mesh.positions[i as usize].map(f64::from));
-                let turn = |a: [f64; 3], b: [f64; 3]| {
-                    (b[0] - a[0]) * (a[1] - y) - (b[1] - a[1]) * (a[0] - x)
-                };
+                let turn = |a: [f64; 3], b: [f64; 3]| (b[0] - a[0]) * (a[1] - y) - (b[1] - a[1]) * (a[0] - x);
                 // Counter-clockwise as seen, with y down.
                 let area = (c[0] - a[0]) * (b[1] - a[1]) - (b[0] - a[0]) * (c[1] - a[1]);
                 let w = [turn(b, c), turn(c, a), turn(a, b)];
-                let near = |p: [f64; 3], q: [f64; 3], w: f64| {
-                    w.abs() < 0.006 * (q[0] - p[0]).hypot(q[1] - p[1]).max(1e-3)
-                };
-                let bounds = |k: usize| {
-                    (
-                        a[k].min(b[k]).min(c[k]) - 0.01,
-                        a[k].max(b[k]).max(c[k]) + 0.01,
-                    )
-                };
+                let near =
+                    |p: [f64; 3], q: [f64; 3], w: f64| w.abs() < 0.006 * (q[0] - p[0]).hypot(q[1] - p[1]).max(1e-3);
+                let bounds = |k: usize| (a[k].min(b[k]).min(c[k]) - 0.01, a[k].max(b[k]).max(c[k]) + 0.01);
                 let (left, right) = bounds(0);
                 let (top, bottom) = bounds(1);
                 let close = (left..right).contains(&x) && (top..bottom).contains(&y);
-                if close
-                    && (near(b, c, w[0])
-                        || near(c, a, w[1])
-                        || near(a, b, w[2])
-                        || area.abs() < 0.01)
-                {
+                if close && (near(b, c, w[0]) || near(c, a, w[1]) || near(a, b, w[2]) || area.abs() < 0.01) {
                     doubtful = true;
                 }
                 if area > 0.0 && w.iter().all(|&w| w >= 0.0) {
@@ -378,11 +344,7 @@ mod tests {
                     let uv = [0, 1].map(|i| mix(t.map(|v| mesh.uv[v as usize][i])) as f32);
                     let texel = mesh.texture.sample(uv);
                     // A hole's border, or the depth's slope, is moved by the rounding of vertices.
-                    let slope = [a, b, c]
-                        .iter()
-                        .map(|p| (0.5 - p[2] - d).abs())
-                        .fold(0.0, f64::max)
-                        / area.sqrt();
+                    let slope = [a, b, c].iter().map(|p| (0.5 - p[2] - d).abs()).fold(0.0, f64::max) / area.sqrt();
                     doubtful |= (texel[3] - ALPHA_CUT).abs() < 0.1 || slope > 0.05;
                     if texel[3] >= ALPHA_CUT {
                         let tint = |i: usize| {
@@ -428,18 +390,13 @@ mod tests {
                             "seed {seed} ({y}, {x}): {d} for {expected}"
                         );
                         let seen = colour(&ldi, index, y, x);
-                        let worst = (0..3)
-                            .map(|i| (f64::from(seen[i]) - rgb[i]).abs())
-                            .fold(0.0, f64::max);
+                        let worst = (0..3).map(|i| (f64::from(seen[i]) - rgb[i]).abs()).fold(0.0, f64::max);
                         assert!(worst < 0.05, "seed {seed} ({y}, {x}): {seen:?} for {rgb:?}");
                     }
                 }
             }
         }
-        assert!(
-            sure > 3 * height * width && second > 1000,
-            "{sure} {second}"
-        );
+        assert!(sure > 3 * height * width && second > 1000, "{sure} {second}");
     }
 
     #[test]
@@ -459,13 +416,8 @@ mod tests {
         let refused = |change: &dyn Fn(&mut Mesh), reason: &str| {
             let mut scene = scene.clone();
             change(&mut scene.meshes[0]);
-            let message = render_ldi_reference(&scene, 4, 4, 1)
-                .unwrap_err()
-                .to_string();
-            assert!(
-                message.contains("mesh 0") && message.contains(reason),
-                "{message}"
-            );
+            let message = render_ldi_reference(&scene, 4, 4, 1).unwrap_err().to_string();
+            assert!(message.contains("mesh 0") && message.contains(reason), "{message}");
         };
         refused(&|mesh| mesh.triangles[1][2] = 4, "vertex 4");
         refused(&|mesh| mesh.positions[0][1] = f32::NAN, "not finite");

@@ -69,12 +69,8 @@ impl Shape {
         let at = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
         for j in 0..rows {
             for i in 0..columns {
-                shape
-                    .triangles
-                    .push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
-                shape
-                    .triangles
-                    .push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+                shape.triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+                shape.triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
             }
         }
         shape.normals = vec![[0.0; 3]; shape.positions.len()];
@@ -96,10 +92,7 @@ impl Shape {
         };
         (0..=rows).for_each(|j| share(at(0, j), at(columns, j)));
         (0..=columns).for_each(|i| share(at(i, 0), at(i, rows)));
-        shape
-            .normals
-            .iter_mut()
-            .for_each(|normal| *normal = unit(*normal));
+        shape.normals.iter_mut().for_each(|normal| *normal = unit(*normal));
         shape
     }
 
@@ -255,9 +248,7 @@ impl Shape {
             [cx + x, cy - y, cz + place.depth_per_px * z].map(|v| v as f32)
         };
         let colour = |light: Light| {
-            let shade = move |n: &[f64; 3]| {
-                [light.on(unit(rotate(&place.rotation, scaled(*n, inverse)))) as f32; 3]
-            };
+            let shade = move |n: &[f64; 3]| [light.on(unit(rotate(&place.rotation, scaled(*n, inverse)))) as f32; 3];
             self.normals.iter().map(shade).collect()
         };
         Mesh {
@@ -288,11 +279,8 @@ impl Shape {
         }
         for index in 0..count {
             let (a, b) = (middle + 1 + index, middle + 1 + (index + 1) % count);
-            self.triangles.push(if side > 0.0 {
-                [middle, a, b]
-            } else {
-                [middle, b, a]
-            });
+            self.triangles
+                .push(if side > 0.0 { [middle, a, b] } else { [middle, b, a] });
         }
     }
 }
@@ -391,19 +379,11 @@ mod tests {
         vec![
             ("cuboid", Shape::cuboid(), 8.0),
             ("ball", Shape::ball(64, |_| 1.0), 4.0 / 3.0 * TAU / 2.0),
-            (
-                "torus",
-                Shape::torus(64, 0.25),
-                TAU / 2.0 * 0.25 * 0.25 * TAU * 0.75,
-            ),
+            ("torus", Shape::torus(64, 0.25), TAU / 2.0 * 0.25 * 0.25 * TAU * 0.75),
             ("rod", Shape::cylinder(64, 1.0), TAU),
             ("cone", Shape::cylinder(64, 0.0), TAU / 3.0),
             ("prism", Shape::prism(&hexagon), 2.0 * 1.5 * 3f64.sqrt()),
-            (
-                "tube",
-                Shape::loop_tube(64, 0.2, knot),
-                TAU / 2.0 * 0.04 * TAU * 0.8,
-            ),
+            ("tube", Shape::loop_tube(64, 0.2, knot), TAU / 2.0 * 0.04 * TAU * 0.8),
         ]
     }
 
@@ -418,26 +398,17 @@ mod tests {
                 .map(|t| dot(corner(t, 0), cross(corner(t, 1), corner(t, 2))) / 6.0)
                 .sum();
             // An eight-sided tube holds a tenth less than a round one.
-            assert!(
-                (sum / volume - 1.0).abs() < 0.11,
-                "{name}: volume {sum} for {volume}"
-            );
+            assert!((sum / volume - 1.0).abs() < 0.11, "{name}: volume {sum} for {volume}");
             // The areas of a closed surface add up to nothing.
             let area = shape.triangles.iter().fold([0.0; 3], |sum, t| {
                 add(
                     sum,
-                    cross(
-                        sub(corner(t, 1), corner(t, 0)),
-                        sub(corner(t, 2), corner(t, 0)),
-                    ),
+                    cross(sub(corner(t, 1), corner(t, 0)), sub(corner(t, 2), corner(t, 0))),
                 )
             });
             assert!(length(area) < 1e-9, "{name}: {area:?}");
             for t in &shape.triangles {
-                let face = cross(
-                    sub(corner(t, 1), corner(t, 0)),
-                    sub(corner(t, 2), corner(t, 0)),
-                );
+                let face = cross(sub(corner(t, 1), corner(t, 0)), sub(corner(t, 2), corner(t, 0)));
                 for &index in t {
                     assert!(
                         dot(face, shape.normals[index as usize]) >= -1e-12,

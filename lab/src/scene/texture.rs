@@ -22,21 +22,13 @@ impl Texture {
                 texels.len()
             )));
         }
-        Ok(Self {
-            width,
-            height,
-            texels,
-        })
+        Ok(Self { width, height, texels })
     }
 
     /// [`new`](Self::new) where the caller made the count right and not zero.
     pub(super) fn sized(width: usize, height: usize, texels: Vec<[u8; 4]>) -> Self {
         debug_assert!(!texels.is_empty() && texels.len() == width * height);
-        Self {
-            width,
-            height,
-            texels,
-        }
+        Self { width, height, texels }
     }
 
     /// A texture of one colour, RGB in [0, 1].
@@ -69,10 +61,7 @@ impl Texture {
     pub fn sample(&self, uv: [f32; 2]) -> [f32; 4] {
         let (x0, x1, fx) = neighbours(uv[0], self.width);
         let (y0, y1, fy) = neighbours(uv[1], self.height);
-        let (top, bottom) = (
-            &self.texels[y0 * self.width..],
-            &self.texels[y1 * self.width..],
-        );
+        let (top, bottom) = (&self.texels[y0 * self.width..], &self.texels[y1 * self.width..]);
         let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
         std::array::from_fn(|c| {
             let at = |row: &[[u8; 4]], x: usize| f32::from(row[x][c]);
@@ -91,11 +80,7 @@ fn neighbours(t: f32, size: usize) -> (usize, usize, f32) {
     let below = position.floor();
     // `below` is −1 at least and `size` at most (where rounding made t − ⌊t⌋ one).
     let wrap = |index: f32| {
-        if index < 0.0 {
-            size - 1
-        } else {
-            index as usize % size
-        }
+        if index < 0.0 { size - 1 } else { index as usize % size }
     };
     (wrap(below), wrap(below + 1.0), position - below)
 }
@@ -111,12 +96,7 @@ mod tests {
         let texture = Texture::new(
             2,
             2,
-            vec![
-                [0, 0, 0, 255],
-                [255, 0, 0, 255],
-                [0, 255, 0, 255],
-                [255, 255, 51, 0],
-            ],
+            vec![[0, 0, 0, 255], [255, 0, 0, 255], [0, 255, 0, 255], [255, 255, 51, 0]],
         )
         .unwrap();
         assert_eq!(texture.sample([0.25, 0.25]), [0.0, 0.0, 0.0, 1.0]);

@@ -33,11 +33,7 @@ struct Case {
 
 impl std::fmt::Display for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(
-            f,
-            "{}, {} layers of {}",
-            self.isa, self.shape.2, self.shape.1
-        )
+        write!(f, "{}, {} layers of {}", self.isa, self.shape.2, self.shape.1)
     }
 }
 
@@ -47,24 +43,14 @@ fn cases(isas: Vec<Isa>) -> Vec<Case> {
         .collect()
 }
 
-fn run(
-    bencher: Bencher<'_, '_>,
-    shape: (usize, usize, usize),
-    frame: impl Fn(&[f32], &mut [f32]) + Sync,
-) {
+fn run(bencher: Bencher<'_, '_>, shape: (usize, usize, usize), frame: impl Fn(&[f32], &mut [f32]) + Sync) {
     let area = SIZE.0 * SIZE.1;
     let input: Vec<f32> = (0..shape.0 * area)
         .map(|k| (k * 7919 % 255) as f32 / 255.0 - 0.5)
         .collect();
     let mut output = vec![0.0; OUTPUTS * area];
-    let macs: usize = layers(shape)
-        .iter()
-        .map(|(inputs, outputs)| 9 * inputs * outputs)
-        .sum();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .unwrap();
+    let macs: usize = layers(shape).iter().map(|(inputs, outputs)| 9 * inputs * outputs).sum();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     bencher
         .counter(ItemsCount::new(macs * area))
         .bench_local(|| pool.install(|| frame(&input, &mut output)));

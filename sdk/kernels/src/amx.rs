@@ -107,11 +107,9 @@ impl Steps {
 
     /// The (line, column tap) of each line of each step, in order; `None` where a panel's tile is not full.
     fn lines(&self) -> Vec<Option<(usize, usize)>> {
-        let direct =
-            (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
+        let direct = (0..3).flat_map(|kx| (0..self.direct * TILE).map(move |line| Some((line, kx))));
         let first = self.direct * TILE;
-        let panel =
-            (0..3).flat_map(|kx| (first..first + self.left).map(move |line| Some((line, kx))));
+        let panel = (0..3).flat_map(|kx| (first..first + self.left).map(move |line| Some((line, kx))));
         let mut lines: Vec<_> = direct.chain(panel).collect();
         lines.resize(self.count() * TILE, None);
         lines
@@ -132,9 +130,7 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
                         Some((line, kx)) => {
                             // Slot 0 holds row `ky` with turn + ky ≡ 0 (mod 3).
                             let ky = (line / groups + 3 - turn) % 3;
-                            i32::from_le_bytes(
-                                taps.group(filter, line % groups, ky, *kx).map(|w| w as u8),
-                            )
+                            i32::from_le_bytes(taps.group(filter, line % groups, ky, *kx).map(|w| w as u8))
                         }
                         None => 0,
                     }));
@@ -212,11 +208,7 @@ fn each_block(
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
 fn each_block_in(
-    Work {
-        biases,
-        panels,
-        sums,
-    }: &mut Work,
+    Work { biases, panels, sums }: &mut Work,
     layer: &Packed,
     window: Window<'_, u8>,
     first: usize,
@@ -228,10 +220,7 @@ fn each_block_in(
     let stride = geometry.stride();
     let rows = window.rows();
     check_rows(&rows, layer.groups, geometry);
-    assert!(
-        window.slots.len() == 3 * layer.groups * stride
-            && to.next_multiple_of(2 * TILE) <= geometry.padded
-    );
+    assert!(window.slots.len() == 3 * layer.groups * stride && to.next_multiple_of(2 * TILE) <= geometry.padded);
     let turn_words = steps.count() * STEP_WORDS;
     let weights = &layer.weights[(first / FILTERS * 3 + window.first) * turn_words..][..turn_words];
     let filters = (layer.outputs.next_multiple_of(8) - first).min(FILTERS);
@@ -297,10 +286,7 @@ fn each_block_in(
 /// Tiles are configured.
 #[inline(always)]
 unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
-    let (first, second) = (
-        biases.0.as_ptr(),
-        biases.0[if wide { TILE } else { 0 }..].as_ptr(),
-    );
+    let (first, second) = (biases.0.as_ptr(), biases.0[if wide { TILE } else { 0 }..].as_ptr());
     // SAFETY: 16 and 8 lines of 64 bytes lie there.
     unsafe {
         if wide {
@@ -319,13 +305,7 @@ unsafe fn start(biases: &Biases, wide: bool, narrow: bool) {
 /// # Safety
 /// Tiles are configured; 24 lines of 64 bytes lie at `weights`, 16 lines `stride` bytes apart at each of `lines`.
 #[inline(always)]
-unsafe fn step(
-    weights: *const i32,
-    lines: [*const u8; 2],
-    stride: usize,
-    wide: bool,
-    narrow: bool,
-) {
+unsafe fn step(weights: *const i32, lines: [*const u8; 2], stride: usize, wide: bool, narrow: bool) {
     // SAFETY: as the function's own.
     unsafe {
         asm!("tileloadd tmm6, [{a} + {s}]", "tileloadd tmm7, [{b} + {s}]",
@@ -365,13 +345,7 @@ unsafe fn finish(sums: &mut Sums, wide: bool, narrow: bool) {
     }
 }
 
-fn hidden_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     for first in (0..layer.outputs).step_by(FILTERS) {
         // SAFETY: `kernels` has found the features.
         unsafe { hidden_filters(layer, first, window, skip, out, geometry) };
@@ -388,35 +362,20 @@ fn hidden_filters(
     geometry: Geometry,
 ) {
     let size = (layer.outputs - first).min(FILTERS);
-    each_block(
-        layer,
-        window,
-        first,
-        (0, geometry.width),
-        geometry,
-        |x, sums| {
-            for g in 0..size / GROUP {
-                for (half, sums) in sums.0.iter().enumerate() {
-                    let group = (first / GROUP + g) * geometry.stride();
-                    let at = group + geometry.start() + (x + half * TILE) * GROUP;
-                    // SAFETY: a line of sums is 64 bytes long.
-                    let four = std::array::from_fn(|k| unsafe {
-                        _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast())
-                    });
-                    requantise(layer, first + g * GROUP, four, skip, out, at);
-                }
+    each_block(layer, window, first, (0, geometry.width), geometry, |x, sums| {
+        for g in 0..size / GROUP {
+            for (half, sums) in sums.0.iter().enumerate() {
+                let group = (first / GROUP + g) * geometry.stride();
+                let at = group + geometry.start() + (x + half * TILE) * GROUP;
+                // SAFETY: a line of sums is 64 bytes long.
+                let four = std::array::from_fn(|k| unsafe { _mm512_load_si512(sums[g * GROUP + k].as_ptr().cast()) });
+                requantise(layer, first + g * GROUP, four, skip, out, at);
             }
-        },
-    );
+        }
+    });
 }
 
-fn last_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     // SAFETY: `kernels` has found the features.
     unsafe { last_filters(layer, window, out, from, geometry) }
 }
@@ -431,32 +390,25 @@ fn last_filters(
 ) {
     let to = from + out[0].len();
     let multiplier = &layer.multiplier[..OUTPUTS];
-    each_block(
-        layer,
-        window,
-        0,
-        (from / BLOCK * BLOCK, to),
-        geometry,
-        |block, sums| {
-            for (half, sums) in sums.0.iter().enumerate() {
-                let x = block + half * TILE;
-                let (start, end) = (x.max(from), (x + TILE).min(to));
-                if start >= end {
-                    continue;
-                }
-                for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
-                    let mut values = [0.0; TILE];
-                    // SAFETY: the features are this function's; 16 sums and 16 values.
-                    unsafe {
-                        let sums = _mm512_cvtepi32_ps(_mm512_load_si512(sums.as_ptr().cast()));
-                        let scaled = _mm512_mul_ps(sums, _mm512_set1_ps(*multiplier));
-                        _mm512_storeu_ps(values.as_mut_ptr(), scaled);
-                    }
-                    out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
-                }
+    each_block(layer, window, 0, (from / BLOCK * BLOCK, to), geometry, |block, sums| {
+        for (half, sums) in sums.0.iter().enumerate() {
+            let x = block + half * TILE;
+            let (start, end) = (x.max(from), (x + TILE).min(to));
+            if start >= end {
+                continue;
             }
-        },
-    );
+            for ((out, sums), multiplier) in out.iter_mut().zip(sums).zip(multiplier) {
+                let mut values = [0.0; TILE];
+                // SAFETY: the features are this function's; 16 sums and 16 values.
+                unsafe {
+                    let sums = _mm512_cvtepi32_ps(_mm512_load_si512(sums.as_ptr().cast()));
+                    let scaled = _mm512_mul_ps(sums, _mm512_set1_ps(*multiplier));
+                    _mm512_storeu_ps(values.as_mut_ptr(), scaled);
+                }
+                out[start - from..end - from].copy_from_slice(&values[start - x..end - x]);
+            }
+        }
+    });
 }
 
 /// Multiply-accumulates in tiles, for the machine's peak.

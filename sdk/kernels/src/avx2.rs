@@ -54,26 +54,14 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
         .collect()
 }
 
-fn hidden_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let rows = window.rows();
     // SAFETY: `int8_kernels` has found the features.
     unsafe { int8_filters(layer, &rows, skip, out, geometry) }
 }
 
 #[target_feature(enable = "avx2,fma")]
-fn int8_filters(
-    layer: &Packed,
-    rows: &[&[u8]; 3],
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+fn int8_filters(layer: &Packed, rows: &[&[u8]; 3], skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let groups = layer.outputs / GROUP;
     assert!(out.len() >= groups * geometry.stride());
     assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
@@ -95,10 +83,7 @@ fn int8_filters(
                         }
                         _ => requantise(four, multiplier),
                     };
-                    _mm256_storeu_si256(
-                        out.as_mut_ptr().add(at).cast(),
-                        _mm256_adds_epu8(value, zero),
-                    );
+                    _mm256_storeu_si256(out.as_mut_ptr().add(at).cast(), _mm256_adds_epu8(value, zero));
                 }
             }
         }
@@ -117,10 +102,7 @@ fn int8_sums(
 ) -> [[__m256i; INT8_BLOCKS]; GROUP] {
     let words = 9 * layer.groups * GROUP * 2;
     let weights = &layer.weights[g * words..][..words];
-    assert!(
-        rows.iter()
-            .all(|row| row.len() >= layer.groups * geometry.stride())
-    );
+    assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
     assert!(x + 8 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
     let even = _mm256_set1_epi16(255);
     let mut sums = [[_mm256_setzero_si256(); INT8_BLOCKS]; GROUP];
@@ -145,8 +127,7 @@ fn int8_sums(
                             let pair = _mm256_set1_epi32(*weight);
                             weight = weight.add(1);
                             for (sum, halves) in sums.iter_mut().zip(halves) {
-                                *sum =
-                                    _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
+                                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(halves[half], pair));
                             }
                         }
                     }
@@ -173,22 +154,14 @@ fn requantise(sums: [__m256i; GROUP], multiplier: &[f32]) -> __m256i {
 /// The same with the sum of a skip.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn requantise_sum(
-    sums: [__m256i; GROUP],
-    multiplier: &[f32],
-    factors: SkipSum,
-    skip: __m256i,
-) -> __m256i {
+fn requantise_sum(sums: [__m256i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m256i) -> __m256i {
     pack_groups(std::array::from_fn(|k| {
         let v = _mm256_mul_ps(_mm256_cvtepi32_ps(sums[k]), _mm256_set1_ps(multiplier[k]));
         let v = _mm256_max_ps(v, _mm256_setzero_ps());
         let a = match factors.relu {
             Some(factor) => {
                 let v = _mm256_min_ps(v, _mm256_set1_ps(255.0));
-                _mm256_mul_ps(
-                    _mm256_cvtepi32_ps(_mm256_cvtps_epi32(v)),
-                    _mm256_set1_ps(factor),
-                )
+                _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtps_epi32(v)), _mm256_set1_ps(factor))
             }
             None => v,
         };
@@ -206,22 +179,11 @@ fn requantise_sum(
 fn pack_groups([a, b, c, d]: [__m256i; GROUP]) -> __m256i {
     // Both packs work in 128-bit lanes: four pixels of a, then of b, c and d; the shuffle turns this 4×4 block.
     let bytes = _mm256_packus_epi16(_mm256_packs_epi32(a, b), _mm256_packs_epi32(c, d));
-    let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(
-        0x0f0b_0703,
-        0x0e0a_0602,
-        0x0d09_0501,
-        0x0c08_0400,
-    ));
+    let turn = _mm256_broadcastsi128_si256(_mm_set_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400));
     _mm256_shuffle_epi8(bytes, turn)
 }
 
-fn last_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     let rows = window.rows();
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `int8_kernels` has found the features.
@@ -242,12 +204,7 @@ fn int8_last_block(
             let sums = int8_sums(layer, g, rows, x + start, geometry);
             for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
                 let multiplier = _mm256_set1_ps(layer.multiplier[o]);
-                for (values, sum) in values[o][start..]
-                    .as_chunks_mut::<8>()
-                    .0
-                    .iter_mut()
-                    .zip(sums)
-                {
+                for (values, sum) in values[o][start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
                     let value = _mm256_mul_ps(_mm256_cvtepi32_ps(sum), multiplier);
                     // SAFETY: 8 values.
                     unsafe { _mm256_storeu_ps(values.as_mut_ptr(), value) };
@@ -257,13 +214,7 @@ fn int8_last_block(
     }
 }
 
-fn f32_hidden_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    skip: Option<&[f32]>,
-    out: &mut [f32],
-    geometry: Geometry,
-) {
+fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
     for first in (0..layer.outputs).step_by(GROUP) {
         let range = first * geometry.stride()..(first + GROUP) * geometry.stride();
         let skip = skip.map(|skip| &skip[range.clone()]);
@@ -281,9 +232,7 @@ fn f32_filters(
     out: &mut [f32],
     geometry: Geometry,
 ) {
-    assert!(
-        out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len())
-    );
+    assert!(out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len()));
     for x in (0..geometry.width).step_by(8 * F32_BLOCKS) {
         let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
         for (o, sums) in sums.iter().enumerate() {
@@ -313,10 +262,7 @@ fn f32_sums<const O: usize>(
     geometry: Geometry,
 ) -> [[__m256; F32_BLOCKS]; O] {
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
-    assert!(
-        rows.iter()
-            .all(|row| row.len() >= layer.inputs * geometry.stride())
-    );
+    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
     assert!(x + 8 * F32_BLOCKS < geometry.padded + MARGIN);
     let mut sums = [[_mm256_setzero_ps(); F32_BLOCKS]; O];
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
@@ -329,8 +275,7 @@ fn f32_sums<const O: usize>(
             let mut pixels = row.as_ptr().add(geometry.start() + x - 1);
             for _ in 0..layer.inputs {
                 for kx in 0..3 {
-                    let values: [__m256; F32_BLOCKS] =
-                        std::array::from_fn(|b| _mm256_loadu_ps(pixels.add(kx + 8 * b)));
+                    let values: [__m256; F32_BLOCKS] = std::array::from_fn(|b| _mm256_loadu_ps(pixels.add(kx + 8 * b)));
                     for sums in &mut sums {
                         let w = _mm256_set1_ps(*weight);
                         weight = weight.add(1);
@@ -346,13 +291,7 @@ fn f32_sums<const O: usize>(
     sums
 }
 
-fn f32_last_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn f32_last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `f32_kernels` has found the features.
         unsafe { f32_last_block(layer, rows, x, values, geometry) }
@@ -370,11 +309,7 @@ fn f32_last_block(
     const SPAN: usize = 8 * F32_BLOCKS;
     let (wide, narrow) = values.split_at_mut(GROUP);
     for start in (0..BLOCK).step_by(SPAN) {
-        store(
-            wide,
-            start,
-            f32_sums::<GROUP>(layer, 0, rows, x + start, geometry),
-        );
+        store(wide, start, f32_sums::<GROUP>(layer, 0, rows, x + start, geometry));
         store(
             narrow,
             start,
@@ -386,11 +321,7 @@ fn f32_last_block(
 /// Stores the registers that fall into the block.
 #[inline]
 #[target_feature(enable = "avx2")]
-fn store<const O: usize>(
-    values: &mut [[f32; BLOCK]],
-    start: usize,
-    sums: [[__m256; F32_BLOCKS]; O],
-) {
+fn store<const O: usize>(values: &mut [[f32; BLOCK]], start: usize, sums: [[__m256; F32_BLOCKS]; O]) {
     for (values, sums) in values.iter_mut().zip(sums) {
         for (values, sum) in values[start..].as_chunks_mut::<8>().0.iter_mut().zip(sums) {
             // SAFETY: 8 values.
@@ -400,12 +331,7 @@ fn store<const O: usize>(
 }
 
 /// [`int8::quantise_row`], compiled for AVX2. The AVX-512 kernels take it too: they imply AVX2.
-pub(crate) fn quantise_row(
-    source: SourceRow<'_>,
-    rounding: Rounding,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+pub(crate) fn quantise_row(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
     #[target_feature(enable = "avx2")]
     fn compiled(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
         int8::quantise_row(source, rounding, out, geometry);

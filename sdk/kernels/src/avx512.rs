@@ -26,13 +26,7 @@ fn size(left: usize) -> usize {
     }
 }
 
-fn hidden_row(
-    layer: &Packed,
-    rows: &[&[f32]; 3],
-    skip: Option<&[f32]>,
-    out: &mut [f32],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
     let mut first = 0;
     while first < layer.outputs {
         let size = size(layer.outputs - first);
@@ -51,13 +45,7 @@ fn hidden_row(
     }
 }
 
-fn last_row(
-    layer: &Packed,
-    rows: &[&[f32]; 3],
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `kernels` has found the feature.
         unsafe { last_block(layer, rows, x, values, geometry) }
@@ -104,10 +92,7 @@ fn sums<const O: usize, const B: usize>(
     geometry: Geometry,
 ) -> [[__m512; B]; O] {
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
-    assert!(
-        rows.iter()
-            .all(|row| row.len() >= layer.inputs * geometry.stride())
-    );
+    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
     assert!(x + 16 * B <= geometry.padded && MARGIN >= 1);
     let mut sums = [[_mm512_setzero_ps(); B]; O];
     for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
@@ -120,8 +105,7 @@ fn sums<const O: usize, const B: usize>(
             let mut pixels = row.as_ptr().add(geometry.start() + x - 1);
             for _ in 0..layer.inputs {
                 for kx in 0..3 {
-                    let values: [__m512; B] =
-                        std::array::from_fn(|b| _mm512_loadu_ps(pixels.add(kx + 16 * b)));
+                    let values: [__m512; B] = std::array::from_fn(|b| _mm512_loadu_ps(pixels.add(kx + 16 * b)));
                     for (o, sums) in sums.iter_mut().enumerate() {
                         let weight = _mm512_set1_ps(*weight.add(o));
                         for (sum, value) in sums.iter_mut().zip(values) {
@@ -138,13 +122,7 @@ fn sums<const O: usize, const B: usize>(
 }
 
 #[target_feature(enable = "avx512f")]
-fn last_block(
-    layer: &Packed,
-    rows: &[&[f32]; 3],
-    x: usize,
-    values: &mut [[f32; BLOCK]; OUTPUTS],
-    geometry: Geometry,
-) {
+fn last_block(layer: &Packed, rows: &[&[f32]; 3], x: usize, values: &mut [[f32; BLOCK]; OUTPUTS], geometry: Geometry) {
     let sums = sums::<OUTPUTS, 4>(layer, 0, rows, x, geometry);
     for (sums, values) in sums.iter().zip(values) {
         for (sum, values) in sums.iter().zip(values.as_chunks_mut::<16>().0) {

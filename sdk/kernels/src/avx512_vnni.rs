@@ -33,13 +33,7 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
     taps.dot_words(&vec![together; outputs / together])
 }
 
-fn hidden_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let rows = window.rows();
     check_rows(&rows, layer.groups, geometry);
     let mut x = 0;
@@ -57,13 +51,7 @@ fn hidden_row(
     }
 }
 
-fn last_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     let rows = window.rows();
     last_row_by_blocks(out, from, |x, values| {
         // SAFETY: `kernels` has found the features.
@@ -73,10 +61,7 @@ fn last_row(
 
 /// Checks that three rows hold `groups` groups of blocks and margins, so that block reads stay inside.
 pub(crate) fn check_rows(rows: &[&[u8]; 3], groups: usize, geometry: Geometry) {
-    assert!(
-        rows.iter()
-            .all(|row| row.len() >= groups * geometry.stride())
-    );
+    assert!(rows.iter().all(|row| row.len() >= groups * geometry.stride()));
     assert!(geometry.group == GROUP && geometry.padded.is_multiple_of(BLOCK) && MARGIN >= 16);
 }
 
@@ -135,9 +120,8 @@ unsafe fn sums<const O: usize, const B: usize>(
             let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
             for _ in 0..groups {
                 for kx in 0..3 {
-                    let values: [__m512i; B] = std::array::from_fn(|b| {
-                        _mm512_loadu_si512(pixels.add((kx + 16 * b) * GROUP).cast())
-                    });
+                    let values: [__m512i; B] =
+                        std::array::from_fn(|b| _mm512_loadu_si512(pixels.add((kx + 16 * b) * GROUP).cast()));
                     for (o, sums) in sums.iter_mut().enumerate() {
                         let weight = _mm512_set1_epi32(*weight.add(o));
                         for (sum, value) in sums.iter_mut().zip(values) {
@@ -154,25 +138,12 @@ unsafe fn sums<const O: usize, const B: usize>(
 }
 
 #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
-fn last_block(
-    layer: &Packed,
-    rows: &[&[u8]; 3],
-    x: usize,
-    values: &mut [[f32; BLOCK]; OUTPUTS],
-    geometry: Geometry,
-) {
+fn last_block(layer: &Packed, rows: &[&[u8]; 3], x: usize, values: &mut [[f32; BLOCK]; OUTPUTS], geometry: Geometry) {
     check_rows(rows, layer.groups, geometry);
     assert!(layer.weights.len() == OUTPUTS * 9 * layer.groups && x + BLOCK <= geometry.padded);
     // SAFETY: the asserts above.
     unsafe {
-        let sums = sums::<OUTPUTS, 4>(
-            rows,
-            layer.groups,
-            &layer.weights,
-            &layer.bias[..OUTPUTS],
-            x,
-            geometry,
-        );
+        let sums = sums::<OUTPUTS, 4>(rows, layer.groups, &layer.weights, &layer.bias[..OUTPUTS], x, geometry);
         for (o, (sums, values)) in sums.iter().zip(values).enumerate() {
             let multiplier = _mm512_set1_ps(layer.multiplier[o]);
             for (b, sum) in sums.iter().enumerate() {
@@ -183,8 +154,8 @@ fn last_block(
     }
 }
 
-/// From the sums of four filters at 16 pixels to their group in the next layer's input, `at` in its row `out`, as in that of
-/// the skip.
+/// From the sums of four filters at 16 pixels to their group in the next layer's input, `at` in its row `out`, as in
+/// that of the skip.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
 pub(crate) fn requantise(
@@ -227,12 +198,7 @@ fn without_skip(sums: [__m512i; GROUP], multiplier: &[f32]) -> __m512i {
 /// The same with the sum of a skip.
 #[inline]
 #[target_feature(enable = "avx512f,avx512bw")]
-fn with_skip(
-    sums: [__m512i; GROUP],
-    multiplier: &[f32],
-    factors: SkipSum,
-    skip: __m512i,
-) -> __m512i {
+fn with_skip(sums: [__m512i; GROUP], multiplier: &[f32], factors: SkipSum, skip: __m512i) -> __m512i {
     let zero = _mm512_setzero_ps();
     let skip_factor = _mm512_set1_ps(factors.skip);
     let values = std::array::from_fn(|k| {

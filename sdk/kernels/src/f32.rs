@@ -73,13 +73,8 @@ impl F32Chain {
             .ok_or_else(|| format!("this processor has no f32 kernels '{isa}'"))?;
         crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
         let pack = |layer: &F32Layer| {
-            if layer.kernel.len() != layer.outputs * layer.inputs * 9
-                || layer.bias.len() != layer.outputs
-            {
-                return Err(format!(
-                    "weights or biases do not fit {} filters",
-                    layer.outputs
-                ));
+            if layer.kernel.len() != layer.outputs * layer.inputs * 9 || layer.bias.len() != layer.outputs {
+                return Err(format!("weights or biases do not fit {} filters", layer.outputs));
             }
             let mut weights = Vec::with_capacity(layer.kernel.len());
             let mut first = 0;
@@ -88,9 +83,10 @@ impl F32Chain {
                 for ky in 0..3 {
                     for channel in 0..layer.inputs {
                         for kx in 0..3 {
-                            weights.extend((first..first + size).map(|filter| {
-                                layer.kernel[((filter * layer.inputs + channel) * 3 + ky) * 3 + kx]
-                            }));
+                            weights.extend(
+                                (first..first + size)
+                                    .map(|filter| layer.kernel[((filter * layer.inputs + channel) * 3 + ky) * 3 + kx]),
+                            );
                         }
                     }
                 }
@@ -104,11 +100,7 @@ impl F32Chain {
             })
         };
         let layers = layers.iter().map(pack).collect::<Result<_, _>>()?;
-        Ok(F32Chain {
-            isa,
-            kernels,
-            layers,
-        })
+        Ok(F32Chain { isa, kernels, layers })
     }
 
     /// The kernels in use.
@@ -130,14 +122,7 @@ impl F32Chain {
     ///
     /// # Panics
     /// If a length does not fit the size.
-    pub fn run(
-        &self,
-        input: &[f32],
-        output: &mut [f32],
-        size: (usize, usize),
-        tiling: Tiling,
-        scratch: &Scratch<f32>,
-    ) {
+    pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<f32>) {
         let area = size.0 * size.1;
         assert_eq!(input.len(), self.inputs() * area, "planes of the input");
         assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
@@ -191,31 +176,14 @@ impl Chain for F32Chain {
     }
 
     fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
-        copy_rows(
-            source,
-            &mut out[self.layers[0].outputs * geometry.stride()..],
-            geometry,
-        );
+        copy_rows(source, &mut out[self.layers[0].outputs * geometry.stride()..], geometry);
     }
 
-    fn hidden_row(
-        &self,
-        i: usize,
-        window: Window<'_, f32>,
-        skip: Option<&[f32]>,
-        out: &mut [f32],
-        geometry: Geometry,
-    ) {
+    fn hidden_row(&self, i: usize, window: Window<'_, f32>, skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
         (self.kernels.hidden_row)(&self.layers[i], &window.rows(), skip, out, geometry);
     }
 
-    fn last_row(
-        &self,
-        window: Window<'_, f32>,
-        out: [&mut [f32]; OUTPUTS],
-        from: usize,
-        geometry: Geometry,
-    ) {
+    fn last_row(&self, window: Window<'_, f32>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
         if let Some(layer) = self.layers.last() {
             (self.kernels.last_row)(layer, &window.rows(), out, from, geometry);
         }
@@ -224,7 +192,6 @@ impl Chain for F32Chain {
 
 fn copy_rows(source: SourceRow<'_>, out: &mut [f32], geometry: Geometry) {
     for (c, out) in out.chunks_exact_mut(geometry.stride()).enumerate() {
-        out[geometry.start()..][..geometry.width]
-            .copy_from_slice(source.channel(c, geometry.width));
+        out[geometry.start()..][..geometry.width].copy_from_slice(source.channel(c, geometry.width));
     }
 }

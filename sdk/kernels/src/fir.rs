@@ -78,10 +78,7 @@ impl Fir {
             isa: Isa::Portable,
             kernel: portable::kernel,
         };
-        Isa::f32()
-            .into_iter()
-            .find_map(Fir::new)
-            .unwrap_or(portable)
+        Isa::f32().into_iter().find_map(Fir::new).unwrap_or(portable)
     }
 
     /// The instruction set in use.
@@ -95,21 +92,11 @@ impl Fir {
     ///
     /// # Panics
     /// If `out` is no whole number of [`RUN`]s, its parts differ in length, or a place lies beyond `source`.
-    pub fn filter(
-        &self,
-        taps: &Taps,
-        source: [&[f32]; 2],
-        places: &[[usize; 2]],
-        out: [&mut [f32]; 2],
-    ) {
+    pub fn filter(&self, taps: &Taps, source: [&[f32]; 2], places: &[[usize; 2]], out: [&mut [f32]; 2]) {
         let length = out[0].len();
         assert!(!taps.is_empty() && taps.len() == places.len());
         assert!(length.is_multiple_of(RUN) && out[1].len() == length);
-        let last = places
-            .as_flattened()
-            .iter()
-            .fold(0, |last, at| last.max(*at))
-            + length;
+        let last = places.as_flattened().iter().fold(0, |last, at| last.max(*at)) + length;
         assert!(last <= source[0].len() && last <= source[1].len());
         let [re, im] = out;
         let run = Run {

@@ -1,7 +1,7 @@
 //! The quantised chain: what it computes, to the bit, and how its weights are packed for the kernels.
 //!
-//! Activations are u8, weights s8, sums exact in 32 bits. After a sum come, in f32 and in this order (`rint` rounds half
-//! to even, `sat` clamps to 0…255, each operation rounds by itself, nothing is fused):
+//! Activations are u8, weights s8, sums exact in 32 bits. After a sum come, in f32 and in this order (`rint` rounds
+//! half to even, `sat` clamps to 0…255, each operation rounds by itself, nothing is fused):
 //!
 //! - `v = f32(sum + bias) · multiplier[filter]`;
 //! - without a skip, `q = sat(rint(v))`: saturation is the ReLU;
@@ -12,7 +12,8 @@
 //!
 //! The last layer yields `f32(sum + bias) · multiplier[filter]`.
 //!
-//! A row is grouped by four channels: `[channel/4][pixel][4]`. The concatenated network input starts a group of its own.
+//! A row is grouped by four channels: `[channel/4][pixel][4]`. The concatenated network input starts a group of its
+//! own.
 
 use crate::wavefront::{self, Chain, Geometry, Rows, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
@@ -126,9 +127,7 @@ impl Taps<'_> {
         std::array::from_fn(|k| {
             let channel = match group.checked_sub(split) {
                 None => Some(group * GROUP + k).filter(|&c| c < self.features),
-                Some(after) => {
-                    Some(self.features + after * GROUP + k).filter(|&c| c < self.layer.inputs)
-                }
+                Some(after) => Some(self.features + after * GROUP + k).filter(|&c| c < self.layer.inputs),
             };
             match channel {
                 Some(c) if filter < self.layer.outputs => {
@@ -157,9 +156,7 @@ impl Taps<'_> {
                 for group in 0..self.groups() {
                     for kx in 0..3 {
                         for filter in first..first + size {
-                            words.push(i32::from_le_bytes(
-                                self.group(filter, group, ky, kx).map(|w| w as u8),
-                            ));
+                            words.push(i32::from_le_bytes(self.group(filter, group, ky, kx).map(|w| w as u8)));
                         }
                     }
                 }
@@ -271,13 +268,9 @@ impl Int8Chain {
             packed.push(Packed::new(&taps, next_zero, &kernels));
         }
         let zero_points: Vec<u8> = layers.iter().map(|l| l.zero_point).collect();
-        let settled =
-            first.zero_point == input.zero_point && last.zero_point == concatenated.zero_point;
+        let settled = first.zero_point == input.zero_point && last.zero_point == concatenated.zero_point;
         if !settled || zero_points[1..layers.len() - 1].iter().any(|&z| z != 0) {
-            return Err(
-                "hidden inputs have zero point 0, the first and last those of their quantisers"
-                    .into(),
-            );
+            return Err("hidden inputs have zero point 0, the first and last those of their quantisers".into());
         }
         for scale in [input.scale, concatenated.scale] {
             if !scale.is_normal() || scale < 0.0 {
@@ -317,14 +310,7 @@ impl Int8Chain {
     ///
     /// # Panics
     /// If a length does not fit the size.
-    pub fn run(
-        &self,
-        input: &[f32],
-        output: &mut [f32],
-        size: (usize, usize),
-        tiling: Tiling,
-        scratch: &Scratch<u8>,
-    ) {
+    pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<u8>) {
         let area = size.0 * size.1;
         assert_eq!(input.len(), self.inputs() * area, "planes of the input");
         assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
@@ -354,21 +340,14 @@ impl Int8Chain {
 /// Sums must fit 32 bits, and their products with the factors stay where conversions are exact.
 fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
     let (outputs, per_filter) = (layer.outputs, layer.inputs * 9);
-    if layer.kernel.len() != outputs * per_filter
-        || layer.bias.len() != outputs
-        || layer.multiplier.len() != outputs
-    {
+    if layer.kernel.len() != outputs * per_filter || layer.bias.len() != outputs || layer.multiplier.len() != outputs {
         return Err(format!(
             "weights, biases or multipliers do not fit {outputs} filters of {per_filter} weights"
         ));
     }
     for (o, (&bias, &multiplier)) in layer.bias.iter().zip(&layer.multiplier).enumerate() {
         let weights = &layer.kernel[o * per_filter..][..per_filter];
-        let reach: i64 = weights
-            .iter()
-            .map(|&w| 255 * i64::from(w).abs())
-            .sum::<i64>()
-            + 2 * i64::from(bias).abs();
+        let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum::<i64>() + 2 * i64::from(bias).abs();
         if 2 * reach > i64::from(i32::MAX) {
             return Err(format!("sums of filter {o} do not fit 32 bits"));
         }
@@ -388,9 +367,7 @@ fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
         .chain(layer.requantise.rescale)
         .find(|f| !f.is_normal() || *f < 0.0 || f64::from(*f) * 1e3 > LARGEST)
     {
-        Some(bad) => Err(format!(
-            "a rounding scales by {bad}, out of any range that makes sense"
-        )),
+        Some(bad) => Err(format!("a rounding scales by {bad}, out of any range that makes sense")),
         None => Ok(()),
     }
 }
@@ -398,8 +375,8 @@ fn check_numbers(layer: &Int8Layer, is_last: bool) -> Result<(), String> {
 impl Chain for Int8Chain {
     type Element = u8;
     const GROUP: usize = GROUP;
-    // A byte is worked on as long as four of f32, so rings may outgrow the cache: narrower strips only cost their edges,
-    // 4 % at 30 layers.
+    // A byte is worked on as long as four of f32, so rings may outgrow the cache: narrower strips only cost their
+    // edges, 4 % at 30 layers.
     const CACHE: usize = 1 << 21;
 
     fn layers(&self) -> usize {
@@ -442,24 +419,11 @@ impl Chain for Int8Chain {
         (self.kernels.quantise_row)(source, rounding, out, geometry);
     }
 
-    fn hidden_row(
-        &self,
-        i: usize,
-        window: Window<'_, u8>,
-        skip: Option<&[u8]>,
-        out: &mut [u8],
-        geometry: Geometry,
-    ) {
+    fn hidden_row(&self, i: usize, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
         (self.kernels.hidden_row)(&self.layers[i], window, skip, out, geometry);
     }
 
-    fn last_row(
-        &self,
-        window: Window<'_, u8>,
-        out: [&mut [f32]; OUTPUTS],
-        from: usize,
-        geometry: Geometry,
-    ) {
+    fn last_row(&self, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
         if let Some(layer) = self.layers.last() {
             (self.kernels.last_row)(layer, window, out, from, geometry);
         }
@@ -489,17 +453,8 @@ impl Quantiser {
 /// Writes planes of a source row as groups of four; channels that pad a group get 0, and have weight 0. Inlined into
 /// each instruction set's own copy.
 #[inline(always)]
-pub(crate) fn quantise_row(
-    source: SourceRow<'_>,
-    rounding: Rounding,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
-    let Rounding {
-        channels,
-        before,
-        to,
-    } = rounding;
+pub(crate) fn quantise_row(source: SourceRow<'_>, rounding: Rounding, out: &mut [u8], geometry: Geometry) {
+    let Rounding { channels, before, to } = rounding;
     match before {
         Some(before) => quantise_by(source, channels, out, geometry, |real| {
             to.quantise(before.dequantise(before.quantise(real)))
@@ -518,12 +473,9 @@ fn quantise_by(
 ) {
     let width = geometry.width;
     for (g, out) in out.chunks_exact_mut(geometry.stride()).enumerate() {
-        let pixels = out[geometry.start()..][..GROUP * width]
-            .as_chunks_mut::<GROUP>()
-            .0;
+        let pixels = out[geometry.start()..][..GROUP * width].as_chunks_mut::<GROUP>().0;
         if (g + 1) * GROUP <= channels {
-            let [a, b, c, d]: [&[f32]; GROUP] =
-                std::array::from_fn(|k| source.channel(g * GROUP + k, width));
+            let [a, b, c, d]: [&[f32]; GROUP] = std::array::from_fn(|k| source.channel(g * GROUP + k, width));
             for ((((pixel, &a), &b), &c), &d) in pixels.iter_mut().zip(a).zip(b).zip(c).zip(d) {
                 *pixel = [quantise(a), quantise(b), quantise(c), quantise(d)];
             }

@@ -42,8 +42,7 @@ impl Isa {
         let mut found = Vec::new();
         #[cfg(target_arch = "x86_64")]
         {
-            let avx512 =
-                is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw");
+            let avx512 = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw");
             let vnni = avx512 && is_x86_feature_detected!("avx512vnni");
             if vnni && crate::amx::available() {
                 found.push(Isa::Amx);

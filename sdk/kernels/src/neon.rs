@@ -23,13 +23,7 @@ pub(crate) const BLOCKS: usize = 3;
 /// Pixels computed together.
 pub(crate) const SPAN: usize = 4 * BLOCKS;
 
-fn hidden_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    skip: Option<&[f32]>,
-    out: &mut [f32],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
     for first in (0..layer.outputs).step_by(FILTERS) {
         let range = first * geometry.stride()..(first + FILTERS) * geometry.stride();
         let skip = skip.map(|skip| &skip[range.clone()]);
@@ -54,13 +48,7 @@ fn hidden_row(
     }
 }
 
-fn last_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     last_row_by_blocks(out, from, |x, values| {
         for start in (0..BLOCK).step_by(SPAN) {
             let sums = sums::<OUTPUTS>(layer, 0, rows, x + start, geometry);
@@ -89,10 +77,7 @@ fn sums<const O: usize>(
     geometry: Geometry,
 ) -> [[float32x4_t; BLOCKS]; O] {
     let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
-    assert!(
-        rows.iter()
-            .all(|row| row.len() >= layer.inputs * geometry.stride())
-    );
+    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
     assert!(x + SPAN < geometry.padded + MARGIN);
     // SAFETY: NEON is there; by the asserts rows with their margin reach past the block, and weights are as many as
     // the loops take.
@@ -106,8 +91,7 @@ fn sums<const O: usize>(
             let mut pixels = row.as_ptr().add(geometry.start() + x - 1);
             for _ in 0..layer.inputs {
                 for kx in 0..3 {
-                    let values: [float32x4_t; BLOCKS] =
-                        std::array::from_fn(|b| vld1q_f32(pixels.add(kx + 4 * b)));
+                    let values: [float32x4_t; BLOCKS] = std::array::from_fn(|b| vld1q_f32(pixels.add(kx + 4 * b)));
                     for sums in &mut sums {
                         let w = *weight;
                         weight = weight.add(1);
@@ -136,12 +120,7 @@ pub(crate) struct Constants<'a> {
 }
 
 /// Turns the sums of four filters at four pixels into values: 16 bytes at `out`, with the same bytes of the skip.
-pub(crate) fn requantise(
-    sums: [int32x4_t; GROUP],
-    constants: &Constants<'_>,
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-) {
+pub(crate) fn requantise(sums: [int32x4_t; GROUP], constants: &Constants<'_>, skip: Option<&[u8]>, out: &mut [u8]) {
     let (skip, out) = (skip.map(|skip| &skip[..16]), &mut out[..16]);
     // SAFETY: NEON is there, and the slices hold 16 bytes.
     unsafe {
@@ -157,14 +136,8 @@ pub(crate) fn requantise(
             };
             // Byte k of each group, widened.
             let groups = vreinterpretq_u32_u8(vld1q_u8(skip.as_ptr()));
-            let bytes = vandq_u32(
-                vshlq_u32(groups, vdupq_n_s32(-8 * k as i32)),
-                vdupq_n_u32(255),
-            );
-            vcvtnq_s32_f32(vaddq_f32(
-                a,
-                vmulq_n_f32(vcvtq_f32_u32(bytes), factors.skip),
-            ))
+            let bytes = vandq_u32(vshlq_u32(groups, vdupq_n_s32(-8 * k as i32)), vdupq_n_u32(255));
+            vcvtnq_s32_f32(vaddq_f32(a, vmulq_n_f32(vcvtq_f32_u32(bytes), factors.skip)))
         });
         let narrow = |v| vqmovun_s16(v);
         let ab = narrow(vcombine_s16(vqmovn_s32(values[0]), vqmovn_s32(values[1])));
@@ -172,10 +145,7 @@ pub(crate) fn requantise(
         // Four pixels of a, then of b, c and d; the table turns this 4×4 block.
         const TURN: [u8; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
         let bytes = vqtbl1q_u8(vcombine_u8(ab, cd), vld1q_u8(TURN.as_ptr()));
-        vst1q_u8(
-            out.as_mut_ptr(),
-            vqaddq_u8(bytes, vdupq_n_u8(constants.zero_point)),
-        );
+        vst1q_u8(out.as_mut_ptr(), vqaddq_u8(bytes, vdupq_n_u8(constants.zero_point)));
     }
 }
 
@@ -188,18 +158,9 @@ pub(crate) struct Dots<'a> {
 
 impl<'a> Dots<'a> {
     /// Eight filters from `first`; three rows from pixel `x`.
-    pub(crate) fn new(
-        layer: &'a int8::Packed,
-        first: usize,
-        rows: &[&[u8]; 3],
-        x: usize,
-        geometry: Geometry,
-    ) -> Self {
+    pub(crate) fn new(layer: &'a int8::Packed, first: usize, rows: &[&[u8]; 3], x: usize, geometry: Geometry) -> Self {
         let words = 9 * layer.groups;
-        assert!(
-            rows.iter()
-                .all(|row| row.len() >= layer.groups * geometry.stride())
-        );
+        assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
         assert!(x + SPAN < geometry.padded + MARGIN && geometry.group == GROUP);
         Dots {
             weights: &layer.weights[first * words..][..FILTERS * words],
@@ -277,13 +238,7 @@ macro_rules! int8_kernels {
             sums
         }
 
-        fn hidden_row(
-            layer: &Packed,
-            window: Window<'_, u8>,
-            skip: Option<&[u8]>,
-            out: &mut [u8],
-            geometry: Geometry,
-        ) {
+        fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
             let rows = window.rows();
             for first in (0..layer.outputs).step_by(FILTERS) {
                 for x in (0..geometry.width).step_by(SPAN) {
@@ -299,12 +254,7 @@ macro_rules! int8_kernels {
                             let group = (first / GROUP + g) * geometry.stride();
                             let at = group + geometry.start() + (x + 4 * b) * GROUP;
                             let four = std::array::from_fn(|k| sums[g * GROUP + k][b]);
-                            requantise(
-                                four,
-                                &constants,
-                                skip.map(|skip| &skip[at..]),
-                                &mut out[at..],
-                            );
+                            requantise(four, &constants, skip.map(|skip| &skip[at..]), &mut out[at..]);
                         }
                     }
                 }
@@ -323,12 +273,9 @@ macro_rules! int8_kernels {
                 for start in (0..BLOCK).step_by(SPAN) {
                     // SAFETY: `kernels` has found the feature.
                     let sums = unsafe { sums(layer, 0, &rows, x + start, geometry) };
-                    for ((values, sums), multiplier) in
-                        values.iter_mut().zip(sums).zip(&layer.multiplier)
-                    {
+                    for ((values, sums), multiplier) in values.iter_mut().zip(sums).zip(&layer.multiplier) {
                         // SAFETY: NEON is there.
-                        let values_of =
-                            |sum| unsafe { vmulq_n_f32(vcvtq_f32_s32(sum), *multiplier) };
+                        let values_of = |sum| unsafe { vmulq_n_f32(vcvtq_f32_s32(sum), *multiplier) };
                         store(&mut values[start..], sums.map(values_of));
                     }
                 }

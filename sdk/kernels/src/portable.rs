@@ -24,10 +24,7 @@ fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geo
     let weights = &layer.weights[filter * 3 * per_row..][..3 * per_row];
     let mut sum = layer.bias[filter];
     for (row, weights) in rows.iter().zip(weights.chunks_exact(per_row)) {
-        for (group, taps) in row
-            .chunks_exact(geometry.stride())
-            .zip(weights.chunks_exact(3))
-        {
+        for (group, taps) in row.chunks_exact(geometry.stride()).zip(weights.chunks_exact(3)) {
             let pixels = &group[geometry.start() + x * GROUP - GROUP..][..3 * GROUP];
             for (pixel, weights) in pixels.chunks_exact(GROUP).zip(taps) {
                 for (value, weight) in pixel.iter().zip(weights.to_le_bytes()) {
@@ -39,13 +36,7 @@ fn sum(layer: &Packed, rows: &[&[u8]; 3], filter: usize, x: usize, geometry: Geo
     sum
 }
 
-fn hidden_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    skip: Option<&[u8]>,
-    out: &mut [u8],
-    geometry: Geometry,
-) {
+fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
     let rows = window.rows();
     for filter in 0..layer.outputs {
         let at = filter / GROUP * geometry.stride() + geometry.start() + filter % GROUP;
@@ -67,13 +58,7 @@ fn hidden_row(
     }
 }
 
-fn last_row(
-    layer: &Packed,
-    window: Window<'_, u8>,
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     let rows = window.rows();
     for (filter, out) in out.into_iter().enumerate() {
         for (x, out) in out.iter_mut().enumerate() {
@@ -89,22 +74,12 @@ pub(crate) const F32: f32::Kernels = f32::Kernels {
 };
 
 /// The sums of `filter` along a row, bias included.
-fn f32_sums(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    filter: usize,
-    sums: &mut [f32],
-    from: usize,
-    geometry: Geometry,
-) {
+fn f32_sums(layer: &f32::Packed, rows: &[&[f32]; 3], filter: usize, sums: &mut [f32], from: usize, geometry: Geometry) {
     sums.fill(layer.bias[filter]);
     let per_row = layer.inputs * 3;
     let weights = &layer.weights[filter * 3 * per_row..][..3 * per_row];
     for (row, weights) in rows.iter().zip(weights.chunks_exact(per_row)) {
-        for (channel, taps) in row
-            .chunks_exact(geometry.stride())
-            .zip(weights.chunks_exact(3))
-        {
+        for (channel, taps) in row.chunks_exact(geometry.stride()).zip(weights.chunks_exact(3)) {
             for (kx, weight) in taps.iter().enumerate() {
                 let pixels = &channel[geometry.start() + from + kx - 1..][..sums.len()];
                 for (sum, pixel) in sums.iter_mut().zip(pixels) {
@@ -115,13 +90,7 @@ fn f32_sums(
     }
 }
 
-fn f32_hidden_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    skip: Option<&[f32]>,
-    out: &mut [f32],
-    geometry: Geometry,
-) {
+fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
     for filter in 0..layer.outputs {
         let range = filter * geometry.stride() + geometry.start()..;
         let out = &mut out[range.clone()][..geometry.width];
@@ -136,13 +105,7 @@ fn f32_hidden_row(
     }
 }
 
-fn f32_last_row(
-    layer: &f32::Packed,
-    rows: &[&[f32]; 3],
-    out: [&mut [f32]; OUTPUTS],
-    from: usize,
-    geometry: Geometry,
-) {
+fn f32_last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
     for (filter, out) in out.into_iter().enumerate() {
         f32_sums(layer, rows, filter, out, from, geometry);
     }

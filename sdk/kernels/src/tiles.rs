@@ -60,17 +60,15 @@ pub fn each_tile_rows<T: Send, W: Send>(
     let start = &start;
     let parts = work.len().div_ceil(piece.max(1)).max(1);
     let part_rows = rows.div_ceil(parts);
-    work.par_chunks_mut(piece)
-        .enumerate()
-        .for_each(|(part, work)| {
-            let own = (part * part_rows).min(rows)..((part + 1) * part_rows).min(rows);
-            let tiles = TileRows {
-                first: start.0,
-                rows,
-                own,
-                columns,
-                plane: PhantomData,
-            };
-            then(tiles, work);
-        });
+    work.par_chunks_mut(piece).enumerate().for_each(|(part, work)| {
+        let own = (part * part_rows).min(rows)..((part + 1) * part_rows).min(rows);
+        let tiles = TileRows {
+            first: start.0,
+            rows,
+            own,
+            columns,
+            plane: PhantomData,
+        };
+        then(tiles, work);
+    });
 }

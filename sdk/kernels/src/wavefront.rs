@@ -27,8 +27,8 @@ pub struct Tiling {
     pub strip_columns: usize,
 }
 
-/// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as long as
-/// a sixteenth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
+/// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as
+/// long as a sixteenth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
@@ -42,9 +42,7 @@ pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Ti
         .div_ceil(threads * bands_a_thread)
         .max((4 * layers).min(height))
         .max(1);
-    let widest = (C::CACHE / ring_column.max(1))
-        .max(24 * layers)
-        .max(4 * BLOCK);
+    let widest = (C::CACHE / ring_column.max(1)).max(24 * layers).max(4 * BLOCK);
     let strip_columns = width.div_ceil(width.div_ceil(widest).max(1)).max(1);
     Tiling {
         band_rows,
@@ -124,12 +122,7 @@ pub(crate) trait Chain: Sync {
     /// Writes a row of `x[0]` from the network input's planes.
     fn input_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
     /// Writes the concatenated part of a row of `x[last]`; `out` is the whole row.
-    fn concatenated_row(
-        &self,
-        source: SourceRow<'_>,
-        out: &mut [Self::Element],
-        geometry: Geometry,
-    );
+    fn concatenated_row(&self, source: SourceRow<'_>, out: &mut [Self::Element], geometry: Geometry);
     /// Runs layer `i` on three rows of `x[i]` and writes the features of a row of `x[i+1]`; `skip` is the row of
     /// `x[i−1]`.
     fn hidden_row(
@@ -141,13 +134,7 @@ pub(crate) trait Chain: Sync {
         geometry: Geometry,
     );
     /// Runs the last layer: pixels `from..from + out[c].len()` of the row, into the output planes' rows.
-    fn last_row(
-        &self,
-        window: Window<'_, Self::Element>,
-        out: [&mut [f32]; OUTPUTS],
-        from: usize,
-        geometry: Geometry,
-    );
+    fn last_row(&self, window: Window<'_, Self::Element>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry);
 }
 
 /// Three rows of a layer's input, adjacent in memory but turned: the row above lies in slot `first`, the next ones
@@ -196,13 +183,7 @@ pub trait Rows<const PLANES: usize>: Sync {
     fn read(&self, row: usize, from: usize, band: &Band<'_, Self::Value, PLANES>, into: &mut [f32]);
 
     /// Takes the values of `row` from column `from` on, one run of pixels for each output; they may be worked on there.
-    fn write(
-        &self,
-        row: usize,
-        from: usize,
-        values: [&mut [f32]; OUTPUTS],
-        band: &mut Band<'_, Self::Value, PLANES>,
-    );
+    fn write(&self, row: usize, from: usize, values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Self::Value, PLANES>);
 }
 
 /// Some rows of the planes that a chain's rows are written to.
@@ -232,9 +213,7 @@ impl<T, const PLANES: usize> Band<'_, T, PLANES> {
     /// If the row does not lie in this band.
     pub fn rows_mut(&mut self, row: usize, from: usize, count: usize) -> [&mut [T]; PLANES] {
         let at = (row - self.top) * self.width + from;
-        self.planes
-            .each_mut()
-            .map(|plane| &mut plane[at..at + count])
+        self.planes.each_mut().map(|plane| &mut plane[at..at + count])
     }
 }
 
@@ -256,13 +235,7 @@ impl Rows<OUTPUTS> for Planar<'_> {
         }
     }
 
-    fn write(
-        &self,
-        row: usize,
-        from: usize,
-        values: [&mut [f32]; OUTPUTS],
-        band: &mut Band<'_, f32, OUTPUTS>,
-    ) {
+    fn write(&self, row: usize, from: usize, values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, f32, OUTPUTS>) {
         let out = band.rows_mut(row, from, values[0].len());
         for (out, values) in out.into_iter().zip(values) {
             out.copy_from_slice(values);
@@ -387,11 +360,7 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
         scratch,
     };
     let bands = height.div_ceil(tiling.band_rows.max(1));
-    let whole = Band {
-        top: 0,
-        width,
-        planes,
-    };
+    let whole = Band { top: 0, width, planes };
     frame.bands(0, bands, whole);
 }
 
@@ -415,9 +384,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         }
         let middle = (from + to) / 2;
         let rows = (middle - from) * self.tiling.band_rows.max(1);
-        let mut halves = band
-            .planes
-            .map(|plane| plane.split_at_mut(rows * self.width));
+        let mut halves = band.planes.map(|plane| plane.split_at_mut(rows * self.width));
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);
         let part = |top, planes| Band {
@@ -436,12 +403,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
     where
         R: Rows<PLANES>,
     {
-        let free = || {
-            self.scratch
-                .free
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-        };
+        let free = || self.scratch.free.lock().unwrap_or_else(PoisonError::into_inner);
         let mut memory = free().pop().unwrap_or_default();
         let columns = self.tiling.strip_columns.max(1);
         for left in (0..self.width).step_by(columns) {
@@ -455,11 +417,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
         &self,
         (left, right): (usize, usize),
         band: &mut Band<'_, R::Value, PLANES>,
-        Memory {
-            rings,
-            input,
-            output,
-        }: &mut Memory<C::Element>,
+        Memory { rings, input, output }: &mut Memory<C::Element>,
     ) where
         R: Rows<PLANES>,
     {
@@ -519,8 +477,7 @@ impl<C: Chain, R> Frame<'_, C, R> {
             let row = step - depth;
             if (top..bottom).contains(&row) {
                 let mut planes = output.chunks_exact_mut(right - left);
-                let mut planes: [_; OUTPUTS] =
-                    std::array::from_fn(|_| planes.next().unwrap_or_default());
+                let mut planes: [_; OUTPUTS] = std::array::from_fn(|_| planes.next().unwrap_or_default());
                 let out = planes.each_mut().map(|plane| &mut **plane);
                 chain.last_row(rings[layers - 1].window(row), out, left - start, geometry);
                 self.rows.write(row as usize, left, planes, band);

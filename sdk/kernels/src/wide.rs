@@ -2,10 +2,11 @@
 #![allow(unsafe_code)]
 
 /// Computes an expression, compiled once for each instruction set with wider vectors than the target is known to have:
-/// what is inlined into it is vectorised so. Sums and products keep their order and are not fused: the bits are the same.
+/// what is inlined into it is vectorised so. Sums and products keep their order and are not fused: the bits are the
+/// same.
 ///
-/// A macro, so that each instruction set has a copy of its own: one closure that several call would be compiled once, for
-/// none of them. So whatever the expression calls must be inlined too.
+/// A macro, so that each instruction set has a copy of its own: one closure that several call would be compiled once,
+/// for none of them. So whatever the expression calls must be inlined too.
 #[macro_export]
 macro_rules! wide {
     ($work:expr) => {

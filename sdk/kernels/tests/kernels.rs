@@ -97,9 +97,7 @@ impl Int8Case {
                     kernel: (0..outputs * reads * 9)
                         .map(|_| (random.next() % 255) as u8 as i8)
                         .collect(),
-                    bias: (0..outputs)
-                        .map(|_| random.next() as i32 % 20_000 - 10_000)
-                        .collect(),
+                    bias: (0..outputs).map(|_| random.next() as i32 % 20_000 - 10_000).collect(),
                     multiplier: (0..outputs)
                         .map(|_| random.between(0.5, 1.5) / (reads as f32).sqrt() / 250.0)
                         .collect(),
@@ -108,8 +106,7 @@ impl Int8Case {
                             relu: inner_roundings.then(|| random.between(0.5, 0.9)),
                             skip: random.between(0.5, 0.9),
                         }),
-                        rescale: (inner_roundings && i + 2 == count)
-                            .then(|| random.between(0.5, 0.9)),
+                        rescale: (inner_roundings && i + 2 == count).then(|| random.between(0.5, 0.9)),
                     },
                 }
             })
@@ -123,27 +120,16 @@ impl Int8Case {
     }
 
     fn chain(&self, isa: Isa) -> Result<Int8Chain, String> {
-        Int8Chain::new(
-            &self.layers,
-            self.input,
-            self.concatenated,
-            self.rounded_twice,
-            isa,
-        )
+        Int8Chain::new(&self.layers, self.input, self.concatenated, self.rounded_twice, isa)
     }
 
     /// The chain from its definition, plane by plane.
     fn expected(&self, input: &[f32], size: (usize, usize)) -> Vec<f32> {
         let (h, w) = size;
-        let quantise = |q: Quantiser, v: f32| {
-            ((v / q.scale).round_ties_even() + f32::from(q.zero_point)).clamp(0.0, 255.0) as u8
-        };
+        let quantise =
+            |q: Quantiser, v: f32| ((v / q.scale).round_ties_even() + f32::from(q.zero_point)).clamp(0.0, 255.0) as u8;
         let dequantise = |q: Quantiser, v: u8| (f32::from(v) - f32::from(q.zero_point)) * q.scale;
-        let planes = |data, outside| Planes {
-            data,
-            size,
-            outside,
-        };
+        let planes = |data, outside| Planes { data, size, outside };
         let first = input.iter().map(|&v| quantise(self.input, v)).collect();
         let mut x = vec![planes(first, self.input.zero_point)];
         for (i, layer) in self.layers.iter().enumerate() {
@@ -156,9 +142,7 @@ impl Int8Case {
                     let weights = &layer.kernel[o * layer.inputs * 9..][..layer.inputs * 9];
                     let zero = i32::from(layer.zero_point);
                     let products = taps.iter().zip(weights);
-                    let sum: i32 = products
-                        .map(|(&v, &w)| (i32::from(v) - zero) * i32::from(w))
-                        .sum();
+                    let sum: i32 = products.map(|(&v, &w)| (i32::from(v) - zero) * i32::from(w)).sum();
                     let v = (sum + layer.bias[o]) as f32 * layer.multiplier[o];
                     let mut q = match layer.requantise.skip {
                         Some(skip) => {
@@ -175,11 +159,7 @@ impl Int8Case {
                     if let Some(factor) = layer.requantise.rescale {
                         q = (q * factor).round_ties_even().clamp(0.0, 255.0);
                     }
-                    let next_zero = if last {
-                        0
-                    } else {
-                        self.layers[i + 1].zero_point
-                    };
+                    let next_zero = if last { 0 } else { self.layers[i + 1].zero_point };
                     real[(o * h + y) * w + column] = v;
                     rounded[(o * h + y) * w + column] = (q + f32::from(next_zero)).min(255.0) as u8;
                 }
@@ -189,10 +169,7 @@ impl Int8Case {
             }
             if i + 2 == self.layers.len() {
                 rounded.extend(input.iter().map(|&v| match self.rounded_twice {
-                    true => quantise(
-                        self.concatenated,
-                        dequantise(self.input, quantise(self.input, v)),
-                    ),
+                    true => quantise(self.concatenated, dequantise(self.input, quantise(self.input, v))),
                     false => quantise(self.concatenated, v),
                 }));
             }
@@ -243,10 +220,7 @@ fn int8_is_the_definition_to_the_bit_on_every_instruction_set_and_tiling() {
                 for isa in Isa::int8() {
                     let chain = case.chain(isa).unwrap();
                     let scratch = Scratch::default();
-                    for tiling in tilings(size)
-                        .into_iter()
-                        .chain([chain.tiling(size.0, size.1)])
-                    {
+                    for tiling in tilings(size).into_iter().chain([chain.tiling(size.0, size.1)]) {
                         if isa == Isa::Portable && tiling.band_rows < 8 && size.0 > 10 {
                             continue;
                         }
@@ -282,8 +256,7 @@ fn f32_layers(inputs: usize, filters: usize, count: usize, seed: u64) -> Vec<F32
                 filters + if last { inputs } else { 0 }
             };
             let outputs = if last { OUTPUTS } else { filters };
-            let spread =
-                (6.0 / (9 * reads) as f32).sqrt() * if i > 0 && i % 2 == 0 { 0.7 } else { 1.0 };
+            let spread = (6.0 / (9 * reads) as f32).sqrt() * if i > 0 && i % 2 == 0 { 0.7 } else { 1.0 };
             F32Layer {
                 inputs: reads,
                 outputs,
@@ -309,10 +282,7 @@ fn f32_expected(layers: &[F32Layer], input: &[f32], size: (usize, usize)) -> Vec
             let taps = taps(&x[i], y, column);
             for o in 0..layer.outputs {
                 let weights = &layer.kernel[o * layer.inputs * 9..][..layer.inputs * 9];
-                let products = taps
-                    .iter()
-                    .zip(weights)
-                    .map(|(&v, &w)| f64::from(v) * f64::from(w));
+                let products = taps.iter().zip(weights).map(|(&v, &w)| f64::from(v) * f64::from(w));
                 let sum = products.sum::<f64>() + f64::from(layer.bias[o]);
                 data[(o * h + y) * w + column] = sum as f32;
             }
@@ -322,9 +292,7 @@ fn f32_expected(layers: &[F32Layer], input: &[f32], size: (usize, usize)) -> Vec
         }
         data.iter_mut().for_each(|v| *v = v.max(0.0));
         if i + 1 >= 3 && (i + 1) % 2 == 1 {
-            data.iter_mut()
-                .zip(&x[i - 1].data)
-                .for_each(|(v, skip)| *v += skip);
+            data.iter_mut().zip(&x[i - 1].data).for_each(|(v, skip)| *v += skip);
         }
         if i + 2 == layers.len() {
             data.extend(input);
@@ -340,14 +308,7 @@ fn f32_expected(layers: &[F32Layer], input: &[f32], size: (usize, usize)) -> Vec
 
 #[test]
 fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every_tiling() {
-    for (inputs, filters, count) in [
-        (4, 24, 8),
-        (4, 8, 2),
-        (6, 8, 5),
-        (4, 16, 4),
-        (20, 24, 3),
-        (4, 40, 3),
-    ] {
+    for (inputs, filters, count) in [(4, 24, 8), (4, 8, 2), (6, 8, 5), (4, 16, 4), (20, 24, 3), (4, 40, 3)] {
         let layers = f32_layers(inputs, filters, count, 5);
         for size in SIZES {
             if size.0 > 10 && filters != 8 {
@@ -359,22 +320,13 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
                 let chain = F32Chain::new(&layers, isa).unwrap();
                 let scratch = Scratch::default();
                 let mut whole = vec![f32::NAN; expected.len()];
-                chain.run(
-                    &input,
-                    &mut whole,
-                    size,
-                    chain.tiling(size.0, size.1),
-                    &scratch,
-                );
+                chain.run(&input, &mut whole, size, chain.tiling(size.0, size.1), &scratch);
                 let worst = whole
                     .iter()
                     .zip(&expected)
                     .map(|(a, b)| (a - b).abs())
                     .fold(0.0, f32::max);
-                assert!(
-                    worst < 1e-5,
-                    "{isa}, {count} layers of {filters}, {size:?}: {worst}"
-                );
+                assert!(worst < 1e-5, "{isa}, {count} layers of {filters}, {size:?}: {worst}");
                 for tiling in tilings(size) {
                     let mut output = vec![f32::NAN; expected.len()];
                     chain.run(&input, &mut output, size, tiling, &scratch);
@@ -394,13 +346,7 @@ fn extreme_values_saturate_alike() {
     for layer in &mut case.layers {
         let count = layer.kernel.len();
         layer.kernel = (0..count)
-            .map(|k| {
-                if k / (layer.inputs * 9) % 2 == 0 {
-                    127
-                } else {
-                    -128
-                }
-            })
+            .map(|k| if k / (layer.inputs * 9) % 2 == 0 { 127 } else { -128 })
             .collect();
         layer.multiplier.iter_mut().for_each(|m| *m = 60.0);
     }
@@ -410,13 +356,7 @@ fn extreme_values_saturate_alike() {
         let outputs = Isa::int8().into_iter().map(|isa| {
             let chain = case.chain(isa).unwrap();
             let mut output = vec![0.0f32; 6 * 6 * 35];
-            chain.run(
-                &input,
-                &mut output,
-                size,
-                chain.tiling(6, 35),
-                &Scratch::default(),
-            );
+            chain.run(&input, &mut output, size, chain.tiling(6, 35), &Scratch::default());
             output.iter().map(|v| v.to_bits()).collect::<Vec<_>>()
         });
         let outputs: Vec<_> = outputs.collect();
@@ -431,13 +371,8 @@ fn scratch_is_reused_and_small() {
     let size = (300, 700);
     let (input, mut output) = (frame(4, size, 1), vec![0.0; 6 * 300 * 700]);
     let scratch = Scratch::default();
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .unwrap();
-    let run = |output: &mut [f32]| {
-        pool.install(|| chain.run(&input, output, size, chain.tiling(300, 700), &scratch))
-    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let run = |output: &mut [f32]| pool.install(|| chain.run(&input, output, size, chain.tiling(300, 700), &scratch));
     run(&mut output);
     let (first, bytes) = (output.clone(), scratch.bytes());
     assert!(bytes > 0 && bytes < 2 << 20, "{bytes} bytes");
@@ -465,12 +400,7 @@ fn chains_that_kernels_cannot_run_are_refused() {
     assert!(broken(&|c| c.input.scale = f32::NAN).contains("scale"));
     let mut layers = f32_layers(4, 8, 3, 1);
     layers[2].bias.pop();
-    assert!(
-        F32Chain::new(&layers, Isa::Portable)
-            .err()
-            .unwrap()
-            .contains("biases")
-    );
+    assert!(F32Chain::new(&layers, Isa::Portable).err().unwrap().contains("biases"));
     let foreign = if cfg!(target_arch = "x86_64") {
         Isa::Neon
     } else {

@@ -45,8 +45,7 @@ impl Cameras {
     /// A focal length that is not positive, or a number that is not finite.
     pub fn check(&self) -> Result<()> {
         for (what, i) in [("colour", self.colour), ("depth", self.depth)] {
-            if !(i.fx > 0.0 && i.fy > 0.0 && [i.fx, i.fy, i.cx, i.cy].iter().all(|v| v.is_finite()))
-            {
+            if !(i.fx > 0.0 && i.fy > 0.0 && [i.fx, i.fy, i.cx, i.cy].iter().all(|v| v.is_finite())) {
                 return Err(Error::Frame(format!(
                     "intrinsics of {what} are {i:?}; focal lengths must be above 0 and all numbers finite"
                 )));
@@ -76,14 +75,7 @@ impl Cameras {
         (metres, confidence): (&[f32], &[f32]),
         (to, to_confidence): (&mut [f32], &mut [f32]),
     ) -> usize {
-        assert!(
-            [
-                metres.len(),
-                confidence.len(),
-                to.len(),
-                to_confidence.len()
-            ] == [height * width; 4]
-        );
+        assert!([metres.len(), confidence.len(), to.len(), to_confidence.len()] == [height * width; 4]);
         to.fill(f32::NAN);
         to_confidence.fill(0.0);
         let scale_x = width as f64 / colour_shape.1 as f64;
@@ -189,31 +181,16 @@ mod tests {
             translation_m: [-0.1, 0.0, 0.0],
             ..Cameras::concentric(CAMERA, CAMERA)
         };
-        let seen = cameras.reproject(
-            (48, 64),
-            (48, 64),
-            (&metres, &sure),
-            (&mut to, &mut to_sure),
-        );
+        let seen = cameras.reproject((48, 64), (48, 64), (&metres, &sure), (&mut to, &mut to_sure));
         let row = &to[24 * 64..25 * 64];
-        assert!(
-            row[20..34].iter().all(|z| (*z - 1.0).abs() < 1e-6),
-            "{row:?}"
-        );
+        assert!(row[20..34].iter().all(|z| (*z - 1.0).abs() < 1e-6), "{row:?}");
         assert!(row[36..37].iter().all(|z| z.is_nan()), "{row:?}");
         assert!(
-            row[..18]
-                .iter()
-                .chain(&row[39..60])
-                .all(|z| (*z - 2.0).abs() < 1e-6),
+            row[..18].iter().chain(&row[39..60]).all(|z| (*z - 2.0).abs() < 1e-6),
             "{row:?}"
         );
         assert_eq!(seen, to.iter().filter(|z| !z.is_nan()).count());
-        assert!(
-            to.iter()
-                .zip(&to_sure)
-                .all(|(z, s)| z.is_nan() == (*s == 0.0))
-        );
+        assert!(to.iter().zip(&to_sure).all(|(z, s)| z.is_nan() == (*s == 0.0)));
     }
 
     #[test]
@@ -224,10 +201,6 @@ mod tests {
         let mut cameras = Cameras::concentric(CAMERA, CAMERA);
         assert!(cameras.check().is_ok());
         cameras.translation_m[1] = f64::NAN;
-        assert!(
-            cameras
-                .check()
-                .is_err_and(|e| e.to_string().contains("pose"))
-        );
+        assert!(cameras.check().is_err_and(|e| e.to_string().contains("pose")));
     }
 }

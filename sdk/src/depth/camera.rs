@@ -51,8 +51,7 @@ impl<'a> CameraFrame<'a> {
     /// [`Error::Frame`]: aligned images of other aspect ratios, cameras that cannot be, or cameras with normalized
     /// depth, which has no metres to project.
     pub fn check(&self) -> Result<()> {
-        let ((height, width), (depth_height, depth_width)) =
-            (self.colour.shape(), self.depth.shape());
+        let ((height, width), (depth_height, depth_width)) = (self.colour.shape(), self.depth.shape());
         match self.alignment {
             Alignment::Aligned => {
                 let ratio = (width * depth_height) as f64 / (height * depth_width) as f64;

@@ -51,11 +51,7 @@ impl DepthFormat {
         let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
         let f32_at = || f32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
         let metres = |m: f32| {
-            if m.is_finite() && m > 0.0 {
-                m
-            } else {
-                f32::NAN
-            }
+            if m.is_finite() && m > 0.0 { m } else { f32::NAN }
         };
         match self {
             DepthFormat::MetresF32 => (metres(f32_at()), 1.0),
@@ -210,32 +206,12 @@ mod tests {
     fn each_format_reads_as_its_platform_says() {
         let f16_bytes = |v: f32| f16::from_f32(v).to_le_bytes().to_vec();
         let cases = [
-            (
-                DepthFormat::MetresF32,
-                2.5f32.to_le_bytes().to_vec(),
-                2.5,
-                1.0,
-            ),
+            (DepthFormat::MetresF32, 2.5f32.to_le_bytes().to_vec(), 2.5, 1.0),
             (DepthFormat::MetresF16, f16_bytes(2.5), 2.5, 1.0),
-            (
-                DepthFormat::DisparityF32,
-                0.4f32.to_le_bytes().to_vec(),
-                2.5,
-                1.0,
-            ),
+            (DepthFormat::DisparityF32, 0.4f32.to_le_bytes().to_vec(), 2.5, 1.0),
             (DepthFormat::DisparityF16, f16_bytes(0.5), 2.0, 1.0),
-            (
-                DepthFormat::MillimetresU16,
-                9000u16.to_le_bytes().to_vec(),
-                9.0,
-                1.0,
-            ),
-            (
-                DepthFormat::AndroidDepth16,
-                2500u16.to_le_bytes().to_vec(),
-                2.5,
-                1.0,
-            ),
+            (DepthFormat::MillimetresU16, 9000u16.to_le_bytes().to_vec(), 9.0, 1.0),
+            (DepthFormat::AndroidDepth16, 2500u16.to_le_bytes().to_vec(), 2.5, 1.0),
             (
                 DepthFormat::AndroidDepth16,
                 (1 << 13 | 2500u16).to_le_bytes().to_vec(),
@@ -261,20 +237,9 @@ mod tests {
             );
         }
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-            assert!(
-                DepthFormat::MetresF32
-                    .reading(&bad.to_le_bytes())
-                    .0
-                    .is_nan()
-            );
+            assert!(DepthFormat::MetresF32.reading(&bad.to_le_bytes()).0.is_nan());
             assert!(DepthFormat::MetresF16.reading(&f16_bytes(bad)).0.is_nan());
-            assert!(
-                DepthFormat::DisparityF16
-                    .reading(&f16_bytes(bad))
-                    .0
-                    .is_nan()
-                    || bad.is_infinite()
-            );
+            assert!(DepthFormat::DisparityF16.reading(&f16_bytes(bad)).0.is_nan() || bad.is_infinite());
         }
         assert!(DepthFormat::MillimetresU16.reading(&[0, 0]).0.is_nan());
         assert!(DepthFormat::AndroidDepth16.reading(&[0, 0x20]).0.is_nan());
@@ -295,11 +260,7 @@ mod tests {
             DepthFormat::NormalizedU8,
             DepthFormat::NormalizedU16,
         ] {
-            for confidences in [
-                None,
-                Some(ConfidenceFormat::LowMediumHigh),
-                Some(ConfidenceFormat::U8),
-            ] {
+            for confidences in [None, Some(ConfidenceFormat::LowMediumHigh), Some(ConfidenceFormat::U8)] {
                 let (w, h) = (random.random_range(1..20), random.random_range(1..20));
                 let n = format.pixel_bytes();
                 let pixel = n + random.random_range(0..3);
@@ -307,11 +268,8 @@ mod tests {
                 let bytes: Vec<u8> = (0..(h - 1) * row + (w - 1) * pixel + n)
                     .map(|_| random.random())
                     .collect();
-                let map: Vec<u8> = (0..h * (2 * w + 1))
-                    .map(|_| random.random_range(0..=255))
-                    .collect();
-                let mut image =
-                    DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
+                let map: Vec<u8> = (0..h * (2 * w + 1)).map(|_| random.random_range(0..=255)).collect();
+                let mut image = DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
                 if let Some(format) = confidences {
                     image = image
                         .with_confidence(format, w, h, Plane::new(&map, 2 * w + 1, 2))
@@ -323,8 +281,7 @@ mod tests {
                 for y in 0..h {
                     for x in 0..w {
                         let (value, own) = format.reading(&bytes[y * row + x * pixel..][..n]);
-                        let map =
-                            confidences.map_or(1.0, |f| f.confidence(map[y * (2 * w + 1) + 2 * x]));
+                        let map = confidences.map_or(1.0, |f| f.confidence(map[y * (2 * w + 1) + 2 * x]));
                         let (is, is_sure) = (values[y * w + x], sure[y * w + x]);
                         match value.is_nan() || own.min(map) < 0.4 {
                             true => assert!(is.is_nan() && is_sure == 0.0),
@@ -339,9 +296,7 @@ mod tests {
     #[test]
     fn images_that_are_not_whole_are_named() {
         let bytes = [0; 60];
-        let image = |w, h, row, pixel| {
-            DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&bytes, row, pixel))
-        };
+        let image = |w, h, row, pixel| DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&bytes, row, pixel));
         for (refused, word) in [
             (image(0, 3, 20, 4), "empty"),
             (image(7680, 4320, 30720, 4), "too large"),
@@ -349,23 +304,18 @@ mod tests {
             (image(5, 3, 19, 4), "row stride of 19"),
             (image(5, 3, 20, 2), "pixel stride of 2"),
             (
-                image(5, 3, 20, 4).and_then(|i| {
-                    i.with_confidence(ConfidenceFormat::U8, 4, 3, Plane::new(&bytes, 4, 1))
-                }),
+                image(5, 3, 20, 4)
+                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 4, 3, Plane::new(&bytes, 4, 1))),
                 "confidence is 4×3 and depth 5×3",
             ),
             (
-                image(5, 3, 20, 4).and_then(|i| {
-                    i.with_confidence(ConfidenceFormat::U8, 5, 3, Plane::new(&bytes, 4, 1))
-                }),
+                image(5, 3, 20, 4)
+                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 5, 3, Plane::new(&bytes, 4, 1))),
                 "confidence: a row stride of 4",
             ),
         ] {
             let message = refused.map(|_| ()).map_err(|e| e.to_string());
-            assert!(
-                message.as_ref().is_err_and(|m| m.contains(word)),
-                "{word}: {message:?}"
-            );
+            assert!(message.as_ref().is_err_and(|m| m.contains(word)), "{word}: {message:?}");
         }
     }
 }

@@ -23,9 +23,7 @@ impl DepthRange {
     /// Fixed metres that are no range.
     pub fn check(self) -> Result<()> {
         match self {
-            DepthRange::Fixed { near_m, far_m }
-                if !(near_m >= 0.0 && near_m < far_m && far_m.is_finite()) =>
-            {
+            DepthRange::Fixed { near_m, far_m } if !(near_m >= 0.0 && near_m < far_m && far_m.is_finite()) => {
                 Err(Error::Plan(format!(
                     "near {near_m} m and far {far_m} m are no range; near must lie before far"
                 )))
@@ -130,16 +128,8 @@ mod tests {
             far_m: 3.0,
         };
         assert!(fixed.check().is_ok());
-        assert_eq!(
-            RangeTracker::new(fixed).next(&[9.0], FRAME).unwrap(),
-            (0.5, 3.0)
-        );
-        for (near_m, far_m) in [
-            (1.0, 1.0),
-            (2.0, 1.0),
-            (f32::NAN, 1.0),
-            (0.0, f32::INFINITY),
-        ] {
+        assert_eq!(RangeTracker::new(fixed).next(&[9.0], FRAME).unwrap(), (0.5, 3.0));
+        for (near_m, far_m) in [(1.0, 1.0), (2.0, 1.0), (f32::NAN, 1.0), (0.0, f32::INFINITY)] {
             assert!(DepthRange::Fixed { near_m, far_m }.check().is_err());
         }
     }

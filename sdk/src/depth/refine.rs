@@ -9,7 +9,8 @@
 //! a mean across an edge would.
 //!
 //! The cost, for a depth image of n pixels and a display of N of which a share e lies at edges: some 25·n + 40·e·n
-//! weights at the sensor's resolution, 4·N + 9·e·N at the display's; a tenth of the pixels of usual scenes lies at edges.
+//! weights at the sensor's resolution, 4·N + 9·e·N at the display's; a tenth of the pixels of usual scenes lies at
+//! edges.
 
 use super::fill_from_nearest;
 use crate::error::{Error, Result};
@@ -45,11 +46,7 @@ impl Closeness {
         const STEPS: usize = 512;
         // Beyond 6σ nothing is left but the least.
         let scale = (STEPS - 1) as f32 / (36.0 * sigma * sigma);
-        let weight = |i: usize| {
-            (-(i as f32 / scale) / (2.0 * sigma * sigma))
-                .exp()
-                .max(least)
-        };
+        let weight = |i: usize| (-(i as f32 / scale) / (2.0 * sigma * sigma)).exp().max(least);
         Closeness {
             table: (0..STEPS).map(weight).collect(),
             scale,
@@ -270,13 +267,11 @@ impl Refiner {
     /// Each reading from its neighbours; NaN where none of them is one.
     fn clean(&self, depth: &[f32], confidence: &[f32], guide: &[[f32; 3]], cleaned: &mut [f32]) {
         let width = self.depth.1;
-        (cleaned.par_chunks_exact_mut(width))
-            .enumerate()
-            .for_each(|(y, row)| {
-                for (x, value) in row.iter_mut().enumerate() {
-                    *value = self.clean_one(x, y, depth, |i| confidence[i], guide);
-                }
-            });
+        (cleaned.par_chunks_exact_mut(width)).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                *value = self.clean_one(x, y, depth, |i| confidence[i], guide);
+            }
+        });
     }
 
     /// One reading from its neighbours.
@@ -320,9 +315,7 @@ impl Refiner {
             }
             return surface(votes);
         }
-        let (sum, weights) = (votes.iter()).fold((0.0, 0.0), |(sum, weights), (v, w)| {
-            (sum + w * v, weights + w)
-        });
+        let (sum, weights) = (votes.iter()).fold((0.0, 0.0), |(sum, weights), (v, w)| (sum + w * v, weights + w));
         match weights > 0.0 {
             true => sum / weights,
             false => votes[0].0,
@@ -368,11 +361,7 @@ impl Refiner {
         let (height, width) = self.depth;
         let cell_y = self.y.cell[y] as usize;
         let offset_y = self.y.offset[y];
-        let rows = [
-            cell_y.saturating_sub(1),
-            cell_y,
-            (cell_y + 1).min(height - 1),
-        ];
+        let rows = [cell_y.saturating_sub(1), cell_y, (cell_y + 1).min(height - 1)];
         let mut x = 0;
         while x < out_width {
             let cell_x = self.x.cell[x] as usize;
@@ -380,11 +369,7 @@ impl Refiner {
             while end < out_width && self.x.cell[end] as usize == cell_x {
                 end += 1;
             }
-            let columns = [
-                cell_x.saturating_sub(1),
-                cell_x,
-                (cell_x + 1).min(width - 1),
-            ];
+            let columns = [cell_x.saturating_sub(1), cell_x, (cell_x + 1).min(width - 1)];
             let around: [usize; 9] = std::array::from_fn(|k| rows[k / 3] * width + columns[k % 3]);
             let depths = around.map(|i| readings.depth[i]);
             let least = depths.into_iter().fold(f32::INFINITY, f32::min);
@@ -402,10 +387,7 @@ impl Refiner {
                         let dx = (k % 3) as f32 - 1.0 - self.x.offset[x];
                         let dy = (k / 3) as f32 - 1.0 - offset_y;
                         let near = self.up_near.of(dx * dx + dy * dy);
-                        (
-                            depths[k],
-                            near * self.up_colour.of(apart(colours[k], colour)),
-                        )
+                        (depths[k], near * self.up_colour.of(apart(colours[k], colour)))
                     });
                     *to = surface(&mut votes);
                 }
@@ -458,36 +440,19 @@ mod tests {
             let mut noise = |most: f32| random.random_range(-most..most);
             let front = |x: f64, y: f64| (x - 0.4).powi(2) + (y - 0.5).powi(2) < 0.07;
             let depth = Array2::from_shape_fn(cells, |(y, x)| {
-                let (x, y) = (
-                    (x as f64 + 0.5) / cells.1 as f64,
-                    (y as f64 + 0.5) / cells.0 as f64,
-                );
-                let surface = if front(x, y) {
-                    0.2
-                } else {
-                    0.7 + 0.2 * y as f32
-                };
+                let (x, y) = ((x as f64 + 0.5) / cells.1 as f64, (y as f64 + 0.5) / cells.0 as f64);
+                let surface = if front(x, y) { 0.2 } else { 0.7 + 0.2 * y as f32 };
                 match noise(1.0) {
                     n if n > 0.8 => f32::NAN,
                     _ if x > 0.7 && y < 0.5 => f32::NAN,
                     n => surface + 0.02 * n,
                 }
             });
-            let confidence = depth.mapv(|d| {
-                if d.is_nan() {
-                    0.0
-                } else {
-                    0.6 + 0.4 * noise(1.0)
-                }
-            });
+            let confidence = depth.mapv(|d| if d.is_nan() { 0.0 } else { 0.6 + 0.4 * noise(1.0) });
             let rgb = Array3::from_shape_fn((3, out.0, out.1), |(c, y, x)| {
                 let x = (crop.x + (x as f64 + 0.5) * crop.width / out.1 as f64) / cells.1 as f64;
                 let y = (crop.y + (y as f64 + 0.5) * crop.height / out.0 as f64) / cells.0 as f64;
-                let colour = if front(x, y) {
-                    [0.9, 0.5, 0.1]
-                } else {
-                    [0.2, 0.4, 0.6]
-                };
+                let colour = if front(x, y) { [0.9, 0.5, 0.1] } else { [0.2, 0.4, 0.6] };
                 (colour[c] + 0.03 * noise(1.0)).clamp(0.0, 1.0)
             });
             Case {
@@ -540,17 +505,14 @@ mod tests {
     #[test]
     fn threads_make_no_difference() {
         let run = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .unwrap();
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| Case::random(12).refine().unwrap())
         };
         assert_eq!(run(1), run(3));
     }
 
-    /// Depth whose edge is 2 pixels beside the colour's, with mixed readings: the edge goes to where the colour has it, and
-    /// no depth is made between the surfaces.
+    /// Depth whose edge is 2 pixels beside the colour's, with mixed readings: the edge goes to where the colour has it,
+    /// and no depth is made between the surfaces.
     #[test]
     fn edges_follow_the_colour() {
         let (h, w, f) = (12, 16, 4);
@@ -560,10 +522,7 @@ mod tests {
             _ => 0.8,
         });
         // The colour's edge is at pixel 36, in the middle of reading 8's neighbour.
-        let rgb = Array3::from_shape_fn(
-            (3, h * f, w * f),
-            |(_, _, x)| if x < 36 { 0.9 } else { 0.1 },
-        );
+        let rgb = Array3::from_shape_fn((3, h * f, w * f), |(_, _, x)| if x < 36 { 0.9 } else { 0.1 });
         let case = Case {
             confidence: Array2::ones((h, w)),
             crop: Crop::cover((h, w), (h * f, w * f)),

@@ -2,8 +2,7 @@
 //! the definition stands in words.
 
 use super::refine::{
-    CLEAN_COLOUR_SIGMA, CLEAN_REACH, CLEAN_SIGMA, FILL_PASSES, LEAST_CLOSENESS, TOLERANCE,
-    UP_COLOUR_SIGMA, UP_SIGMA,
+    CLEAN_COLOUR_SIGMA, CLEAN_REACH, CLEAN_SIGMA, FILL_PASSES, LEAST_CLOSENESS, TOLERANCE, UP_COLOUR_SIGMA, UP_SIGMA,
 };
 use crate::frame::Crop;
 use ndarray::{Array2, ArrayView2, ArrayView3};
@@ -119,11 +118,7 @@ fn clean(
             if y2 < height && x2 < width && !from[(y2, x2)].is_nan() {
                 let near = gauss((dy * dy + dx * dx) as f64, CLEAN_SIGMA) * confidence(y2, x2);
                 let alike = gauss(apart(guide[(y, x)], guide[(y2, x2)]), CLEAN_COLOUR_SIGMA);
-                votes.push((
-                    f64::from(from[(y2, x2)]),
-                    near,
-                    alike.max(LEAST_CLOSENESS.into()),
-                ));
+                votes.push((f64::from(from[(y2, x2)]), near, alike.max(LEAST_CLOSENESS.into())));
             }
         }
     }
@@ -136,24 +131,16 @@ fn clean(
     }
 }
 
-/// The depth of a display pixel of `colour` that lies `off` its reading, (y, x); `around` gives the depth and the colour
-/// of the readings beside that.
-fn enlarged(
-    around: &dyn Fn(isize, isize) -> (f64, [f64; 3]),
-    [dy, dx]: [f64; 2],
-    colour: [f64; 3],
-) -> f32 {
+/// The depth of a display pixel of `colour` that lies `off` its reading, (y, x); `around` gives the depth and the
+/// colour of the readings beside that.
+fn enlarged(around: &dyn Fn(isize, isize) -> (f64, [f64; 3]), [dy, dx]: [f64; 2], colour: [f64; 3]) -> f32 {
     let mut votes = Vec::new();
     for row in -1..=1 {
         for column in -1..=1 {
             let (depth, guide) = around(row, column);
             let square = (column as f64 - dx).powi(2) + (row as f64 - dy).powi(2);
             let alike = gauss(apart(guide, colour), UP_COLOUR_SIGMA);
-            votes.push((
-                depth,
-                gauss(square, UP_SIGMA),
-                alike.max(LEAST_CLOSENESS.into()),
-            ));
+            votes.push((depth, gauss(square, UP_SIGMA), alike.max(LEAST_CLOSENESS.into())));
         }
     }
     if !one_surface(&votes) {

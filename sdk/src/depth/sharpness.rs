@@ -53,8 +53,8 @@ impl Sharpness {
 /// Lines that a thread looks at together.
 const LINES: usize = 16;
 
-/// Measures the depth of `frame`, on the current rayon pool; allocates nothing. A frame narrower and lower than six pixels
-/// has no edges, one narrower than three no noise.
+/// Measures the depth of `frame`, on the current rayon pool; allocates nothing. A frame narrower and lower than six
+/// pixels has no edges, one narrower than three no noise.
 pub fn measure(frame: &RgbdFrame) -> Sharpness {
     let (height, width) = frame.shape();
     let along_rows = (0..height.div_ceil(LINES)).into_par_iter();
@@ -62,9 +62,7 @@ pub fn measure(frame: &RgbdFrame) -> Sharpness {
     let lines = |part: usize, of: usize| part * LINES..((part + 1) * LINES).min(of);
     let rows = along_rows.map(|part| edges(frame, lines(part, height), (1, width), width));
     let columns = along_columns.map(|part| edges(frame, lines(part, width), (width, height), 1));
-    let (sharp, all) = rows
-        .chain(columns)
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let (sharp, all) = rows.chain(columns).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     let edges = match all {
         0 => 1.0,
         all => sharp as f32 / all as f32,
@@ -77,12 +75,7 @@ pub fn measure(frame: &RgbdFrame) -> Sharpness {
 
 /// How many edges are sharp, and how many there are, along `lines`, each `next` values from the one before and `along`
 /// long, its values `step` apart.
-fn edges(
-    frame: &RgbdFrame,
-    lines: Range<usize>,
-    (step, along): (usize, usize),
-    next: usize,
-) -> (u32, u32) {
+fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), next: usize) -> (u32, u32) {
     let (rgb, depth) = frame.values();
     let size = depth.len();
     let (mut sharp, mut all) = (0, 0);
@@ -143,9 +136,7 @@ fn noise(depth: &[f32], width: usize) -> f32 {
         below += count;
         below > half
     });
-    median.map_or(0.0, |step| {
-        step as f32 * DIFFERENCE / (0.6745 * 6f32.sqrt())
-    })
+    median.map_or(0.0, |step| step as f32 * DIFFERENCE / (0.6745 * 6f32.sqrt()))
 }
 
 #[cfg(test)]

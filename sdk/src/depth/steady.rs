@@ -31,13 +31,7 @@ impl Steadier {
     /// Replaces `readings`, (H, `width`), NaN for none, by the steadied ones; the last call was `elapsed` ago.
     /// `metric` says that readings are metres; if not, they are normalized depth. Another size begins anew. Gives how
     /// many readings there are now.
-    pub fn steady(
-        &mut self,
-        readings: &mut [f32],
-        width: usize,
-        elapsed: Duration,
-        metric: bool,
-    ) -> usize {
+    pub fn steady(&mut self, readings: &mut [f32], width: usize, elapsed: Duration, metric: bool) -> usize {
         if self.known.len() != readings.len() {
             self.known.clear();
             self.known.extend_from_slice(readings);
@@ -65,13 +59,8 @@ impl Steadier {
                 } else {
                     let age = self.age[i].saturating_add(elapsed);
                     let near_x = x.saturating_sub(NEIGHBOURS)..(x + NEIGHBOURS + 1).min(width);
-                    let spoken_for = || {
-                        (near_y.clone()).any(|y| {
-                            near_x
-                                .clone()
-                                .any(|x| agree(readings[y * width + x], known))
-                        })
-                    };
+                    let spoken_for =
+                        || (near_y.clone()).any(|y| near_x.clone().any(|x| agree(readings[y * width + x], known)));
                     match !known.is_nan() && age <= HOLD && spoken_for() {
                         true => (known, age),
                         false => (f32::NAN, age),
@@ -100,9 +89,7 @@ mod tests {
         let mut steadier = Steadier::default();
         let (mut before, mut after) = (0.0f64, 0.0f64);
         for frame in 0..40 {
-            let mut readings: Vec<f32> = (0..400)
-                .map(|_| 2.0 + random.random_range(-0.02..0.02))
-                .collect();
+            let mut readings: Vec<f32> = (0..400).map(|_| 2.0 + random.random_range(-0.02..0.02)).collect();
             let raw = readings.clone();
             assert_eq!(steadier.steady(&mut readings, 20, FRAME, true), 400);
             if frame > 10 {

@@ -153,8 +153,7 @@ impl DepthStream {
         let elapsed = elapsed.unwrap_or_default();
         let width = plan.upright().1;
         let metric = layout.format.is_metric();
-        self.steadier
-            .steady(&mut plan.values, width, elapsed, metric);
+        self.steadier.steady(&mut plan.values, width, elapsed, metric);
         let range_m = match metric {
             true => Some(self.range.next(&plan.values, elapsed)?),
             false => None,
@@ -169,13 +168,8 @@ impl DepthStream {
                 *value = (*value * scale + shift).clamp(0.0, 1.0);
             }
         }
-        plan.refiner.refine(
-            &plan.values,
-            &plan.confidence,
-            rgb,
-            depth,
-            &mut plan.scratch,
-        )?;
+        plan.refiner
+            .refine(&plan.values, &plan.confidence, rgb, depth, &mut plan.scratch)?;
         Ok(DepthReport {
             range_m,
             valid: found as f32 / plan.values.len() as f32,
@@ -187,13 +181,9 @@ impl Plan {
     fn new(layout: Layout, out: (usize, usize)) -> Result<Self> {
         let (height, width) = layout.sensor;
         let upright = layout.orientation.upright_shape(height, width);
-        let colour = layout
-            .orientation
-            .upright_shape(layout.colour.0, layout.colour.1);
-        let crop = Crop::cover(colour, out).scaled(
-            upright.1 as f64 / colour.1 as f64,
-            upright.0 as f64 / colour.0 as f64,
-        );
+        let colour = layout.orientation.upright_shape(layout.colour.0, layout.colour.1);
+        let crop =
+            Crop::cover(colour, out).scaled(upright.1 as f64 / colour.1 as f64, upright.0 as f64 / colour.0 as f64);
         let refiner = Refiner::new(upright, crop, out)?;
         let scratch = refiner.scratch();
         let plane = || vec![f32::NAN; height * width];
@@ -228,10 +218,7 @@ impl Plan {
             let (_, width) = self.upright();
             for i in 0..self.values.len() {
                 let sensor = self.layout.sensor;
-                let (x, y) = self
-                    .layout
-                    .orientation
-                    .sensor_pixel(i % width, i / width, sensor);
+                let (x, y) = self.layout.orientation.sensor_pixel(i % width, i / width, sensor);
                 self.moved.0[i] = self.values[y * sensor.1 + x];
                 self.moved.1[i] = self.confidence[y * sensor.1 + x];
             }

@@ -50,8 +50,8 @@ impl AntiAlias {
         }
     }
 
-    /// Hands each row of `plane`, (H, W), blurred, to `then`: its index, its values, to be worked on, and its part of `out`,
-    /// which is cut into H parts of one size.
+    /// Hands each row of `plane`, (H, W), blurred, to `then`: its index, its values, to be worked on, and its part of
+    /// `out`, which is cut into H parts of one size.
     pub fn rows<T: Send>(
         &self,
         plane: &[Complex32],
@@ -130,9 +130,7 @@ impl AntiAlias {
                         while next <= (y + half).min(height - 1) {
                             let ring = &mut ring[next % count * width..][..width];
                             match next.checked_sub(end) {
-                                None => {
-                                    self.blur_row(&plane[(next - first) * width..][..width], ring)
-                                }
+                                None => self.blur_row(&plane[(next - first) * width..][..width], ring),
                                 Some(i) => ring.copy_from_slice(&after[i * width..][..width]),
                             }
                             next += 1;
@@ -246,10 +244,7 @@ mod tests {
             (4, 4, 1.0, 1),
         ] {
             for threads in [1, 3] {
-                let pool = rayon::ThreadPoolBuilder::new()
-                    .num_threads(threads)
-                    .build()
-                    .unwrap();
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| check(h, w, sigma, taps));
             }
         }
@@ -284,10 +279,7 @@ mod tests {
                     }
                 }
                 let got = out[y as usize * w + x as usize];
-                assert!(
-                    (got - expected).norm() < 1e-5,
-                    "{h}×{w}, {taps} taps: {x},{y}"
-                );
+                assert!((got - expected).norm() < 1e-5, "{h}×{w}, {taps} taps: {x},{y}");
             }
         }
     }

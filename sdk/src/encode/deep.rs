@@ -1,8 +1,8 @@
-//! The deep double phase method's pre-filter (DDPM, Eq. 6): a small network that was trained, together with the one that
-//! made the field and through encoding and aperture, to leave what double phase can show.
+//! The deep double phase method's pre-filter (DDPM, Eq. 6): a small network that was trained, together with the one
+//! that made the field and through encoding and aperture, to leave what double phase can show.
 //!
-//! It reads the field at the modulator, its phase included: neither a mean phase is taken out nor is it scaled. Where it
-//! asks for that, AA-DPM's blur has gone over the field first.
+//! It reads the field at the modulator, its phase included: neither a mean phase is taken out nor is it scaled. Where
+//! it asks for that, AA-DPM's blur has gone over the field first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
 use crate::error::Result;

@@ -15,12 +15,7 @@ pub fn encode_value(value: Complex32, x: usize, y: usize, scale: f32) -> f32 {
         0.0
     };
     let half = amplitude.acos();
-    let phase = value.im.atan2(value.re)
-        + if (x + y).is_multiple_of(2) {
-            half
-        } else {
-            -half
-        };
+    let phase = value.im.atan2(value.re) + if (x + y).is_multiple_of(2) { half } else { -half };
     wrap(phase)
 }
 
@@ -67,8 +62,8 @@ fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
     }
 }
 
-/// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first` of
-/// the stack (3, H, W).
+/// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first`
+/// of the stack (3, H, W).
 pub fn encode_row_levels(
     values: &[Complex32],
     y: usize,
@@ -234,10 +229,7 @@ mod tests {
                 for (row, (values, levels)) in rows.enumerate() {
                     encode_row_levels(values, row % h, scale, &response, row * w, levels);
                 }
-                assert!(
-                    (phase.iter().zip(&fused).enumerate())
-                        .all(|(at, (p, l))| response.level(*p, at) == *l)
-                );
+                assert!((phase.iter().zip(&fused).enumerate()).all(|(at, (p, l))| response.level(*p, at) == *l));
             }
         }
     }

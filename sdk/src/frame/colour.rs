@@ -93,12 +93,7 @@ impl<'a> ColourImage<'a> {
     /// # Errors
     /// [`Error::Frame`] that names an empty or too large image, another number of planes than the format has, a
     /// stride that is too small, or a plane with too few bytes.
-    pub fn new(
-        format: ColourFormat,
-        width: usize,
-        height: usize,
-        planes: &[Plane<'a>],
-    ) -> Result<Self> {
+    pub fn new(format: ColourFormat, width: usize, height: usize, planes: &[Plane<'a>]) -> Result<Self> {
         check_size("colour", width, height)?;
         let layout = format.layout();
         if planes.len() != layout.len() {
@@ -163,41 +158,11 @@ mod tests {
         let nv12 = ColourFormat::Nv12(YuvEncoding::default());
         let cases = [
             (ColourFormat::Rgba, 0, 4, vec![plane(16, 4)], "empty"),
-            (
-                ColourFormat::Rgba,
-                7680,
-                4320,
-                vec![plane(30720, 4)],
-                "too large",
-            ),
-            (
-                ColourFormat::Rgba,
-                usize::MAX,
-                2,
-                vec![plane(16, 4)],
-                "too large",
-            ),
-            (
-                ColourFormat::Rgba,
-                4,
-                5,
-                vec![plane(16, 4)],
-                "64 bytes are too few",
-            ),
-            (
-                ColourFormat::Bgra,
-                4,
-                4,
-                vec![plane(15, 4)],
-                "row stride of 15",
-            ),
-            (
-                ColourFormat::Rgb,
-                4,
-                4,
-                vec![plane(16, 2)],
-                "pixel stride of 2",
-            ),
+            (ColourFormat::Rgba, 7680, 4320, vec![plane(30720, 4)], "too large"),
+            (ColourFormat::Rgba, usize::MAX, 2, vec![plane(16, 4)], "too large"),
+            (ColourFormat::Rgba, 4, 5, vec![plane(16, 4)], "64 bytes are too few"),
+            (ColourFormat::Bgra, 4, 4, vec![plane(15, 4)], "row stride of 15"),
+            (ColourFormat::Rgb, 4, 4, vec![plane(16, 2)], "pixel stride of 2"),
             (nv12, 8, 8, vec![plane(8, 1)], "1 colour planes"),
             (
                 nv12,
@@ -224,10 +189,7 @@ mod tests {
         for (format, width, height, planes, word) in cases {
             let refused = ColourImage::new(format, width, height, &planes);
             let message = refused.map(|_| ()).map_err(|e| e.to_string());
-            assert!(
-                message.as_ref().is_err_and(|m| m.contains(word)),
-                "{word}: {message:?}"
-            );
+            assert!(message.as_ref().is_err_and(|m| m.contains(word)), "{word}: {message:?}");
         }
         let whole = ColourImage::new(yuv, 7, 9, &[plane(7, 1), plane(13, 3), plane(14, 2)]);
         assert!(whole.is_ok());

@@ -48,12 +48,7 @@ impl ColourPlan {
     ///
     /// # Errors
     /// An empty output.
-    pub fn new(
-        image: &ColourImage<'_>,
-        orientation: Orientation,
-        height: usize,
-        width: usize,
-    ) -> Result<Self> {
+    pub fn new(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Result<Self> {
         Self::for_format(image.format(), image.shape(), orientation, height, width)
     }
 
@@ -78,7 +73,8 @@ impl ColourPlan {
         let crop = Crop::cover(upright, (height, width));
         let chroma = format.layout().get(1).map(|(_, _, share)| {
             let half = |n: usize| n.div_ceil(*share);
-            // Of an odd side the last chroma sample reaches beyond the picture, at its far end or, flipped, at its near.
+            // Of an odd side the last chroma sample reaches beyond the picture, at its far end or, flipped, at its
+            // near.
             let from = |from: f64, side: usize, flipped: bool| {
                 from / 2.0
                     + match flipped {
@@ -164,12 +160,7 @@ impl ColourPlan {
     ///
     /// # Panics
     /// If `rgb` has not 3·H·W values.
-    pub fn convert(
-        &self,
-        image: &ColourImage<'_>,
-        rgb: &mut [f32],
-        scratch: &mut ColourScratch,
-    ) -> Result<()> {
+    pub fn convert(&self, image: &ColourImage<'_>, rgb: &mut [f32], scratch: &mut ColourScratch) -> Result<()> {
         if !self.fits(image, self.orientation) {
             return Err(Error::Frame(format!(
                 "the image is {:?} of {}×{}; this plan takes {:?} of {}×{}",

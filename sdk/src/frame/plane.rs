@@ -24,13 +24,7 @@ impl<'a> Plane<'a> {
     }
 
     /// Checks that (`height`, `width`) pixels of `pixel_bytes` lie in it.
-    pub(crate) fn check(
-        &self,
-        what: &str,
-        width: usize,
-        height: usize,
-        pixel_bytes: usize,
-    ) -> Result<()> {
+    pub(crate) fn check(&self, what: &str, width: usize, height: usize, pixel_bytes: usize) -> Result<()> {
         if self.pixel_stride < pixel_bytes {
             return Err(Error::Frame(format!(
                 "{what}: a pixel stride of {} bytes is too small; a pixel has {pixel_bytes}",
@@ -46,9 +40,7 @@ impl<'a> Plane<'a> {
                 self.row_stride, self.pixel_stride
             )));
         }
-        let need = (height - 1)
-            .saturating_mul(self.row_stride)
-            .saturating_add(row);
+        let need = (height - 1).saturating_mul(self.row_stride).saturating_add(row);
         if self.bytes.len() < need {
             return Err(Error::Frame(format!(
                 "{what}: {} bytes are too few; {width}×{height} pixels with a row stride of {} need {need}",
@@ -124,18 +116,9 @@ impl Orientation {
     }
 
     /// The sensor's pixel (x, y) that upright pixel (`x`, `y`) shows, for a sensor of (`height`, `width`).
-    pub fn sensor_pixel(
-        self,
-        x: usize,
-        y: usize,
-        (height, width): (usize, usize),
-    ) -> (usize, usize) {
+    pub fn sensor_pixel(self, x: usize, y: usize, (height, width): (usize, usize)) -> (usize, usize) {
         let (_, upright_width) = self.upright_shape(height, width);
-        let x = if self.mirrored {
-            upright_width - 1 - x
-        } else {
-            x
-        };
+        let x = if self.mirrored { upright_width - 1 - x } else { x };
         match self.rotation {
             Rotation::None => (x, y),
             Rotation::Clockwise90 => (y, height - 1 - x),
@@ -198,10 +181,7 @@ mod tests {
             (usize::MAX / 2, 4, 10, 9, "too few"),
         ] {
             let refused = Plane::new(&bytes, row, pixel).check("colour", width, height, 4);
-            assert!(
-                refused.is_err_and(|e| e.to_string().contains(word)),
-                "{word}"
-            );
+            assert!(refused.is_err_and(|e| e.to_string().contains(word)), "{word}");
         }
         // The last row ends with its last pixel; one row needs no stride.
         assert!(Plane::new(&bytes, 60, 4).check("colour", 10, 2, 4).is_ok());

@@ -8,12 +8,7 @@ use super::resample::Crop;
 /// The amplitudes, (3, H, W), that (`height`, `width`) shows of `image` turned by `orientation`: [`Crop::cover`] of
 /// it, each pixel the mean of the image's under a triangle as wide as itself (at least as wide as a sample). A chroma
 /// sample lies in the middle of its four pixels.
-pub fn convert(
-    image: &ColourImage<'_>,
-    orientation: Orientation,
-    height: usize,
-    width: usize,
-) -> Vec<f32> {
+pub fn convert(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Vec<f32> {
     let upright = orientation.upright_shape(image.shape().0, image.shape().1);
     let crop = Crop::cover(upright, (height, width));
     let mut rgb = vec![0.0; 3 * height * width];
@@ -24,17 +19,12 @@ pub fn convert(
                 crop.y + (y as f64 + 0.5) * crop.height / height as f64,
             );
             let sizes = (crop.width / width as f64, crop.height / height as f64);
-            let mean =
-                |plane, byte, share| mean(image, orientation, plane, byte, share, centre, sizes);
+            let mean = |plane, byte, share| mean(image, orientation, plane, byte, share, centre, sizes);
             let colour = match image.format() {
                 ColourFormat::Rgba | ColourFormat::Rgb => [0, 1, 2].map(|b| mean(0, b, 1) / 255.0),
                 ColourFormat::Bgra => [2, 1, 0].map(|b| mean(0, b, 1) / 255.0),
-                ColourFormat::Nv12(encoding) => {
-                    rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(1, 1, 2)], encoding)
-                }
-                ColourFormat::Yuv420(encoding) => {
-                    rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(2, 0, 2)], encoding)
-                }
+                ColourFormat::Nv12(encoding) => rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(1, 1, 2)], encoding),
+                ColourFormat::Yuv420(encoding) => rgb_of_yuv([mean(0, 0, 1), mean(1, 0, 2), mean(2, 0, 2)], encoding),
             };
             for (c, value) in colour.into_iter().enumerate() {
                 rgb[(c * height + y) * width + x] = value.clamp(0.0, 1.0) as f32;
@@ -66,8 +56,7 @@ fn mean(
             let y = (row as f64 + 0.5) * share as f64 / height as f64;
             let (x, y) = turn(orientation, x, y);
             let (x, y) = (x * upright_width as f64, y * upright_height as f64);
-            let weight =
-                |apart: f64, size: f64| (1.0 - apart.abs() / size.max(share as f64)).max(0.0);
+            let weight = |apart: f64, size: f64| (1.0 - apart.abs() / size.max(share as f64)).max(0.0);
             let weight = weight(x - centre.0, size.0) * weight(y - centre.1, size.1);
             let at = row * plane.row_stride + column * plane.pixel_stride + byte;
             sum += weight * f64::from(plane.bytes[at]);

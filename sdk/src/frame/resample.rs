@@ -157,32 +157,21 @@ mod tests {
         assert_eq!((crop.x, crop.y), (0.0, 180.0));
         assert_eq!((crop.width, crop.height), (1920.0, 1080.0));
         let crop = Crop::cover((480, 640), (100, 50)).scaled(0.5, 0.5);
-        assert_eq!(
-            (crop.x, crop.y, crop.width, crop.height),
-            (100.0, 0.0, 120.0, 240.0)
-        );
+        assert_eq!((crop.x, crop.y, crop.width, crop.height), (100.0, 0.0, 120.0, 240.0));
     }
 
     #[test]
     fn what_is_not_resized_is_copied_and_what_is_keeps_its_mean() {
         assert_eq!(Axis::new(7, 0.0, 7.0, 7).taps, 1);
         let row: Vec<f32> = (0..12).map(|i| i as f32).collect();
-        for (from, length, out) in [
-            (0.0, 12.0, 4),
-            (0.0, 12.0, 31),
-            (2.0, 8.0, 5),
-            (0.0, 12.0, 1),
-        ] {
+        for (from, length, out) in [(0.0, 12.0, 4), (0.0, 12.0, 31), (2.0, 8.0, 5), (0.0, 12.0, 1)] {
             let axis = Axis::new(12, from, length, out);
             let mut resampled = vec![0.0; out];
             let needed = axis.needed();
             axis.apply(&row[needed.clone()], needed.start, &mut resampled);
             let mean = resampled.iter().sum::<f32>() / out as f32;
             let expected = (from + length / 2.0) as f32 - 0.5;
-            assert!(
-                (mean - expected).abs() < 0.02,
-                "{from} {length} {out}: {mean}"
-            );
+            assert!((mean - expected).abs() < 0.02, "{from} {length} {out}: {mean}");
             assert!((0..out).all(|o| (axis.taps(o).map(|t| t.1).sum::<f32>() - 1.0).abs() < 1e-6));
         }
     }

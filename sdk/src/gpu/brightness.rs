@@ -1,4 +1,5 @@
-//! The scale of a frame where brightness is steady, found without leaving the GPU. The twin of the core's `brightness.rs`.
+//! The scale of a frame where brightness is steady, found without leaving the GPU. The twin of the core's
+//! `brightness.rs`.
 
 use super::Result;
 use super::device::{Constants, Device, Dispatch};
@@ -18,12 +19,7 @@ pub(super) struct Steadier {
 
 impl Steadier {
     /// `found` is one u32: the bits of the scale's square.
-    pub(super) fn new(
-        device: &Device,
-        field: &wgpu::Buffer,
-        len: usize,
-        found: &wgpu::Buffer,
-    ) -> Result<Self> {
+    pub(super) fn new(device: &Device, field: &wgpu::Buffer, len: usize, found: &wgpu::Buffer) -> Result<Self> {
         let (count, over) = looked_at(len);
         let groups = count.div_ceil(THREADS).min(MOST_GROUPS);
         let source = format!(
@@ -38,21 +34,16 @@ impl Steadier {
         ) + include_str!("brightness.wgsl");
         let past = device.constants("the past", bytemuck::cast_slice(&alone()))?;
         let bins = device.buffer("a histogram", 4 * BINS)?;
-        let counted = [
-            (1, field.as_entire_binding()),
-            (2, bins.as_entire_binding()),
-        ];
+        let counted = [(1, field.as_entire_binding()), (2, bins.as_entire_binding())];
         let settled = [
             (0, past.buffer.as_entire_binding()),
             (3, bins.as_entire_binding()),
             (4, found.as_entire_binding()),
         ];
         let steps = [
-            device.program("a histogram", source.clone(), "count").on(
-                device,
-                &counted,
-                [groups, 1, 1],
-            )?,
+            device
+                .program("a histogram", source.clone(), "count")
+                .on(device, &counted, [groups, 1, 1])?,
             device
                 .program("the scale", source, "settle")
                 .on(device, &settled, [1, 1, 1])?,

@@ -231,11 +231,7 @@ impl ChainPlan {
         // not fused; the input twice; the end once.
         let hidden = plan.dispatches() - 1;
         let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
-        let again = if plan.fusion == Fusion::Pairs {
-            0
-        } else {
-            skips
-        };
+        let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
         plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * width * height;
         Ok(plan)
     }
@@ -309,13 +305,7 @@ impl Maker<'_> {
         Ok(steps)
     }
 
-    fn layer(
-        &self,
-        layer: &Packed,
-        from: &wgpu::Buffer,
-        to: &wgpu::Buffer,
-        skip: bool,
-    ) -> Result<Dispatch> {
+    fn layer(&self, layer: &Packed, from: &wgpu::Buffer, to: &wgpu::Buffer, skip: bool) -> Result<Dispatch> {
         let weights = self.device.constants("weights", &layer.bytes)?;
         let tables = self.tables(layer)?;
         let source = self.source(layer, &weights, skip, "") + include_str!("chain_layer.wgsl");
@@ -326,13 +316,7 @@ impl Maker<'_> {
         program.on(self.device, &arguments, self.grid())
     }
 
-    fn pair(
-        &self,
-        first: &Packed,
-        second: &Packed,
-        from: &wgpu::Buffer,
-        to: &wgpu::Buffer,
-    ) -> Result<Dispatch> {
+    fn pair(&self, first: &Packed, second: &Packed, from: &wgpu::Buffer, to: &wgpu::Buffer) -> Result<Dispatch> {
         let both = [&first.bytes[..], &second.bytes].concat();
         let weights = self.device.constants("weights", &both)?;
         let tables = self.tables(second)?;
@@ -377,11 +361,7 @@ impl Maker<'_> {
     }
 
     fn grid(&self) -> [usize; 3] {
-        [
-            self.size.1.div_ceil(TILE.0),
-            self.size.0.div_ceil(TILE.1),
-            1,
-        ]
+        [self.size.1.div_ceil(TILE.0), self.size.0.div_ceil(TILE.1), 1]
     }
 
     fn arguments<'b>(
@@ -467,11 +447,7 @@ impl Maker<'_> {
 
 /// Groups of a layer's features and of what is concatenated with them.
 fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
-    let beside = if i + 1 == chain.layers.len() {
-        chain.inputs
-    } else {
-        0
-    };
+    let beside = if i + 1 == chain.layers.len() { chain.inputs } else { 0 };
     let features = layer.inputs - beside;
     (features, features.div_ceil(GROUP), beside.div_ceil(GROUP))
 }
@@ -499,9 +475,7 @@ fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Resul
                     for k in 0..GROUP {
                         let c = channel(features, groups, layer.inputs, group, k);
                         values.extend((block * BLOCK..(block + 1) * BLOCK).map(|o| match c {
-                            Some(c) if o < layer.outputs => {
-                                kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx]
-                            }
+                            Some(c) if o < layer.outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx],
                             _ => 0.0,
                         }));
                     }
@@ -511,10 +485,7 @@ fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Resul
     }
     let bytes = match numbers {
         Numbers::F16 => {
-            let halves: Vec<u16> = values
-                .iter()
-                .map(|&v| half::f16::from_f32(v).to_bits())
-                .collect();
+            let halves: Vec<u16> = values.iter().map(|&v| half::f16::from_f32(v).to_bits()).collect();
             bytemuck::cast_slice(&halves).to_vec()
         }
         _ => bytemuck::cast_slice(&values).to_vec(),
@@ -562,8 +533,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
                             u32::from_le_bytes(std::array::from_fn(|k| {
                                 match channel(features, groups, layer.inputs, group, k) {
                                     Some(c) if o < layer.outputs => {
-                                        layer.kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx]
-                                            as u8
+                                        layer.kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx] as u8
                                     }
                                     _ => 0,
                                 }
@@ -627,13 +597,7 @@ impl GpuNetworkPlan {
         device.guarded(|| {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
-            let packer = Packer::new(
-                device,
-                Form::Chain(chain, numbers),
-                size,
-                Source::Planes,
-                None,
-            )?;
+            let packer = Packer::new(device, Form::Chain(chain, numbers), size, Source::Planes, None)?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
             Ok(GpuNetworkPlan {
@@ -657,8 +621,8 @@ impl GpuNetworkPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::network::NetworkPlan::run`] takes it, `output`
-    /// (6, H, W).
+    /// Runs the network on one frame: `input` planar (C, H, W) as [`crate::network::NetworkPlan::run`] takes it,
+    /// `output` (6, H, W).
     ///
     /// # Errors
     /// A wrong length; [`GpuError::Lost`].

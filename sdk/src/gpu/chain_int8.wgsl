@@ -1,5 +1,6 @@
-// The numbers of a chain in 8-bit whole numbers: the bits of `phasefront-kernels`' int8 module. The header that chain.rs
-// writes before this text gives the constants in capitals and the declaration of `weights`. chain.wgsl follows.
+// The numbers of a chain in 8-bit whole numbers: the bits of `phasefront-kernels`' int8 module. The header that
+// chain.rs writes before this text gives the constants in capitals and the declaration of `weights`. chain.wgsl
+// follows.
 //
 // A word holds four activations minus 128, so that they are signed as the weights are; the biases give it back. What
 // follows the sums is one multiplication, an addition and roundings, each product of the latter from a table: so no

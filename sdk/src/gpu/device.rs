@@ -102,18 +102,14 @@ impl Device {
             required_limits: (allowed.limits)(adapter.limits()),
             ..Default::default()
         };
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&descriptor)).map_err(|why| {
-                GpuError::Refused(format!("{} cannot be opened: {}", info.name, one_line(why)))
-            })?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+            .map_err(|why| GpuError::Refused(format!("{} cannot be opened: {}", info.name, one_line(why))))?;
         Ok(Self::of(device, queue, options.programs.as_deref()))
     }
 
     /// The features that an app's own device should have for [`Device::of`], as far as its adapter has them.
     pub fn wanted() -> wgpu::Features {
-        wgpu::Features::SHADER_F16
-            | wgpu::Features::TIMESTAMP_QUERY
-            | wgpu::Features::PIPELINE_CACHE
+        wgpu::Features::SHADER_F16 | wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE
     }
 
     /// A device that an app opened, so that it shows on its own surface what is computed, without a copy: best with the
@@ -252,14 +248,8 @@ impl Device {
             self.ask()?;
         }
         match error {
-            Some(wgpu::Error::OutOfMemory { source }) => {
-                Err(GpuError::OutOfMemory(one_line(source)))
-            }
-            Some(why) => Err(GpuError::Refused(format!(
-                "{}: {}",
-                self.name(),
-                one_line(why)
-            ))),
+            Some(wgpu::Error::OutOfMemory { source }) => Err(GpuError::OutOfMemory(one_line(source))),
+            Some(why) => Err(GpuError::Refused(format!("{}: {}", self.name(), one_line(why)))),
             None => done,
         }
     }
@@ -312,17 +302,13 @@ fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
 }
 
 pub(crate) fn one_line(error: impl std::fmt::Display) -> String {
-    error
-        .to_string()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    error.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::testing::software;
+    use super::testing::{or_skip, software};
     use super::*;
 
     #[test]
@@ -346,8 +332,7 @@ mod tests {
             },
             ..Default::default()
         };
-        let Ok(device) = Device::open_with(&software(), &little) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(device) = or_skip(Device::open_with(&software(), &little)) else {
             return;
         };
         assert!(!device.has_half() && !device.features().timestamps);
@@ -373,8 +358,7 @@ mod tests {
         };
         // Drivers in software do not heed what memory there is.
         let opened = Device::open_with(&DeviceOptions::default(), &little);
-        let Ok(device) = opened.or_else(|_| Device::open_with(&software(), &little)) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(device) = or_skip(opened.or_else(|_| Device::open_with(&software(), &little))) else {
             return;
         };
         let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;
@@ -395,8 +379,7 @@ mod tests {
 
     #[test]
     fn a_device_that_hangs_is_given_up() {
-        let Ok(mut device) = Device::open(&software()) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(mut device) = or_skip(Device::open(&software())) else {
             return;
         };
         device.patience = Duration::from_millis(1);
@@ -423,8 +406,7 @@ mod tests {
 
     #[test]
     fn an_app_computes_on_its_own_device() {
-        let Ok(adapter) = adapter(software().name.as_deref(), None) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(adapter) = or_skip(adapter(software().name.as_deref(), None)) else {
             return;
         };
         let descriptor = wgpu::DeviceDescriptor {

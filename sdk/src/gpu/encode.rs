@@ -89,11 +89,7 @@ pub(super) struct Encoder {
 }
 
 impl Encoder {
-    pub(super) fn new(
-        device: &Device,
-        job: &EncoderJob<'_>,
-        buffers: &[LevelsBuffers],
-    ) -> Result<Self> {
+    pub(super) fn new(device: &Device, job: &EncoderJob<'_>, buffers: &[LevelsBuffers]) -> Result<Self> {
         let (height, width) = job.size;
         let frame = [width, height, width * height, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
@@ -167,14 +163,8 @@ mod tests {
     fn levels_are_those_of_the_cpu() {
         let Some(device) = device() else { return };
         let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
-        let wide = Encoding::AntiAlias {
-            sigma: 2.0,
-            width: 9,
-        };
-        let five = Encoding::AntiAlias {
-            sigma: 1.0,
-            width: 5,
-        };
+        let wide = Encoding::AntiAlias { sigma: 2.0, width: 9 };
+        let five = Encoding::AntiAlias { sigma: 1.0, width: 5 };
         let eight = Response::Linear { bits: 8 };
         let wide = || wide.clone();
         let (nodes, intervals) = (per_pixel::nodes(61, 47, 16), 8);
@@ -191,12 +181,7 @@ mod tests {
             ((61, 47), Encoding::DoublePhase, FrameMax, pixels),
             ((61, 47), Encoding::DoublePhase, FrameMax, eight.clone()),
             ((61, 47), Encoding::ANTI_ALIAS, FrameMax, lut.clone()),
-            (
-                (61, 47),
-                Encoding::ANTI_ALIAS,
-                Fixed(0.7),
-                Response::Linear { bits: 5 },
-            ),
+            ((61, 47), Encoding::ANTI_ALIAS, Fixed(0.7), Response::Linear { bits: 5 }),
             ((61, 47), five, FrameMax, eight.clone()),
             ((61, 47), wide(), Fixed(1.1), eight.clone()),
             ((61, 47), Encoding::BAND_LIMIT, FrameMax, lut),
@@ -215,17 +200,13 @@ mod tests {
                 ..display.into()
             };
             let area = size.0 * size.1;
-            let turns =
-                [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
+            let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
             let turn = upload(&device, &turns);
             let mut expected = field(area);
             let buffer = upload(&device, &expected);
             let (encoder, buffers) = device
                 .guarded(|| {
-                    let buffers = [
-                        LevelsBuffers::new(&device, size)?,
-                        LevelsBuffers::new(&device, size)?,
-                    ];
+                    let buffers = [LevelsBuffers::new(&device, size)?, LevelsBuffers::new(&device, size)?];
                     let job = EncoderJob {
                         field: &buffer,
                         size,
@@ -240,8 +221,7 @@ mod tests {
                 })
                 .unwrap();
             run(&device, |pass| encoder.run(pass, 1));
-            let words: Vec<u32> =
-                bytemuck::pod_collect_to_vec(&device.read(&buffers[1].levels, 4 * area).unwrap());
+            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&buffers[1].levels, 4 * area).unwrap());
             for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
                 plane.iter_mut().for_each(|value| *value *= turn);
             }
@@ -256,8 +236,7 @@ mod tests {
             let used = twin.encode_levels(&mut expected, scale, &mut levels, &mut scratch);
             let mut phase = vec![0.0; 3 * area];
             twin.encode(&mut given, Some(used), &mut phase, &mut scratch);
-            let largest: Vec<u32> =
-                bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
+            let largest: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
             let found = encoder.scale(largest[0]);
             assert!(
                 (found - used).abs() < 1e-4 * used,

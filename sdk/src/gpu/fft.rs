@@ -58,8 +58,8 @@ struct Stage {
     turn: bool,
 }
 
-/// Lines of three planes in one buffer: values from plane to plane, from line to line and along a line, and how many there
-/// are along it.
+/// Lines of three planes in one buffer: values from plane to plane, from line to line and along a line, and how many
+/// there are along it.
 struct Lines<'a> {
     buffer: &'a wgpu::Buffer,
     places: [usize; 4],
@@ -94,12 +94,7 @@ impl Convolution {
         };
         let at = |buffer, places| Lines { buffer, places };
         let frame = || at(planes.field, [height * width, width, 1, width]);
-        let spectra = || {
-            at(
-                &rows,
-                [height * padded_width, padded_width, 1, padded_width],
-            )
-        };
+        let spectra = || at(&rows, [height * padded_width, padded_width, 1, padded_width]);
         let columns = [height * padded_width, 1, padded_width, height];
         let steps = [
             shared.step("rows", row, &row_roots, (frame(), spectra()), height)?,
@@ -310,11 +305,7 @@ fn butterflies(text: &mut String, n: usize, each: usize, r: usize, done: usize) 
             done * r
         );
         for q in 0..r {
-            let _ = writeln!(
-                text,
-                "        row[(at + {}u) * LINES + l] = v{k}[{q}];",
-                q * done
-            );
+            let _ = writeln!(text, "        row[(at + {}u) * LINES + l] = v{k}[{q}];", q * done);
         }
         *text += "    } }\n";
     }
@@ -382,9 +373,7 @@ mod twins {
 
     fn check(size: (usize, usize), distance_m: f64, padding: Padding) {
         let Some(device) = device() else { return };
-        let plans =
-            Propagator::for_colours(size.0, size.1, 8e-6, WAVELENGTHS_M, distance_m, padding)
-                .unwrap();
+        let plans = Propagator::for_colours(size.0, size.1, 8e-6, WAVELENGTHS_M, distance_m, padding).unwrap();
         let given = field(size.0 * size.1);
         let buffer = upload(&device, &given);
         let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
@@ -395,9 +384,7 @@ mod twins {
             factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
             turn: Some(&upload(&device, &turns)),
         };
-        let convolution = device
-            .guarded(|| Convolution::new(&device, &planes))
-            .unwrap();
+        let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();
         run(&device, |pass| convolution.run(pass));
         let mut expected = given;
         let mut scratch = plans[0].scratch();
@@ -407,10 +394,7 @@ mod twins {
             plan.propagate(plane, &mut scratch);
         }
         let worst = apart(&read(&device, &buffer, expected.len()), &expected);
-        assert!(
-            worst < 1e-4,
-            "{size:?}, {distance_m} m, {padding:?}: {worst}"
-        );
+        assert!(worst < 1e-4, "{size:?}, {distance_m} m, {padding:?}: {worst}");
     }
 
     #[test]
@@ -442,10 +426,7 @@ mod twins {
                 f32::from(u8::from(aperture::passes(fx, fy, 0.8)))
             };
             let limit = |kx, ky| f32::from(u8::from(plans.1.keeps(kx, ky)));
-            for (name, kept) in [
-                ("aperture", quadrant(size, round)),
-                ("limit", quadrant(size, limit)),
-            ] {
+            for (name, kept) in [("aperture", quadrant(size, round)), ("limit", quadrant(size, limit))] {
                 let given = field(size.0 * size.1);
                 let buffer = upload(&device, &given);
                 let planes = Planes {
@@ -455,9 +436,7 @@ mod twins {
                     factors: &[&kept],
                     turn: None,
                 };
-                let convolution = device
-                    .guarded(|| Convolution::new(&device, &planes))
-                    .unwrap();
+                let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();
                 run(&device, |pass| convolution.run(pass));
                 let mut expected = given;
                 for plane in expected.chunks_exact_mut(size.0 * size.1) {

@@ -31,11 +31,7 @@ impl Search {
         let side = |first: bool, lines: usize, length: usize, origin: i32, line: i32, step: i32| {
             let counts = [lines, length, area, width].map(|n| n as u32);
             let places = [origin, line, step, 0];
-            let walk = [
-                bytemuck::cast_slice::<u32, u8>(&counts),
-                bytemuck::cast_slice(&places),
-            ]
-            .concat();
+            let walk = [bytemuck::cast_slice::<u32, u8>(&counts), bytemuck::cast_slice(&places)].concat();
             let walk = device.constants("a side", &walk)?;
             let header = format!(
                 "const REACH: u32 = {reach}u;
@@ -99,9 +95,7 @@ mod tests {
             (0..height * width).map(edges).collect(),
             (0..height * width).map(|_| random()).collect(),
             // Jumps just as large as one that counts.
-            (0..height * width)
-                .map(|i| 0.3 + JUMP * ((i * 7) % 5) as f32)
-                .collect(),
+            (0..height * width).map(|i| 0.3 + JUMP * ((i * 7) % 5) as f32).collect(),
             vec![0.25; height * width],
         ]
     }
@@ -120,9 +114,7 @@ mod tests {
             let area = size.0 * size.1;
             for (case, depth) in depths(size).into_iter().enumerate() {
                 let values: Vec<[f32; 4]> = depth.iter().map(|&d| [0.0, 0.0, 0.0, d]).collect();
-                let surfaces = device
-                    .table("surfaces", bytemuck::cast_slice(&values))
-                    .unwrap();
+                let surfaces = device.table("surfaces", bytemuck::cast_slice(&values)).unwrap();
                 let search = device
                     .guarded(|| Search::new(&device, &surfaces.buffer, size, reach))
                     .unwrap();

@@ -1,6 +1,6 @@
-// The surfaces that a frame does not show, from one side of its pixels: the twin of sweep/hidden.rs, to the bit. A thread
-// walks a part of a line, away from that side, from so far before it that what it finds is what the whole line would
-// give. The header that hidden.rs writes before this text gives REACH, PART, JUMP and FIRST.
+// The surfaces that a frame does not show, from one side of its pixels: the twin of sweep/hidden.rs, to the bit. A
+// thread walks a part of a line, away from that side, from so far before it that what it finds is what the whole line
+// would give. The header that hidden.rs writes before this text gives REACH, PART, JUMP and FIRST.
 
 struct Walk {
     // Lines, and pixels of each; pixels of the frame, and of its rows.

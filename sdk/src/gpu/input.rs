@@ -101,8 +101,8 @@ pub(super) struct Packer {
 }
 
 impl Packer {
-    /// The stage for frames of `size` (height, width), into memory of its own or `input`, which another stage of the same
-    /// form and size had.
+    /// The stage for frames of `size` (height, width), into memory of its own or `input`, which another stage of the
+    /// same form and size had.
     pub(super) fn new(
         device: &Device,
         form: Form<'_>,
@@ -203,10 +203,7 @@ mod tests {
             let luma: Vec<u8> = (0..sensor.0 * sensor.1).map(byte).collect();
             let half = (sensor.0.div_ceil(2), sensor.1.div_ceil(2));
             let chroma: Vec<u8> = (0..2 * half.0 * half.1).map(byte).collect();
-            let planes = [
-                Plane::new(&luma, sensor.1, 1),
-                Plane::new(&chroma, 2 * half.1, 2),
-            ];
+            let planes = [Plane::new(&luma, sensor.1, 1), Plane::new(&chroma, 2 * half.1, 2)];
             let image = ColourImage::new(format, sensor.1, sensor.0, &planes).unwrap();
             let words: Vec<u16> = (0..height * width).map(|i| (i * 4099) as u16).collect();
             let frame = Frame {

@@ -154,9 +154,7 @@ impl MethodPlan {
     /// Its sums: three complex f32 for each of so many workgroups.
     pub(super) fn sums(&self) -> (&wgpu::Buffer, usize) {
         match &self.way {
-            Way::Network(trained) | Way::Seeded(_, _, trained) => {
-                (&trained.chain.partial, trained.chain.parts)
-            }
+            Way::Network(trained) | Way::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
             Way::Sweep(sweep) => (&sweep.partial, sweep.parts),
         }
     }

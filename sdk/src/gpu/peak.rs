@@ -24,10 +24,7 @@ pub struct Peak {
 
 pub(super) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
     device.guarded(|| {
-        let [from, to] = [
-            device.buffer("source", COPIED)?,
-            device.buffer("copy", COPIED)?,
-        ];
+        let [from, to] = [device.buffer("source", COPIED)?, device.buffer("copy", COPIED)?];
         let arguments = [(0, from.as_entire_binding()), (1, to.as_entire_binding())];
         let words = COPIED / 16 / 256 / COPIES_EACH;
         let header = format!("const EACH: u32 = {COPIES_EACH}u;\n");
@@ -70,11 +67,9 @@ pub(super) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
         let source = header + include_str!("peak.wgsl") + include_str!("peak_arithmetic.wgsl");
         // A driver in software does in one workgroup what a GPU does in thousands.
         let groups = if device.is_software() { 4 } else { GROUPS };
-        let compute = device.program("arithmetic", source, "compute").on(
-            device,
-            &arguments,
-            [groups, 1, 1],
-        )?;
+        let compute = device
+            .program("arithmetic", source, "compute")
+            .on(device, &arguments, [groups, 1, 1])?;
         let macs = groups * 256 * ROUNDS * 8 * per_step;
         Ok(Peak {
             mac_per_s: macs as f64 / seconds(device, &compute)?,

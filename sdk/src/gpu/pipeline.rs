@@ -125,8 +125,8 @@ impl GpuPipeline {
     /// Plans `job` on `device`. Whether the device is to be trusted is [`super::probe`]'s question.
     ///
     /// # Errors
-    /// What [`crate::Pipeline::new`] refuses, and [`GpuError::Refused`] or [`GpuError::OutOfMemory`] for what this device
-    /// cannot do.
+    /// What [`crate::Pipeline::new`] refuses, and [`GpuError::Refused`] or [`GpuError::OutOfMemory`] for what this
+    /// device cannot do.
     pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let display = &job.target.display;
         job.method.check(display)?;
@@ -249,17 +249,11 @@ impl GpuPipeline {
     ///
     /// # Errors
     /// As [`GpuPipeline::submit`].
-    pub fn submit_after(
-        &mut self,
-        past: Option<Past>,
-        frame: &Frame<'_>,
-        deliver: Deliver,
-    ) -> Result<Ticket> {
+    pub fn submit_after(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
-            return Err(crate::Error::Plan(format!(
-                "{FLIGHTS} frames are in flight; one must be collected first"
-            ))
-            .into());
+            return Err(
+                crate::Error::Plan(format!("{FLIGHTS} frames are in flight; one must be collected first")).into(),
+            );
         };
         let device = self.device.clone();
         let submission = device.guarded(|| {
@@ -366,22 +360,16 @@ impl GpuPipeline {
         self.take(ticket, Deliver::Shown, |_| {})
     }
 
-    fn take(
-        &mut self,
-        ticket: Ticket,
-        wanted: Deliver,
-        read: impl FnOnce(&[u8]),
-    ) -> Result<GpuReport> {
+    fn take(&mut self, ticket: Ticket, wanted: Deliver, read: impl FnOnce(&[u8])) -> Result<GpuReport> {
         let slot = &mut self.slots[ticket.slot];
         let flight = slot.flight.take_if(|flight| flight.serial == ticket.serial);
         let Some(flight) = flight else {
             return Err(crate::Error::Plan("the frame was collected before".into()).into());
         };
         if wanted == Deliver::Levels && flight.deliver == Deliver::Shown {
-            return Err(crate::Error::Plan(
-                "the frame was submitted to be shown; its levels were not copied".into(),
-            )
-            .into());
+            return Err(
+                crate::Error::Plan("the frame was submitted to be shown; its levels were not copied".into()).into(),
+            );
         }
         self.device.map(&slot.readable, &flight.submission)?;
         let mut head = [0; LEVELS_AT];

@@ -17,8 +17,8 @@ const SIZE: (usize, usize) = (37, 43);
 /// Runs a small frame of `job` on `device` and on the CPU and compares their phases.
 ///
 /// # Errors
-/// [`GpuError::Wrong`] where they differ by more than the numbers' rounding, [`GpuError::Lost`] where no answer comes, and
-/// what [`GpuPipeline::new`] refuses.
+/// [`GpuError::Wrong`] where they differ by more than the numbers' rounding, [`GpuError::Lost`] where no answer comes,
+/// and what [`GpuPipeline::new`] refuses.
 pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let job = Job {
         shape: SIZE,
@@ -60,8 +60,7 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
 
 /// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
 pub(super) fn apart(levels: &[u8], others: &[u8], response: &Response) -> f32 {
-    let shown: [Complex32; 256] =
-        std::array::from_fn(|l| Complex32::from_polar(1.0, response.phase(l as u8, 0)));
+    let shown: [Complex32; 256] = std::array::from_fn(|l| Complex32::from_polar(1.0, response.phase(l as u8, 0)));
     let sum: f32 = levels
         .iter()
         .zip(others)
@@ -88,7 +87,7 @@ fn frame() -> Result<RgbdFrame> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::DeviceOptions;
-    use super::super::device::testing::software;
+    use super::super::device::testing::{or_skip, software};
     use super::super::renderer::Renderer;
     use super::*;
     use crate::{Display, Method, Network};
@@ -102,19 +101,15 @@ mod tests {
         let source = include_str!("encode/mean_phase.wgsl");
         let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
         assert_ne!(forged, source);
-        let open = || Device::open(&software()).ok().map(Arc::new);
-        let Some(device) = open() else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let open = || Device::open(&software()).map(Arc::new);
+        let Some(device) = or_skip(open()) else {
             return;
         };
         probe(&device, &job).unwrap();
         let device = open().unwrap();
         device.forge("find", source, &forged);
         let wrong = probe(&device, &job).unwrap_err();
-        assert!(
-            matches!(&wrong, GpuError::Wrong(why) if !why.contains('\n')),
-            "{wrong}"
-        );
+        assert!(matches!(&wrong, GpuError::Wrong(why) if !why.contains('\n')), "{wrong}");
         let refused = Renderer::new(Some(device), DeviceOptions::default(), job);
         assert_eq!(refused.err(), Some(wrong));
     }

@@ -1,5 +1,5 @@
-//! Frames on a GPU that was found to be right. A device that is lost is opened again; what becomes of a frame where none
-//! serves is the session's to say.
+//! Frames on a GPU that was found to be right. A device that is lost is opened again; what becomes of a frame where
+//! none serves is the session's to say.
 
 use super::device::{Device, DeviceOptions};
 use super::input::{Colour, Depth, Frame};
@@ -44,11 +44,7 @@ impl Renderer {
     ///
     /// # Errors
     /// What the CPU refuses too, and what only the GPU does.
-    pub(crate) fn new(
-        device: Option<Arc<Device>>,
-        options: DeviceOptions,
-        job: Job,
-    ) -> Result<Self> {
+    pub(crate) fn new(device: Option<Arc<Device>>, options: DeviceOptions, job: Job) -> Result<Self> {
         let mut renderer = Renderer {
             job,
             options,
@@ -86,9 +82,7 @@ impl Renderer {
         self.epoch += 1;
         let opened = match (self.losses < ATTEMPTS, &self.reason) {
             (true, _) => trusted(device, &self.options, &self.job),
-            (false, Some(last)) => {
-                Err(GpuError::Lost(format!("{ATTEMPTS} times in a row: {last}")))
-            }
+            (false, Some(last)) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row: {last}"))),
             (false, None) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row"))),
         };
         match opened {
@@ -117,8 +111,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Hands a frame in, in the formats of the job, whose steady brightness comes from `past`. [`super::FLIGHTS`] may be
-    /// on their way.
+    /// Hands a frame in, in the formats of the job, whose steady brightness comes from `past`. [`super::FLIGHTS`] may
+    /// be on their way.
     ///
     /// # Errors
     /// Bytes of another length than planned, or what [`Renderer::new`] refuses where a device was lost before.
@@ -201,7 +195,7 @@ fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> R
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::Allowed;
-    use super::super::device::testing::software;
+    use super::super::device::testing::{or_skip, software};
     use super::super::{ChainOptions, Float};
     use super::*;
     use crate::brightness::Brightness;
@@ -235,8 +229,7 @@ mod tests {
 
     #[test]
     fn a_lost_device_costs_the_frames_in_flight_and_no_more() {
-        let Ok(mut renderer) = Renderer::new(None, software(), job(&network())) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(mut renderer) = or_skip(Renderer::new(None, software(), job(&network()))) else {
             return;
         };
         assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
@@ -280,8 +273,7 @@ mod tests {
 
     #[test]
     fn a_device_that_is_lost_again_and_again_is_of_no_use() {
-        let Ok(mut renderer) = Renderer::new(None, software(), job(&network())) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(mut renderer) = or_skip(Renderer::new(None, software(), job(&network()))) else {
             return;
         };
         renderer.losses = ATTEMPTS;
@@ -305,8 +297,7 @@ mod tests {
             },
             ..Default::default()
         };
-        let Ok(device) = Device::open_with(&software(), &little) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(device) = or_skip(Device::open_with(&software(), &little)) else {
             return;
         };
         let device = Arc::new(device);

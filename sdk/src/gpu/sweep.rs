@@ -1,8 +1,8 @@
 //! The plane sweep on the GPU, several planes a dispatch: the twin of [`crate::sweep`], whose filters it has.
 //!
 //! What it reads and writes stays on the device: red, green, blue and depth of each pixel in, the hologram's field out.
-//! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged steps,
-//! only the tiles are passed over here in which there is neither light nor a point yet.
+//! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged
+//! steps, only the tiles are passed over here in which there is neither light nor a point yet.
 
 use super::chain::time;
 use super::device::{Device, Dispatch};
@@ -41,12 +41,7 @@ pub(super) struct Sweeper {
 
 impl Sweeper {
     /// The twin of `plan`, which is for `display`, of a frame's `surfaces`: (H, W) of red, green, blue and depth, f32.
-    pub(super) fn new(
-        device: &Device,
-        plan: &SweepPlan,
-        display: &Display,
-        surfaces: &wgpu::Buffer,
-    ) -> Result<Self> {
+    pub(super) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
         Self::planned(device, plan, display, surfaces, !device.is_software())
     }
 
@@ -115,12 +110,7 @@ impl Sweeper {
             field,
             partial,
             parts: tiles.0 * tiles.1,
-            bytes: searched
-                + (16 + 4) * area
-                + crossings * (2 * swept + 4 * area)
-                + swept
-                + 2 * half_home
-                + 24 * area,
+            bytes: searched + (16 + 4) * area + crossings * (2 * swept + 4 * area) + swept + 2 * half_home + 24 * area,
             steps,
         })
     }
@@ -173,11 +163,7 @@ impl Maker<'_> {
             (3, self.points.as_entire_binding()),
         ];
         let program = self.device.program("points", source, "find");
-        program.on(
-            self.device,
-            &arguments,
-            [width.div_ceil(COLUMNS), height, 1],
-        )
+        program.on(self.device, &arguments, [width.div_ceil(COLUMNS), height, 1])
     }
 
     /// The faster of one plane and `most` planes a dispatch, on a frame that is lit everywhere from its last plane on:
@@ -190,12 +176,10 @@ impl Maker<'_> {
             (self.device.queue).write_buffer(self.surfaces, at, bytemuck::cast_slice(&row));
         }
         let (single, several) = (self.steps(1, fields)?, self.steps(most, fields)?);
-        Ok(
-            match time(self.device, &single)? < time(self.device, &several)? {
-                true => (single, 1),
-                false => (several, most),
-            },
-        )
+        Ok(match time(self.device, &single)? < time(self.device, &several)? {
+            true => (single, 1),
+            false => (several, most),
+        })
     }
 
     /// Each pixel's points, then all planes, so many `together`, from the first field to the second and back. The first
@@ -279,20 +263,18 @@ impl Maker<'_> {
 /// The longest radius of a step that leaves enough of a tile.
 const MOST_RADIUS: usize = TILE.1 / 4;
 
-/// The most planes of a dispatch: each costs a halo more, and saves that the field is read and written. As many as leave a
-/// quarter of the tile; None where one leaves less.
+/// The most planes of a dispatch: each costs a halo more, and saves that the field is read and written. As many as
+/// leave a quarter of the tile; None where one leaves less.
 fn most_together(radius: usize) -> Option<usize> {
     let left = |planes: usize| {
         let halo = 2 * radius * planes;
         TILE.0.saturating_sub(halo) * TILE.1.saturating_sub(halo)
     };
-    (1..)
-        .take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1)
-        .last()
+    (1..).take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1).last()
 }
 
-/// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from the
-/// last plane, and must come back on the way to plane 0 and from there to the hologram to matter.
+/// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from
+/// the last plane, and must come back on the way to plane 0 and from there to the hologram to matter.
 fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
     let sweep = plan.sweep();
     let optics = sweep::optics(display, &sweep, plan.z_m())?;
@@ -370,12 +352,7 @@ mod tests {
         (mixed >> 8) as f32 / (1 << 24) as f32
     }
 
-    fn on_gpu(
-        frame: &RgbdFrame,
-        plan: &SweepPlan,
-        display: &Display,
-        measured: bool,
-    ) -> Option<Vec<Complex32>> {
+    fn on_gpu(frame: &RgbdFrame, plan: &SweepPlan, display: &Display, measured: bool) -> Option<Vec<Complex32>> {
         let device = device()?;
         let (height, width) = frame.shape();
         let (rgb, depth) = (frame.rgb(), frame.depth());
@@ -434,10 +411,7 @@ mod tests {
                 planes: 7,
                 ..sweep()
             },
-            Sweep {
-                planes: 1,
-                ..sweep()
-            },
+            Sweep { planes: 1, ..sweep() },
             Sweep {
                 taps: 5,
                 planes: 24,
@@ -485,8 +459,7 @@ mod tests {
                 return;
             };
             let mut expected = vec![Complex32::ZERO; field.len()];
-            plan.field(&frame, &mut expected, &mut plan.scratch())
-                .unwrap();
+            plan.field(&frame, &mut expected, &mut plan.scratch()).unwrap();
             let worst = apart(&field, &expected);
             println!("{size:?} {sweep:?} {z_m}: {worst}");
             assert!(worst < 1e-4, "{size:?} {sweep:?} {z_m}: {worst}");

@@ -1,8 +1,8 @@
-// Several planes of the sweep, the farthest first, for one colour in one tile: the step from the plane behind along rows
-// and columns, then the plane's points, which replace the field where they are, then the light of those that lie before or
-// behind the plane. A tile comes with a halo into workgroup memory, and what is right of it shrinks by RADIUS a step until
-// its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a thread has EACH
-// rows of a column.
+// Several planes of the sweep, the farthest first, for one colour in one tile: the step from the plane behind along
+// rows and columns, then the plane's points, which replace the field where they are, then the light of those that lie
+// before or behind the plane. A tile comes with a halo into workgroup memory, and what is right of it shrinks by RADIUS
+// a step until its middle is left. The header that sweep.rs writes before this text gives the constants in capitals; a
+// thread has EACH rows of a column.
 
 struct Frame {
     width: u32, height: u32,
@@ -11,8 +11,8 @@ struct Frame {
     // The first plane that is done here; behind the last one there is no light.
     first: u32,
 }
-// What a point gives to its neighbours (see Filters::carry), in the first value's z; the filter's centre, then the taps at
-// distances 1, 2 …, complex.
+// What a point gives to its neighbours (see Filters::carry), in the first value's z; the filter's centre, then the taps
+// at distances 1, 2 …, complex.
 struct Colour { taps: array<vec4f, RADIUS + 1> }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -1,6 +1,6 @@
 // From the nearest plane to where the hologram stands, in two dispatches: rows, which leave the border at their sides
-// behind, then columns. The latter also sum what becomes the mean phase. The header that sweep.rs writes before this text
-// gives RADIUS and DOWN.
+// behind, then columns. The latter also sum what becomes the mean phase. The header that sweep.rs writes before this
+// text gives RADIUS and DOWN.
 
 struct Way {
     // Of what is written, and of what is read.

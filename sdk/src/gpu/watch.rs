@@ -27,12 +27,8 @@ pub(super) fn watched<T: Send + 'static>(
     });
     match receive.recv_timeout(patience) {
         Ok(done) => done,
-        Err(RecvTimeoutError::Timeout) => {
-            Err(GpuError::Lost(format!("no answer for {patience:?} {what}")))
-        }
-        Err(RecvTimeoutError::Disconnected) => {
-            Err(GpuError::Lost(format!("its thread died {what}")))
-        }
+        Err(RecvTimeoutError::Timeout) => Err(GpuError::Lost(format!("no answer for {patience:?} {what}"))),
+        Err(RecvTimeoutError::Disconnected) => Err(GpuError::Lost(format!("its thread died {what}"))),
     }
 }
 
@@ -55,14 +51,10 @@ mod tests {
         assert!(matches!(panicked, Err(GpuError::Lost(_))), "{panicked:?}");
         let end = Arc::new(Barrier::new(2));
         let stuck = end.clone();
-        let left = watched(
-            "while it was tried out",
-            Duration::from_millis(1),
-            move || {
-                stuck.wait();
-                Ok(())
-            },
-        );
+        let left = watched("while it was tried out", Duration::from_millis(1), move || {
+            stuck.wait();
+            Ok(())
+        });
         let message = left.unwrap_err().to_string();
         assert!(message.contains("no answer for 1ms while"), "{message}");
         end.wait();

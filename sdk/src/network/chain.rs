@@ -40,9 +40,7 @@ impl Quantisation {
     /// The nearest value to `real`.
     pub fn quantise(&self, real: f32) -> u8 {
         let zero = f32::from(self.zero_point);
-        let steps = (real / self.scale)
-            .clamp(-zero, 255.0 - zero)
-            .round_ties_even();
+        let steps = (real / self.scale).clamp(-zero, 255.0 - zero).round_ties_even();
         (steps + zero) as u8
     }
 
@@ -136,9 +134,6 @@ impl Chain {
 
     /// Multiply-accumulate operations for one pixel.
     pub fn macs_per_pixel(&self) -> usize {
-        self.layers
-            .iter()
-            .map(|layer| 9 * layer.inputs * layer.outputs)
-            .sum()
+        self.layers.iter().map(|layer| 9 * layer.inputs * layer.outputs).sum()
     }
 }

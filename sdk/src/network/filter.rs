@@ -72,8 +72,7 @@ impl FilterPlan {
         };
         let mut planes = field.chunks_exact_mut(height * width);
         let planes: [_; 3] = std::array::from_fn(|_| planes.next().unwrap_or_default());
-        self.chain
-            .run_rows(&rows, planes, self.size, tiling, &scratch.fused);
+        self.chain.run_rows(&rows, planes, self.size, tiling, &scratch.fused);
     }
 }
 
@@ -116,13 +115,7 @@ impl Rows<3> for InPlace<'_> {
         });
     }
 
-    fn write(
-        &self,
-        row: usize,
-        from: usize,
-        mut values: [&mut [f32]; OUTPUTS],
-        band: &mut Band<'_, Complex32, 3>,
-    ) {
+    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, 3>) {
         let field = band.rows_mut(row, from, values[0].len());
         wide!({
             if self.tanh {

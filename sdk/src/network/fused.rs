@@ -4,8 +4,8 @@ use super::chain::{Chain, Precision, Quantisation, Weights};
 use super::{Head, InputKind, Source};
 use num_complex::Complex32;
 use phasefront_kernels::{
-    Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows,
-    Scratch, SkipSum, Tiling, wide,
+    Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows, Scratch, SkipSum,
+    Tiling, wide,
 };
 use rayon::prelude::*;
 
@@ -59,13 +59,7 @@ impl FusedChain {
     }
 
     /// Runs the chain on the current rayon pool; `input` and `output` are planes of `size` (height, width).
-    pub(super) fn run(
-        &self,
-        input: &[f32],
-        output: &mut [f32],
-        size: (usize, usize),
-        scratch: &FusedScratch,
-    ) {
+    pub(super) fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), scratch: &FusedScratch) {
         let tiling = self.tiling(size);
         match &self.kernels {
             Kernels::Int8(chain) => chain.run(input, output, size, tiling, &scratch.int8),
@@ -73,9 +67,7 @@ impl FusedChain {
         }
         if self.tanh {
             const CHUNK: usize = 1 << 14;
-            output
-                .par_chunks_mut(CHUNK)
-                .for_each(|chunk| wide!(tanh(&mut [chunk])));
+            output.par_chunks_mut(CHUNK).for_each(|chunk| wide!(tanh(&mut [chunk])));
         }
     }
 
@@ -156,13 +148,7 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
         });
     }
 
-    fn write(
-        &self,
-        row: usize,
-        from: usize,
-        mut values: [&mut [f32]; OUTPUTS],
-        band: &mut Band<'_, Complex32, 3>,
-    ) {
+    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, 3>) {
         let field = band.rows_mut(row, from, values[0].len());
         let base = |plane: usize, at: usize, into: &mut [f32]| {
             self.source.read(plane, row, from + at, into);
@@ -216,12 +202,7 @@ pub(crate) fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
     let last = chain.layers.len() - 1;
     let mut layers = Vec::new();
     for (i, layer) in chain.layers.iter().enumerate() {
-        let Weights::Int8 {
-            kernel,
-            scale,
-            bias,
-        } = &layer.weights
-        else {
+        let Weights::Int8 { kernel, scale, bias } = &layer.weights else {
             return Err(format!("layer '{}' is f32 in an int8 chain", layer.name));
         };
         // One step of what the sums are multiplied to, and what follows.
@@ -242,9 +223,7 @@ pub(crate) fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
                 relu
             };
             let target = first.unwrap_or(end);
-            requantise.rescale = first
-                .map(|first| (first / end) as f32)
-                .filter(|_| i + 1 == last);
+            requantise.rescale = first.map(|first| (first / end) as f32).filter(|_| i + 1 == last);
             if Chain::has_skip(i + 1) {
                 requantise.skip = Some(SkipSum {
                     relu: relu.map(|relu| (relu / target) as f32),
@@ -299,9 +278,7 @@ fn tanh_value(x: f32) -> f32 {
     let k = shifted.to_bits() << 23;
     let r = (y - (shifted - ROUND)) * std::f32::consts::LN_2;
     // Taylor series of e^r; the next term is below 2e-7 of the sum.
-    let e = 1.0
-        + r * (1.0
-            + r * (1.0 / 2.0 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
+    let e = 1.0 + r * (1.0 + r * (1.0 / 2.0 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
     let e = f32::from_bits(e.to_bits().wrapping_add(k));
     1.0 - 2.0 / (e + 1.0)
 }

@@ -38,18 +38,9 @@ impl Head {
     ///
     /// # Errors
     /// When the lengths do not fit each other.
-    pub fn field(
-        self,
-        kind: InputKind,
-        output: &[f32],
-        input: &[f32],
-        field: &mut [Complex32],
-    ) -> Result<()> {
+    pub fn field(self, kind: InputKind, output: &[f32], input: &[f32], field: &mut [Complex32]) -> Result<()> {
         let area = field.len() / 3;
-        if field.len() != 3 * area
-            || output.len() != 6 * area
-            || input.len() != kind.channels() * area
-        {
+        if field.len() != 3 * area || output.len() != 6 * area || input.len() != kind.channels() * area {
             return Err(Error::Frame(format!(
                 "head: output {}, input {} and field {} values; 6, {} and 3 planes of one size are right",
                 output.len(),
@@ -62,8 +53,7 @@ impl Head {
             return Ok(());
         }
         let mut planes = field.chunks_exact_mut(area);
-        let [red, green, blue] =
-            std::array::from_fn(|_| planes.next().unwrap_or_default().par_chunks_mut(PART));
+        let [red, green, blue] = std::array::from_fn(|_| planes.next().unwrap_or_default().par_chunks_mut(PART));
         let parts = red.zip(green).zip(blue).enumerate();
         parts.for_each(|(part, ((red, green), blue))| {
             let at = part * PART;
@@ -76,7 +66,8 @@ impl Head {
         Ok(())
     }
 
-    /// A run of pixels of [`Head::field`]: `base` gives pixels of a plane of the input, from the given one of the run on.
+    /// A run of pixels of [`Head::field`]: `base` gives pixels of a plane of the input, from the given one of the run
+    /// on.
     #[inline(always)]
     pub(super) fn row(
         self,
@@ -152,12 +143,9 @@ fn sin_cos_pi(t: f32) -> (f32, f32) {
     let r = t - 0.5 * (shifted - ROUND);
     let r2 = r * r;
     // Taylor series of sin πr and cos πr; the first term left out is below 1e-8 on the interval.
-    let sin = r
-        * (std::f32::consts::PI
-            + r2 * (-5.167_713 + r2 * (2.550_164 + r2 * (-0.599_264_5 + r2 * 0.082_145_89))));
-    let cos = 1.0
-        + r2 * (-4.934_802
-            + r2 * (4.058_712 + r2 * (-1.335_263 + r2 * (0.235_330_63 + r2 * -0.025_806_89))));
+    let sin =
+        r * (std::f32::consts::PI + r2 * (-5.167_713 + r2 * (2.550_164 + r2 * (-0.599_264_5 + r2 * 0.082_145_89))));
+    let cos = 1.0 + r2 * (-4.934_802 + r2 * (4.058_712 + r2 * (-1.335_263 + r2 * (0.235_330_63 + r2 * -0.025_806_89))));
     // Odd quarters swap sine and cosine; the second bit of k gives the sign.
     let odd = 0u32.wrapping_sub(quarter & 1);
     let (s, c) = (sin.to_bits(), cos.to_bits());
@@ -178,14 +166,8 @@ mod tests {
             let t = k as f32 / 20_000.0;
             let (sin, cos) = sin_cos_pi(t);
             let exact = f64::from(t) * std::f64::consts::PI;
-            assert!(
-                (f64::from(sin) - exact.sin()).abs() < 3e-7,
-                "sin π·{t}: {sin}"
-            );
-            assert!(
-                (f64::from(cos) - exact.cos()).abs() < 3e-7,
-                "cos π·{t}: {cos}"
-            );
+            assert!((f64::from(sin) - exact.sin()).abs() < 3e-7, "sin π·{t}: {sin}");
+            assert!((f64::from(cos) - exact.cos()).abs() < 3e-7, "cos π·{t}: {cos}");
         }
     }
 
@@ -199,24 +181,16 @@ mod tests {
             .field(InputKind::Rgbd, &output, &input, &mut field)
             .unwrap();
         for (k, value) in field.iter().enumerate() {
-            let expected = Complex32::from_polar(
-                (output[k] + 1.0) * 0.5f32.sqrt(),
-                std::f32::consts::PI * output[6 + k],
-            );
-            assert!(
-                (value - expected).norm() < 1e-6,
-                "{k}: {value} against {expected}"
-            );
+            let expected =
+                Complex32::from_polar((output[k] + 1.0) * 0.5f32.sqrt(), std::f32::consts::PI * output[6 + k]);
+            assert!((value - expected).norm() < 1e-6, "{k}: {value} against {expected}");
         }
         Head::RealImaginary
             .field(InputKind::Rgbd, &output, &input, &mut field)
             .unwrap();
         for (k, value) in field.iter().enumerate() {
             let expected = Complex32::new(k as f32 / 8.0 + output[k], output[6 + k]);
-            assert!(
-                (value - expected).norm() < 1e-6,
-                "{k}: {value} against {expected}"
-            );
+            assert!((value - expected).norm() < 1e-6, "{k}: {value} against {expected}");
         }
         let there: Vec<f32> = (0..12).map(|k| (k as f32 * 0.7).sin()).collect();
         Head::RealImaginary
@@ -224,10 +198,7 @@ mod tests {
             .unwrap();
         for (k, value) in field.iter().enumerate() {
             let expected = Complex32::new(there[k] + output[k], there[6 + k] + output[6 + k]);
-            assert!(
-                (value - expected).norm() < 1e-6,
-                "{k}: {value} against {expected}"
-            );
+            assert!((value - expected).norm() < 1e-6, "{k}: {value} against {expected}");
         }
     }
 

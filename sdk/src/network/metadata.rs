@@ -12,8 +12,8 @@ use tract_onnx::pb::StringStringEntryProto;
 pub enum InputKind {
     /// "rgbd": red, green, blue and normalized depth, each minus 0.5.
     Rgbd,
-    /// "rgbdxy": as [`InputKind::Rgbd`], then the place in the frame, x and y, from −½ at the first pixel's outer edge to
-    /// ½ at the last one's: for aberrations that differ over it.
+    /// "rgbdxy": as [`InputKind::Rgbd`], then the place in the frame, x and y, from −½ at the first pixel's outer edge
+    /// to ½ at the last one's: for aberrations that differ over it.
     RgbdXy,
     /// "ldi2" to "ldi9": that many layers front first, each as [`InputKind::Rgbd`].
     Ldi {
@@ -24,11 +24,11 @@ pub enum InputKind {
     Seeded,
     /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
     Field,
-    /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network is
-    /// small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
+    /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network
+    /// is small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
     BlurredField,
-    /// "split-blurred-field": the same in two parts, for networks whose input is rounded to 8 bits: its six planes in steps
-    /// of [`InputKind::SPLIT_STEP`], then of each what is left, [`InputKind::REMAINDER_GAIN`] times.
+    /// "split-blurred-field": the same in two parts, for networks whose input is rounded to 8 bits: its six planes in
+    /// steps of [`InputKind::SPLIT_STEP`], then of each what is left, [`InputKind::REMAINDER_GAIN`] times.
     SplitBlurredField,
 }
 
@@ -127,13 +127,7 @@ impl TrainedDisplay {
     pub(super) fn check(&self, display: &Display) -> Result<()> {
         let pairs = [
             ("pitch", "µm", 1e6, self.pitch_m, display.pitch_m()),
-            (
-                "volume depth",
-                "mm",
-                1e3,
-                self.volume_depth_m,
-                display.volume_depth_m(),
-            ),
+            ("volume depth", "mm", 1e3, self.volume_depth_m, display.volume_depth_m()),
         ];
         let colours = self
             .wavelengths_m
@@ -197,22 +191,10 @@ pub(super) fn read(metadata: &[StringStringEntryProto]) -> Result<Description> {
         positive,
     )?;
     let display = TrainedDisplay {
-        pitch_m: number(
-            metadata,
-            "pitch_um",
-            "a number in µm such as '8.0'",
-            positive,
-        )? * 1e-6,
+        pitch_m: number(metadata, "pitch_um", "a number in µm such as '8.0'", positive)? * 1e-6,
         wavelengths_m: wavelengths.map(|nm: f64| nm * 1e-9),
-        volume_depth_m: number(
-            metadata,
-            "volume_depth_mm",
-            "a number in mm such as '6.0'",
-            positive,
-        )? * 1e-3,
-        offset_m: number(metadata, "offset_mm", "a number in mm such as '0'", |v| {
-            v.is_finite()
-        })? * 1e-3,
+        volume_depth_m: number(metadata, "volume_depth_mm", "a number in mm such as '6.0'", positive)? * 1e-3,
+        offset_m: number(metadata, "offset_mm", "a number in mm such as '0'", |v| v.is_finite())? * 1e-3,
     };
     let seed_planes = match found(metadata, "seed_planes") {
         Some(planes) if input == InputKind::Seeded => {
@@ -238,19 +220,11 @@ fn found<'a>(metadata: &'a [StringStringEntryProto], key: &str) -> Option<&'a st
 }
 
 fn text<'a>(metadata: &'a [StringStringEntryProto], key: &str, right: &str) -> Result<&'a str> {
-    found(metadata, key).ok_or_else(|| {
-        Error::Network(format!(
-            "metadata 'phasefront.{key}' is missing; {right} is right"
-        ))
-    })
+    found(metadata, key)
+        .ok_or_else(|| Error::Network(format!("metadata 'phasefront.{key}' is missing; {right} is right")))
 }
 
-fn number(
-    metadata: &[StringStringEntryProto],
-    key: &str,
-    right: &str,
-    valid: impl Fn(&f64) -> bool,
-) -> Result<f64> {
+fn number(metadata: &[StringStringEntryProto], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
     numbers::<1>(metadata, key, right, valid).map(|[one]| one)
 }
 
@@ -269,7 +243,5 @@ fn numbers<const N: usize>(
 }
 
 fn wrong(key: &str, value: &str, right: &str) -> Error {
-    Error::Network(format!(
-        "metadata 'phasefront.{key}' is '{value}'; {right} is right"
-    ))
+    Error::Network(format!("metadata 'phasefront.{key}' is '{value}'; {right} is right"))
 }

@@ -8,9 +8,7 @@ use super::chain::{Chain, InputQuantisation, Layer, Precision, Quantisation, Wei
 use super::tensor::Constant;
 use crate::{Error, Result};
 use std::collections::HashMap;
-use tract_onnx::pb::{
-    GraphProto, NodeProto, ValueInfoProto, tensor_shape_proto::dimension::Value as Dimension,
-};
+use tract_onnx::pb::{GraphProto, NodeProto, ValueInfoProto, tensor_shape_proto::dimension::Value as Dimension};
 
 /// Most layers, and most channels of one layer, that are taken for a hologram network.
 const MAX_LAYERS: usize = 256;
@@ -89,10 +87,7 @@ fn describe(node: &NodeProto) -> String {
 fn constants(graph: &GraphProto) -> Result<HashMap<&str, Constant>> {
     let mut all = HashMap::new();
     for tensor in &graph.initializer {
-        all.insert(
-            tensor.name.as_str(),
-            Constant::new(tensor).map_err(Error::Network)?,
-        );
+        all.insert(tensor.name.as_str(), Constant::new(tensor).map_err(Error::Network)?);
     }
     for node in graph.node.iter().filter(|node| node.op_type == "Constant") {
         let tensor = node
@@ -101,8 +96,7 @@ fn constants(graph: &GraphProto) -> Result<HashMap<&str, Constant>> {
             .find(|a| a.name == "value")
             .and_then(|a| a.t.as_ref());
         if let (Some(tensor), Some(output)) = (tensor, node.output.first()) {
-            let constant = Constant::new(tensor)
-                .map_err(|why| Error::Network(format!("{}: {why}", describe(node))))?;
+            let constant = Constant::new(tensor).map_err(|why| Error::Network(format!("{}: {why}", describe(node))))?;
             all.insert(output, constant);
         }
     }
@@ -124,11 +118,7 @@ struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     fn new(graph: &'a GraphProto, constants: &'a HashMap<&str, Constant>) -> Result<Self> {
-        let layer_count = graph
-            .node
-            .iter()
-            .filter(|node| node.op_type == "Conv")
-            .count();
+        let layer_count = graph.node.iter().filter(|node| node.op_type == "Conv").count();
         if !(2..=MAX_LAYERS).contains(&layer_count) {
             return Err(Error::Network(format!(
                 "{layer_count} convolutions; a hologram network has 2 to {MAX_LAYERS} in a chain"
@@ -145,10 +135,7 @@ impl<'a> Reader<'a> {
                 inputs.len()
             )));
         };
-        let mut values: HashMap<_, _> = constants
-            .iter()
-            .map(|(&name, c)| (name, Value::Constant(c)))
-            .collect();
+        let mut values: HashMap<_, _> = constants.iter().map(|(&name, c)| (name, Value::Constant(c))).collect();
         values.insert(
             &input.name,
             Value::Activation {
@@ -188,10 +175,7 @@ impl<'a> Reader<'a> {
         }
         let value = match node.op_type.as_str() {
             "Constant" => {
-                let known = node
-                    .output
-                    .iter()
-                    .all(|name| self.values.contains_key(name.as_str()));
+                let known = node.output.iter().all(|name| self.values.contains_key(name.as_str()));
                 return if known {
                     Ok(())
                 } else {
@@ -210,9 +194,11 @@ impl<'a> Reader<'a> {
                 return Err("fold batch normalisation into the convolution before export".into());
             }
             _ => {
-                return Err("not an operator of the residual chain (Conv, Relu, Add, Concat, Tanh, QuantizeLinear, \
+                return Err(
+                    "not an operator of the residual chain (Conv, Relu, Add, Concat, Tanh, QuantizeLinear, \
                             DequantizeLinear)"
-                    .into());
+                        .into(),
+                );
             }
         };
         let [output] = &node.output[..] else {
@@ -223,10 +209,7 @@ impl<'a> Reader<'a> {
     }
 
     fn input(&self, node: &NodeProto, k: usize) -> Read<&Value<'a>> {
-        let name = node
-            .input
-            .get(k)
-            .ok_or_else(|| format!("has no input {k}"))?;
+        let name = node.input.get(k).ok_or_else(|| format!("has no input {k}"))?;
         self.values
             .get(name.as_str())
             .ok_or_else(|| format!("reads '{name}', which no earlier node writes"))
@@ -235,10 +218,7 @@ impl<'a> Reader<'a> {
     fn activation(&self, node: &NodeProto, k: usize) -> Read<(Step, Option<Quantisation>)> {
         match self.input(node, k)? {
             Value::Activation { step, rounding } => Ok((*step, *rounding)),
-            _ => Err(format!(
-                "input '{}' is not an activation in f32",
-                node.input[k]
-            )),
+            _ => Err(format!("input '{}' is not an activation in f32", node.input[k])),
         }
     }
 
@@ -292,10 +272,7 @@ impl<'a> Reader<'a> {
         let quantisation = self.activation_quantisation(node)?;
         // What the last layer concatenates may be rounded as the whole is, whose other part has a sign.
         let concatenated = step == self.features(self.last());
-        if matches!(step, Step::Relu(_) | Step::Sum(_))
-            && quantisation.zero_point != 0
-            && !concatenated
-        {
+        if matches!(step, Step::Relu(_) | Step::Sum(_)) && quantisation.zero_point != 0 && !concatenated {
             return Err(format!(
                 "zero point {}; {step} is never negative: 0 is right",
                 quantisation.zero_point
@@ -325,10 +302,7 @@ impl<'a> Reader<'a> {
                 }
                 let scale = self.scales(node)?;
                 // The axis means nothing for a single scale; for several it must be the output channel's.
-                if scale.len() > 1
-                    && int_attribute(node, "axis").unwrap_or(1) != 0
-                    && constant.shape().len() > 1
-                {
+                if scale.len() > 1 && int_attribute(node, "axis").unwrap_or(1) != 0 && constant.shape().len() > 1 {
                     return Err("weights are quantised per output channel: axis 0 is right".into());
                 }
                 Ok(Value::Dequantised { constant, scale })
@@ -354,9 +328,9 @@ impl<'a> Reader<'a> {
                     i - 1,
                     i - 2
                 ),
-                Step::Concat => format!(
-                    "the last layer reads {step}: the features concatenated with the network's input are right"
-                ),
+                Step::Concat => {
+                    format!("the last layer reads {step}: the features concatenated with the network's input are right")
+                }
                 _ => format!("layer {i} reads {step}; {expected} is right"),
             });
         }
@@ -377,8 +351,7 @@ impl<'a> Reader<'a> {
             ));
         }
         if let Some(first) = self.layers.first()
-            && matches!(first.weights, Weights::F32 { .. })
-                != matches!(weights, Weights::F32 { .. })
+            && matches!(first.weights, Weights::F32 { .. }) != matches!(weights, Weights::F32 { .. })
         {
             return Err("mixes f32 and int8 layers; one precision throughout is right".into());
         }
@@ -390,9 +363,7 @@ impl<'a> Reader<'a> {
             self.int8_roundings(i, &mut quantisation)?;
             check_multipliers(&weights, &quantisation)?;
         } else if rounding.is_some() || self.layers.iter().any(|l| l.quantisation.input.is_some()) {
-            return Err(
-                "reads rounded activations with f32 weights; quantise both or neither".into(),
-            );
+            return Err("reads rounded activations with f32 weights; quantise both or neither".into());
         }
         self.layers.push(Layer {
             name: node.name.clone(),
@@ -452,12 +423,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn weights(
-        &self,
-        node: &NodeProto,
-        inputs: usize,
-        rounding: Option<Quantisation>,
-    ) -> Read<Weights> {
+    fn weights(&self, node: &NodeProto, inputs: usize, rounding: Option<Quantisation>) -> Read<Weights> {
         let (weights, weight_scale) = match self.input(node, 1)? {
             Value::Constant(constant) => (*constant, None),
             Value::Dequantised { constant, scale } => (*constant, Some(scale)),
@@ -478,9 +444,7 @@ impl<'a> Reader<'a> {
             Some(_) => Some(self.input(node, 2)?),
             None => None,
         };
-        let wrong_bias = || {
-            format!("its bias must be a constant of {outputs} values, as precise as the weights")
-        };
+        let wrong_bias = || format!("its bias must be a constant of {outputs} values, as precise as the weights");
         let Some(weight_scale) = weight_scale else {
             let bias = match bias {
                 Some(Value::Constant(constant)) => constant.f32s()?.to_vec(),
@@ -503,9 +467,7 @@ impl<'a> Reader<'a> {
         })?;
         let input = rounding.or_else(|| self.concat.and_then(|[features, _]| features));
         let input_scale = input
-            .ok_or(
-                "int8 weights need a rounded input: QuantizeLinear and DequantizeLinear before it",
-            )?
+            .ok_or("int8 weights need a rounded input: QuantizeLinear and DequantizeLinear before it")?
             .scale;
         let bias = match bias {
             Some(bias) => int8_bias(bias, input_scale, &scale)?.ok_or_else(wrong_bias)?,
@@ -527,9 +489,7 @@ impl<'a> Reader<'a> {
                 step: Step::Relu(i),
                 rounding: None,
             }),
-            (step, _) => Err(format!(
-                "follows {step}; ReLU follows each convolution but the last"
-            )),
+            (step, _) => Err(format!("follows {step}; ReLU follows each convolution but the last")),
         }
     }
 
@@ -543,11 +503,7 @@ impl<'a> Reader<'a> {
         if !Chain::has_skip(i) {
             return Err(format!("adds {} and {}; {}", a.0, b.0, right()));
         }
-        let skip = if i - 2 == 1 {
-            Step::Relu(0)
-        } else {
-            Step::Sum(i - 2)
-        };
+        let skip = if i - 2 == 1 { Step::Relu(0) } else { Step::Sum(i - 2) };
         let (relu, skip_rounding) = match (a.0, b.0) {
             (x, y) if x == Step::Relu(i - 1) && y == skip => (a.1, b.1),
             (x, y) if y == Step::Relu(i - 1) && x == skip => (b.1, a.1),
@@ -599,9 +555,7 @@ impl<'a> Reader<'a> {
                 step: Step::Tanh,
                 rounding: None,
             }),
-            (step, _) => Err(format!(
-                "follows {step}; tanh may follow the last convolution alone"
-            )),
+            (step, _) => Err(format!("follows {step}; tanh may follow the last convolution alone")),
         }
     }
 
@@ -646,23 +600,14 @@ impl<'a> Reader<'a> {
 /// The channel count of the graph's input, `(1, C, H, W)` in f32.
 fn input_channels(input: &ValueInfoProto) -> Result<usize> {
     use tract_onnx::pb::{tensor_proto::DataType, type_proto::Value as Type};
-    let wrong = |what: String| {
-        Error::Network(format!(
-            "input '{}' {what}; f32 (1, C, H, W) is right",
-            input.name
-        ))
-    };
-    let Some(Type::TensorType(tensor)) = input.r#type.as_ref().and_then(|t| t.value.as_ref())
-    else {
+    let wrong = |what: String| Error::Network(format!("input '{}' {what}; f32 (1, C, H, W) is right", input.name));
+    let Some(Type::TensorType(tensor)) = input.r#type.as_ref().and_then(|t| t.value.as_ref()) else {
         return Err(wrong("is no tensor".into()));
     };
     if tensor.elem_type != DataType::Float as i32 {
         return Err(wrong("is not f32".into()));
     }
-    let dims = tensor
-        .shape
-        .as_ref()
-        .map_or(&[][..], |shape| &shape.dim[..]);
+    let dims = tensor.shape.as_ref().map_or(&[][..], |shape| &shape.dim[..]);
     let [batch, channels, ..] = dims else {
         return Err(wrong(format!("has {} dimensions", dims.len())));
     };
@@ -674,9 +619,7 @@ fn input_channels(input: &ValueInfoProto) -> Result<usize> {
     }
     match channels.value {
         Some(Dimension::DimValue(c)) if (1..=MAX_CHANNELS as i64).contains(&c) => Ok(c as usize),
-        Some(Dimension::DimValue(c)) => {
-            Err(wrong(format!("has {c} channels, not 1 to {MAX_CHANNELS}")))
-        }
+        Some(Dimension::DimValue(c)) => Err(wrong(format!("has {c} channels, not 1 to {MAX_CHANNELS}"))),
         _ => Err(wrong("states no channel count".into())),
     }
 }
@@ -693,9 +636,7 @@ fn check_convolution(node: &NodeProto) -> Read<()> {
             "group" if attribute.i != 1 => {
                 return Err(format!("group {}; 1 is right", attribute.i));
             }
-            "auto_pad"
-                if !matches!(&attribute.s[..], b"NOTSET" | b"SAME_UPPER" | b"SAME_LOWER") =>
-            {
+            "auto_pad" if !matches!(&attribute.s[..], b"NOTSET" | b"SAME_UPPER" | b"SAME_LOWER") => {
                 return Err(format!(
                     "auto_pad {}; pads of 1 are right",
                     String::from_utf8_lossy(&attribute.s)
@@ -717,15 +658,7 @@ fn check_convolution(node: &NodeProto) -> Read<()> {
 
 /// Every accumulator must fit 32 bits and every step size an f32.
 fn check_multipliers(weights: &Weights, quantisation: &InputQuantisation) -> Read<()> {
-    let (
-        Weights::Int8 {
-            kernel,
-            scale,
-            bias,
-        },
-        Some(input),
-    ) = (weights, quantisation.input)
-    else {
+    let (Weights::Int8 { kernel, scale, bias }, Some(input)) = (weights, quantisation.input) else {
         return Ok(());
     };
     let per_filter = kernel.len() / scale.len();
@@ -770,9 +703,7 @@ fn int8_bias(bias: &Value<'_>, input_scale: f32, scale: &[f32]) -> Read<Option<V
                 let step = f64::from(input_scale) * f64::from(*w);
                 (f64::from(*b) / step).round_ties_even() as i32
             };
-            Ok(Some(
-                constant.f32s()?.iter().zip(scale).map(rounded).collect(),
-            ))
+            Ok(Some(constant.f32s()?.iter().zip(scale).map(rounded).collect()))
         }
         _ => Ok(None),
     }

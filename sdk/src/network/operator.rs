@@ -13,12 +13,7 @@ pub(super) fn model(proto: &ModelProto, chain: FusedChain, channels: usize) -> R
     let build = || -> TractResult<TypedModel> {
         let symbols = SymbolScope::default();
         let (height, width) = (symbols.sym("H"), symbols.sym("W"));
-        let shape = [
-            1.to_dim(),
-            channels.to_dim(),
-            height.to_dim(),
-            width.to_dim(),
-        ];
+        let shape = [1.to_dim(), channels.to_dim(), height.to_dim(), width.to_dim()];
         let mut model = tract_onnx::onnx()
             .model_for_proto_model_with_model_template(proto, template(symbols))?
             .with_input_fact(0, f32::fact(shape).into())?
@@ -93,13 +88,9 @@ impl EvalOp for FusedOperator {
         let shape = [1, phasefront_kernels::OUTPUTS, height, width];
         let mut output = Tensor::zero::<f32>(&shape)?;
         let planes = input.to_plain_array_view::<f32>()?;
-        let planes = planes
-            .as_slice()
-            .context("the chain reads planes row by row")?;
+        let planes = planes.as_slice().context("the chain reads planes row by row")?;
         let mut view = output.to_plain_array_view_mut::<f32>()?;
-        let written = view
-            .as_slice_mut()
-            .context("the chain writes planes row by row")?;
+        let written = view.as_slice_mut().context("the chain writes planes row by row")?;
         self.chain
             .0
             .run(planes, written, (height, width), &FusedScratch::default());

@@ -19,9 +19,7 @@ pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32
         let mut x = output;
         if Chain::has_skip(i) {
             round(&mut x, rounding.relu);
-            x.iter_mut()
-                .zip(&inputs[i - 2])
-                .for_each(|(x, skip)| *x += skip);
+            x.iter_mut().zip(&inputs[i - 2]).for_each(|(x, skip)| *x += skip);
             if i == last {
                 round(&mut x, rounding.sum);
             }
@@ -50,9 +48,7 @@ pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32
 
 fn round(values: &mut [f32], quantisation: Option<Quantisation>) {
     if let Some(q) = quantisation {
-        values
-            .iter_mut()
-            .for_each(|v| *v = q.dequantise(q.quantise(*v)));
+        values.iter_mut().for_each(|v| *v = q.dequantise(q.quantise(*v)));
     }
 }
 
@@ -63,11 +59,7 @@ fn real_kernel(layer: &super::chain::Layer) -> (Vec<f64>, Vec<f64>) {
             kernel.iter().map(|&w| w.into()).collect(),
             bias.iter().map(|&b| b.into()).collect(),
         ),
-        Weights::Int8 {
-            kernel,
-            scale,
-            bias,
-        } => {
+        Weights::Int8 { kernel, scale, bias } => {
             let input = f64::from(layer.quantisation.input.map_or(1.0, |q| q.scale));
             let per_filter = 9 * layer.inputs;
             let real = kernel
@@ -84,13 +76,7 @@ fn real_kernel(layer: &super::chain::Layer) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// A 3×3 convolution (correlation, as networks have it), stride 1, zero padding.
-fn convolve(
-    x: &[f32],
-    (kernel, bias): &(Vec<f64>, Vec<f64>),
-    outputs: usize,
-    height: usize,
-    width: usize,
-) -> Vec<f32> {
+fn convolve(x: &[f32], (kernel, bias): &(Vec<f64>, Vec<f64>), outputs: usize, height: usize, width: usize) -> Vec<f32> {
     let inputs = x.len() / (height * width);
     let mut result = Vec::with_capacity(outputs * height * width);
     for (o, bias) in bias.iter().enumerate().take(outputs) {

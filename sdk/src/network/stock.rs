@@ -30,15 +30,9 @@ impl StockPlan {
             let result = self.model.run(tvec!(input.into()))?;
             let view = result[0].to_plain_array_view::<f32>()?;
             if view.len() != output.len() {
-                return Err(TractError::msg(format!(
-                    "the output has shape {:?}",
-                    view.shape()
-                )));
+                return Err(TractError::msg(format!("the output has shape {:?}", view.shape())));
             }
-            output
-                .iter_mut()
-                .zip(view.iter())
-                .for_each(|(to, from)| *to = *from);
+            output.iter_mut().zip(view.iter()).for_each(|(to, from)| *to = *from);
             Ok(())
         };
         run().map_err(|why| Error::Network(one_line(&why)))
@@ -46,8 +40,5 @@ impl StockPlan {
 }
 
 pub(super) fn one_line(why: &TractError) -> String {
-    format!("{why:#}")
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    format!("{why:#}").split_whitespace().collect::<Vec<_>>().join(" ")
 }

@@ -2,7 +2,8 @@
 
 use tract_onnx::pb::{TensorProto, tensor_proto::DataType};
 
-/// A constant and its values. Types that a chain has no use for are kept by name, for the message of whoever reads them.
+/// A constant and its values. Types that a chain has no use for are kept by name, for the message of whoever reads
+/// them.
 #[derive(Debug)]
 pub(super) struct Constant {
     name: String,
@@ -27,11 +28,7 @@ impl Constant {
                 "tensor '{name}' lies in another file; store the weights inside the model"
             ));
         }
-        let shape: Option<Vec<usize>> = tensor
-            .dims
-            .iter()
-            .map(|&d| usize::try_from(d).ok())
-            .collect();
+        let shape: Option<Vec<usize>> = tensor.dims.iter().map(|&d| usize::try_from(d).ok()).collect();
         let shape = shape.ok_or_else(|| format!("tensor '{name}' has a negative dimension"))?;
         let raw = &tensor.raw_data[..];
         let values = match DataType::try_from(tensor.data_type) {
@@ -39,13 +36,9 @@ impl Constant {
             Ok(DataType::Float) => Values::F32(words(raw).map(f32::from_le_bytes).collect()),
             Ok(DataType::Int32) if raw.is_empty() => Values::I32(tensor.int32_data.clone()),
             Ok(DataType::Int32) => Values::I32(words(raw).map(i32::from_le_bytes).collect()),
-            Ok(DataType::Uint8) if raw.is_empty() => {
-                Values::U8(tensor.int32_data.iter().map(|&v| v as u8).collect())
-            }
+            Ok(DataType::Uint8) if raw.is_empty() => Values::U8(tensor.int32_data.iter().map(|&v| v as u8).collect()),
             Ok(DataType::Uint8) => Values::U8(raw.to_vec()),
-            Ok(DataType::Int8) if raw.is_empty() => {
-                Values::I8(tensor.int32_data.iter().map(|&v| v as i8).collect())
-            }
+            Ok(DataType::Int8) if raw.is_empty() => Values::I8(tensor.int32_data.iter().map(|&v| v as i8).collect()),
             Ok(DataType::Int8) => Values::I8(raw.iter().map(|&v| v as i8).collect()),
             Ok(other) => Values::Other(other.as_str_name()),
             Err(_) => Values::Other("of an unknown type"),
@@ -67,15 +60,9 @@ impl Constant {
         if let Values::F32(v) = &values
             && let Some(bad) = v.iter().find(|v| !v.is_finite())
         {
-            return Err(format!(
-                "tensor '{name}' holds {bad}; every value must be finite"
-            ));
+            return Err(format!("tensor '{name}' holds {bad}; every value must be finite"));
         }
-        Ok(Constant {
-            name,
-            shape,
-            values,
-        })
+        Ok(Constant { name, shape, values })
     }
 
     pub(super) fn shape(&self) -> &[usize] {

@@ -1,7 +1,7 @@
 //! Which amplitude full light stands for, from frame to frame.
 //!
-//! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of noise
-//! would make the whole picture flicker.
+//! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of
+//! noise would make the whole picture flicker.
 
 use crate::brightness::Past;
 use std::time::Duration;

@@ -1,5 +1,5 @@
-//! Where CPU and GPU meet: what takes a frame on one rung of the ladder from amplitudes and depth to levels, and which of
-//! the two it is. The one place that falls back from the GPU to the CPU.
+//! Where CPU and GPU meet: what takes a frame on one rung of the ladder from amplitudes and depth to levels, and which
+//! of the two it is. The one place that falls back from the GPU to the CPU.
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
@@ -116,9 +116,7 @@ impl Engine {
     #[cfg(not(feature = "gpu"))]
     fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
         let GpuState {} = context.gpu;
-        Ok(Err(
-            "no GPU: this library was built without it (feature gpu)".into(),
-        ))
+        Ok(Err("no GPU: this library was built without it (feature gpu)".into()))
     }
 
     /// What runs the frames, and why.

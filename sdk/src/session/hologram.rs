@@ -75,8 +75,8 @@ impl Viewer {
     }
 }
 
-/// The hologram of one frame: modulator levels and what is known of them. Cheap to keep and to send to another thread; its
-/// memory goes back to the session when it is dropped, also after the session's end.
+/// The hologram of one frame: modulator levels and what is known of them. Cheap to keep and to send to another thread;
+/// its memory goes back to the session when it is dropped, also after the session's end.
 pub struct Hologram {
     pub(super) timestamp_ns: u64,
     pub(super) shape: (usize, usize),
@@ -139,11 +139,10 @@ impl Hologram {
     /// Another colour.
     pub fn plane(&self, colour: usize) -> Result<&[u8]> {
         let size = self.shape.0 * self.shape.1;
-        self.levels().chunks_exact(size).nth(colour).ok_or_else(|| {
-            Error::Plan(format!(
-                "there is no plane {colour}; 0 is red, 1 green, 2 blue"
-            ))
-        })
+        self.levels()
+            .chunks_exact(size)
+            .nth(colour)
+            .ok_or_else(|| Error::Plan(format!("there is no plane {colour}; 0 is red, 1 green, 2 blue")))
     }
 
     /// The amplitude that full light stands for.
@@ -182,10 +181,7 @@ impl Hologram {
         let (height, width) = self.shape;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
         let d = self.depth.values[at(y, height) * width + at(x, width)];
-        self.viewer
-            .target
-            .display
-            .z_of_depth(f64::from(d) / 65535.0)
+        self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)
     }
 
     /// What an eye focused at `z_m` sees, as (`height`, `width`) rows of red, green, blue, alpha 255 into `rgba`. The
@@ -214,10 +210,7 @@ impl Hologram {
                 preview,
             });
         }
-        if let Some(ViewPlan {
-            preview, scratch, ..
-        }) = &mut *plan
-        {
+        if let Some(ViewPlan { preview, scratch, .. }) = &mut *plan {
             preview.look(self.levels(), self.scale, rgba, scratch);
         }
         Ok(())

@@ -186,11 +186,7 @@ enum Next<F> {
     End,
 }
 
-fn run<W: Work>(
-    shared: &Shared<W::Frame>,
-    mut work: W,
-    mut listener: impl FnMut(Report<W::Output>),
-) {
+fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut(Report<W::Output>)) {
     let mut tell = |report| {
         let told = catch_unwind(AssertUnwindSafe(|| listener(report)));
         if told.is_err() {
@@ -214,10 +210,7 @@ fn run<W: Work>(
         drop(queue);
         match next {
             Next::End => return,
-            Next::Drop(timestamp_ns, reason) => tell(Report::Dropped {
-                timestamp_ns,
-                reason,
-            }),
+            Next::Drop(timestamp_ns, reason) => tell(Report::Dropped { timestamp_ns, reason }),
             Next::Frame(taken) => {
                 let timestamp_ns = taken.timestamp_ns;
                 let (result, panicked) = guarded(|| work.process(&taken.frame, taken.fresh));
@@ -227,14 +220,8 @@ fn run<W: Work>(
                 lock(&shared.spare).push(taken.frame);
                 if lock(&shared.queue).finish(result.is_err()) {
                     tell(match result {
-                        Ok(output) => Report::Done {
-                            timestamp_ns,
-                            output,
-                        },
-                        Err(error) => Report::Failed {
-                            timestamp_ns,
-                            error,
-                        },
+                        Ok(output) => Report::Done { timestamp_ns, output },
+                        Err(error) => Report::Failed { timestamp_ns, error },
                     });
                 }
             }
@@ -302,11 +289,7 @@ mod tests {
                     }
                     report => {
                         told.fetch_add(1, Ordering::Relaxed);
-                        if let Report::Done {
-                            timestamp_ns,
-                            output,
-                        } = report
-                        {
+                        if let Report::Done { timestamp_ns, output } = report {
                             assert_eq!(timestamp_ns, output);
                         }
                         if random.random_bool(0.05) {

@@ -49,12 +49,7 @@ impl OnCpu {
     }
 
     /// Makes the levels of `frame`, whose steady brightness comes from `past`.
-    pub(super) fn process(
-        &mut self,
-        frame: &RgbdFrame,
-        past: Option<Past>,
-        out: LevelsOut<'_>,
-    ) -> Result<Encoded> {
+    pub(super) fn process(&mut self, frame: &RgbdFrame, past: Option<Past>, out: LevelsOut<'_>) -> Result<Encoded> {
         let OnCpu {
             pipeline,
             scratch,

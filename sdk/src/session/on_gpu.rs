@@ -7,8 +7,7 @@ use super::quality::Rung;
 use super::statistics::BackendReport;
 use crate::error::Error;
 use crate::gpu::{
-    self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError,
-    InFlight, Job, Renderer,
+    self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError, InFlight, Job, Renderer,
 };
 use std::sync::Arc;
 use std::time::Instant;
@@ -45,11 +44,7 @@ pub(super) struct OnGpu(Renderer);
 
 impl OnGpu {
     /// Plans `rung` on `device`, or on one that is opened and tried out.
-    pub(super) fn new(
-        options: &SessionOptions,
-        rung: &Rung,
-        device: Option<Arc<Device>>,
-    ) -> gpu::Result<Self> {
+    pub(super) fn new(options: &SessionOptions, rung: &Rung, device: Option<Arc<Device>>) -> gpu::Result<Self> {
         if options.target.display.bits() > 8 {
             return Err(GpuError::Refused(format!(
                 "it writes levels of up to 8 bits, the display has {}",
@@ -73,16 +68,10 @@ impl OnGpu {
         let Some(pipeline) = self.0.pipeline() else {
             return BackendReport {
                 name: "no GPU at this moment".into(),
-                why: self
-                    .0
-                    .reason()
-                    .map_or_else(String::new, GpuError::to_string),
+                why: self.0.reason().map_or_else(String::new, GpuError::to_string),
             };
         };
-        let mut why = format!(
-            "asked for, and it answers as the CPU does; {}",
-            pipeline.describe()
-        );
+        let mut why = format!("asked for, and it answers as the CPU does; {}", pipeline.describe());
         if let Some(reason) = self.0.reason() {
             why += &format!("; opened again after: {reason}");
         }
@@ -114,11 +103,7 @@ impl OnGpu {
         self.collect(frame, start, brightness, levels)
     }
 
-    fn submit(
-        &mut self,
-        input: &FrameInput<'_>,
-        brightness: &BrightnessTracker,
-    ) -> Result<InFlight, Failure> {
+    fn submit(&mut self, input: &FrameInput<'_>, brightness: &BrightnessTracker) -> Result<InFlight, Failure> {
         let planar = Frame::of(input.rgbd);
         let (colour, frame) = match input.camera {
             None => (Colour::Planar, planar),
@@ -158,9 +143,7 @@ impl OnGpu {
         Ok(Encoded {
             scale: report.scale,
             // With the ways to the GPU and back, and all of it where there are no time stamps.
-            method: start
-                .elapsed()
-                .saturating_sub(times.propagate + times.encode),
+            method: start.elapsed().saturating_sub(times.propagate + times.encode),
             propagate: times.propagate,
             encode: times.encode,
         })
@@ -171,6 +154,7 @@ impl OnGpu {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::gpu::or_skip;
     use crate::{Display, Method, Network, RgbdFrame};
     use ndarray::{Array2, Array3};
     use std::time::Duration;
@@ -183,8 +167,7 @@ mod tests {
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);
         options.gpu.device.name = Some("llvmpipe".into());
-        let Ok(mut gpu) = OnGpu::new(&options, &options.ladder[0], None) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let Some(mut gpu) = or_skip(OnGpu::new(&options, &options.ladder[0], None)) else {
             return;
         };
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);

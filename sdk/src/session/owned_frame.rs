@@ -59,10 +59,7 @@ impl OwnedFrame {
             alignment: frame.alignment,
         };
         let mut copy = match spare {
-            Some(spare) => OwnedFrame {
-                description,
-                ..spare
-            },
+            Some(spare) => OwnedFrame { description, ..spare },
             None => OwnedFrame {
                 description,
                 colour: Default::default(),

@@ -24,8 +24,8 @@ pub enum Backend {
     #[default]
     Cpu,
     /// On the GPU, where this library was built for it (feature `gpu`), there is one, and it answers as the CPU does;
-    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen by sharpness are the
-    /// CPU's. [`super::Statistics::backend`] says which it is, and why.
+    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen by sharpness are
+    /// the CPU's. [`super::Statistics::backend`] says which it is, and why.
     Gpu,
 }
 
@@ -230,12 +230,7 @@ mod tests {
     const PERIOD: Duration = Duration::from_millis(33);
 
     /// Runs `frames` frames on a device whose rungs cost these milliseconds; gives the steps and the frame of each.
-    fn run(
-        ladder: &mut Ladder,
-        costs_ms: &[u64],
-        thermal: Thermal,
-        frames: usize,
-    ) -> Vec<(usize, QualityChange)> {
+    fn run(ladder: &mut Ladder, costs_ms: &[u64], thermal: Thermal, frames: usize) -> Vec<(usize, QualityChange)> {
         (0..frames)
             .filter_map(|frame| {
                 // Every 50th frame takes long for another reason.
@@ -251,17 +246,8 @@ mod tests {
     fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
         let mut ladder = Ladder::new(4, 0);
         let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
-        let to: Vec<_> = steps
-            .iter()
-            .map(|(_, c)| (c.from, c.to, c.reason))
-            .collect();
-        assert_eq!(
-            to,
-            [
-                (0, 1, QualityReason::TooSlow),
-                (1, 2, QualityReason::TooSlow)
-            ]
-        );
+        let to: Vec<_> = steps.iter().map(|(_, c)| (c.from, c.to, c.reason)).collect();
+        assert_eq!(to, [(0, 1, QualityReason::TooSlow), (1, 2, QualityReason::TooSlow)]);
         assert!(steps[1].0 < 20);
     }
 
@@ -305,16 +291,10 @@ mod tests {
             assert_eq!(fixed, None);
         }
         let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
-        assert_eq!(
-            asked.map(|c| (c.to, c.reason)),
-            Some((2, QualityReason::Asked))
-        );
+        assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
         // Without a target rate there is nothing to hold.
         for _ in 0..100 {
-            assert_eq!(
-                ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive),
-                None
-            );
+            assert_eq!(ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
         }
     }
 }

@@ -116,10 +116,7 @@ impl<F> Queue<F> {
     ///
     /// # Errors
     /// A closed session, or a frame that is not later than the last.
-    pub(super) fn admit(
-        &mut self,
-        timestamp_ns: u64,
-    ) -> Result<std::result::Result<Ticket, DropReason>> {
+    pub(super) fn admit(&mut self, timestamp_ns: u64) -> Result<std::result::Result<Ticket, DropReason>> {
         self.gate.admit(timestamp_ns, true)?;
         if self.gate.paused {
             return Ok(Err(self.drop(timestamp_ns, DropReason::Paused)));
@@ -132,9 +129,9 @@ impl<F> Queue<F> {
                 return Ok(Err(self.drop(timestamp_ns, DropReason::AboveTargetRate)));
             }
             // Frames that are in time keep the beat, so that 30 a second become 20 and not 15.
-            let beat = self.due_ns.map_or(timestamp_ns, |due| {
-                due.max(timestamp_ns.saturating_sub(period))
-            });
+            let beat = self
+                .due_ns
+                .map_or(timestamp_ns, |due| due.max(timestamp_ns.saturating_sub(period)));
             self.due_ns = Some(beat.saturating_add(period));
         }
         self.copying += 1;
@@ -147,10 +144,7 @@ impl<F> Queue<F> {
     /// Puts an admitted frame; it waits, unless something happened meanwhile. Gives back a frame that is not needed.
     pub(super) fn put(&mut self, ticket: Ticket, frame: F) -> Option<F> {
         self.copying -= 1;
-        let Ticket {
-            timestamp_ns,
-            epoch,
-        } = ticket;
+        let Ticket { timestamp_ns, epoch } = ticket;
         let stopped = match () {
             _ if self.gate.closed => Some(DropReason::Closed),
             _ if epoch != self.epoch => Some(DropReason::Reset),
@@ -346,10 +340,7 @@ mod tests {
                     return;
                 }
                 Ok(Ok(ticket)) => self.tickets.push(ticket),
-                Ok(Err(reason)) => assert!(matches!(
-                    reason,
-                    DropReason::Paused | DropReason::AboveTargetRate
-                )),
+                Ok(Err(reason)) => assert!(matches!(reason, DropReason::Paused | DropReason::AboveTargetRate)),
             }
             assert!(!late);
             self.clock = timestamp;
@@ -387,9 +378,7 @@ mod tests {
         }
 
         fn processed_of(&self, epoch: u64) -> usize {
-            let done = |(key, reason): &(&(u64, u64), &Option<DropReason>)| {
-                key.0 == epoch && reason.is_none()
-            };
+            let done = |(key, reason): &(&(u64, u64), &Option<DropReason>)| key.0 == epoch && reason.is_none();
             self.told.iter().filter(done).count()
         }
 

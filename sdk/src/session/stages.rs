@@ -181,9 +181,7 @@ impl Stages {
             .options
             .target_rate_hz
             .map(|rate| Duration::from_secs_f64(1.0 / rate));
-        let change = self
-            .ladder
-            .observe(start.elapsed(), period, thermal, quality);
+        let change = self.ladder.observe(start.elapsed(), period, thermal, quality);
         if change.is_some() {
             // The memory of the rung before goes first.
             self.plan = None;
@@ -192,12 +190,7 @@ impl Stages {
         Ok(Made { hologram, change })
     }
 
-    fn run(
-        &mut self,
-        plan: &mut RungPlan,
-        frame: &CameraFrame<'_>,
-        elapsed: Option<Duration>,
-    ) -> Result<Hologram> {
+    fn run(&mut self, plan: &mut RungPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
         let Stages {
             pool,
             brightness,
@@ -218,8 +211,7 @@ impl Stages {
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {
             let start = Instant::now();
-            let fits =
-                |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
+            let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
             if plan.colour.as_mut().filter(fits).is_none() {
                 let colour = ColourPlan::new(&frame.colour, frame.orientation, shape.0, shape.1)?;
                 let scratch = colour.scratch();

@@ -12,7 +12,7 @@
 //! |---|---|
 //! | 8 | `PFPIXEL1` |
 //! | 4 × u32 | height H, width W of the modulator; spacing s; intervals K |
-//! | (3, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, node rows from the top, node columns from the left |
+//! | (3, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
 //! | (3, Gh, Gw) × u16 | `turn`/2π × 65535 |
 //!
 //! Node (i, j) stands on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and Gw alike, so nodes reach to the last pixel
@@ -61,16 +61,16 @@ pub fn nodes(height: usize, width: usize, spacing: usize) -> (usize, usize) {
 }
 
 impl PerPixel {
-    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them.
-    /// `levels`, (3, Gh, Gw, `intervals` + 1), are those of the phases 2πk/`intervals`, and may go on over 255 where the
-    /// modulator does not reach the phase; `turn`, (3, Gh, Gw), are the phases from which that of phase 0 is
-    /// nearer, 2π where the modulator reaches all.
+    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them. `levels`, (3, Gh, Gw,
+    /// `intervals` + 1), are those of the phases 2πk/`intervals`, and may go on over 255 where the modulator does not
+    /// reach the phase; `turn`, (3, Gh, Gw), are the phases from which that of phase 0 is nearer, 2π where the
+    /// modulator reaches all.
     ///
     /// Values are rounded to what the file holds, so that a table is the same before and after.
     ///
     /// # Errors
-    /// A size of 0, more than [`MAX_INTERVALS`] intervals, lengths that do not fit, levels that fall along a curve or lie
-    /// outside 0..=511, or a `turn` outside 0..=2π.
+    /// A size of 0, more than [`MAX_INTERVALS`] intervals, lengths that do not fit, levels that fall along a curve or
+    /// lie outside 0..=511, or a `turn` outside 0..=2π.
     pub fn new(
         height: usize,
         width: usize,
@@ -87,9 +87,7 @@ impl PerPixel {
         if let Some(turn) = turn.iter().find(|t| !(0.0..=TAU).contains(*t)) {
             return refuse(format!("a turn at {turn} rad; it must lie in 0..=2π"));
         }
-        let levels: Vec<u16> = (levels.iter())
-            .map(|l| (l * FRACTIONS).round() as u16)
-            .collect();
+        let levels: Vec<u16> = (levels.iter()).map(|l| (l * FRACTIONS).round() as u16).collect();
         let turn: Vec<u16> = (turn.iter())
             .map(|t| (t / TAU * f32::from(u16::MAX)).round() as u16)
             .collect();
@@ -137,10 +135,7 @@ impl PerPixel {
             intervals,
             nodes,
             levels: levels.iter().map(|l| f32::from(*l) / FRACTIONS).collect(),
-            turn: turn
-                .iter()
-                .map(|t| f32::from(*t) / f32::from(u16::MAX) * TAU)
-                .collect(),
+            turn: turn.iter().map(|t| f32::from(*t) / f32::from(u16::MAX) * TAU).collect(),
         })
     }
 
@@ -193,7 +188,8 @@ impl PerPixel {
         bytes
     }
 
-    /// The table of the (`height`, `width`) pixels in the middle of this one's: for a hologram smaller than the modulator.
+    /// The table of the (`height`, `width`) pixels in the middle of this one's: for a hologram smaller than the
+    /// modulator.
     ///
     /// # Errors
     /// More pixels than there are.
@@ -244,8 +240,8 @@ impl PerPixel {
         &self.turn
     }
 
-    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (3, H, W). The rule as it stands: the oracle of
-    /// [`Self::levels`].
+    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (3, H, W). The rule as it stands: the oracle
+    /// of [`Self::levels`].
     ///
     /// # Panics
     /// If `at` is outside the stack.
@@ -254,8 +250,7 @@ impl PerPixel {
         let phase = if phase >= turn { 0.0 } else { phase };
         let t = phase * (self.intervals as f32 / TAU);
         let k = (t as usize).min(self.intervals - 1);
-        let knot =
-            |k: usize| self.interpolate(at, |node| self.levels[node * (self.intervals + 1) + k]);
+        let knot = |k: usize| self.interpolate(at, |node| self.levels[node * (self.intervals + 1) + k]);
         let (here, next) = (knot(k), knot(k + 1));
         rounded(here + (next - here) * (t - k as f32))
     }
@@ -285,10 +280,7 @@ impl PerPixel {
 
     /// The node before pixel `n` of an axis, and how far it is to the next.
     fn split(&self, n: usize) -> (usize, f32) {
-        (
-            n / self.spacing,
-            (n % self.spacing) as f32 / self.spacing as f32,
-        )
+        (n / self.spacing, (n % self.spacing) as f32 / self.spacing as f32)
     }
 
     /// The index of node (i, j); beyond the grid, where the way to it is 0, that of its last one.
@@ -430,15 +422,11 @@ fn rounded(level: f32) -> u8 {
 /// 2²³: from here on floats have no fraction.
 const WHOLE: f32 = 8_388_608.0;
 
-/// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly where it has to
-/// heed values out of range.
+/// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly
+/// where it has to heed values out of range.
 fn whole(value: f32) -> f32 {
     let nearest = value + WHOLE - WHOLE;
-    if nearest > value {
-        nearest - 1.0
-    } else {
-        nearest
-    }
+    if nearest > value { nearest - 1.0 } else { nearest }
 }
 
 /// A whole value below 2²³ in the low bits of an integer.
@@ -464,20 +452,13 @@ mod tests {
             };
             for k in 0..=intervals {
                 let t = k as f32 / intervals as f32 / reach;
-                levels.push(
-                    255.0 * (t + 0.1 * (TAU * t).sin().min(0.0) * f32::from(t < 1.0)).max(0.0),
-                );
+                levels.push(255.0 * (t + 0.1 * (TAU * t).sin().min(0.0) * f32::from(t < 1.0)).max(0.0));
             }
             for k in 1..=intervals {
                 let n = levels.len();
-                levels[n - 1 - intervals + k] =
-                    levels[n - 1 - intervals + k].max(levels[n - 2 - intervals + k]);
+                levels[n - 1 - intervals + k] = levels[n - 1 - intervals + k].max(levels[n - 2 - intervals + k]);
             }
-            turn.push(if reach < 1.0 {
-                (reach + 1.0) / 2.0 * TAU
-            } else {
-                TAU
-            });
+            turn.push(if reach < 1.0 { (reach + 1.0) / 2.0 * TAU } else { TAU });
         }
         PerPixel::new(shape.0, shape.1, spacing, intervals, &levels, &turn).unwrap()
     }
@@ -511,11 +492,7 @@ mod tests {
                         table.levels(&phases[begin..], row * w + begin, &mut out);
                         for (x, level) in out.iter().enumerate() {
                             let at = row * w + begin + x;
-                            assert_eq!(
-                                *level,
-                                table.level(phases[begin + x], at),
-                                "{shape:?} {at}"
-                            );
+                            assert_eq!(*level, table.level(phases[begin + x], at), "{shape:?} {at}");
                         }
                     }
                 }

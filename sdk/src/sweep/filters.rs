@@ -2,8 +2,8 @@
 //!
 //! Everything is made of one step H and one filter B from plane 0 to where the hologram stands, both fitted
 //! ([`super::fit`]). Over a gap of m empty planes Hᵐ is one filter, nearly as short as light's reach over the gap, and
-//! from plane k the way home is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so it makes no
-//! difference to a result which planes were empty and merged.
+//! from plane k the way home is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so it makes
+//! no difference to a result which planes were empty and merged.
 
 use super::CARRIED;
 use super::fit::{self, Coefficients};
@@ -110,8 +110,7 @@ impl Filters {
         let ends: Vec<Taps> = (0..planes)
             .map(|k| match k {
                 0 => taps(&home),
-                _ => grid
-                    .cut((spectrum.iter().zip(&home_spectrum)).map(|(h, b)| h.powu(k as u32) * b)),
+                _ => grid.cut((spectrum.iter().zip(&home_spectrum)).map(|(h, b)| h.powu(k as u32) * b)),
             })
             .collect();
         let per_m = wavelength_m / (4.0 * PI * pitch_m * pitch_m);
@@ -187,9 +186,7 @@ impl Filters {
 
 /// A filter's taps in f32; the centre takes up the rounding of the others, so that the gain at frequency 0 stays 1.
 fn taps(coefficients: &Coefficients) -> Taps {
-    let sides: Taps = (coefficients.iter())
-        .map(|c| [c.re as f32, c.im as f32])
-        .collect();
+    let sides: Taps = (coefficients.iter()).map(|c| [c.re as f32, c.im as f32]).collect();
     with_centre(sides)
 }
 
@@ -218,9 +215,7 @@ impl Grid {
 
     fn spectrum(&self, coefficients: &Coefficients) -> Vec<Complex64> {
         let f = |i: usize| 2.0 * i.min(self.size - i) as f64 / self.size as f64;
-        (0..self.size)
-            .map(|i| fit::gain(coefficients, f(i)))
-            .collect()
+        (0..self.size).map(|i| fit::gain(coefficients, f(i))).collect()
     }
 
     /// The filter of a spectrum, as long as [`TAIL`] asks for.
@@ -259,8 +254,7 @@ mod tests {
 
     fn gain(taps: &Taps, f: f64) -> Complex64 {
         let tap = |j: usize| Complex64::new(taps[j][0].into(), taps[j][1].into());
-        let sides =
-            (1..taps.len()).map(|j| tap(j) * 2.0 * (std::f64::consts::PI * j as f64 * f).cos());
+        let sides = (1..taps.len()).map(|j| tap(j) * 2.0 * (std::f64::consts::PI * j as f64 * f).cos());
         tap(0) + sides.sum::<Complex64>()
     }
 

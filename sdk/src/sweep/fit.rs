@@ -6,8 +6,8 @@
 //! gain at f = 0 is 1 whatever the cⱼ.
 //!
 //! A step's filter is applied again and again, so it is not H that must be near its target T but the powers of H near
-//! those of T: Σ over f and several m of w(f)·|(H/T)ᵐ − 1|² is made least by Levenberg and Marquardt's method, for small
-//! powers first. w falls as the spectra of images do.
+//! those of T: Σ over f and several m of w(f)·|(H/T)ᵐ − 1|² is made least by Levenberg and Marquardt's method, for
+//! small powers first. w falls as the spectra of images do.
 
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -32,11 +32,7 @@ pub(super) fn transfer(f: f64, distance_m: f64, wavelength_m: f64, pitch_m: f64)
 
 /// The gain of a filter at `f` of the Nyquist frequency.
 pub(super) fn gain(coefficients: &[Complex64], f: f64) -> Complex64 {
-    (1..)
-        .zip(coefficients)
-        .map(|(j, c)| c * basis(j, f))
-        .sum::<Complex64>()
-        + 1.0
+    (1..).zip(coefficients).map(|(j, c)| c * basis(j, f)).sum::<Complex64>() + 1.0
 }
 
 /// What coefficient j is multiplied by.
@@ -49,17 +45,11 @@ fn weights(samples: usize) -> Vec<(f64, f64)> {
     let f = |i: usize| i as f64 / (samples - 1) as f64;
     let weight = |f: f64| 1.0 / (f * f + WHITE);
     let total: f64 = (0..samples).map(|i| weight(f(i))).sum();
-    (0..samples)
-        .map(|i| (f(i), (weight(f(i)) / total).sqrt()))
-        .collect()
+    (0..samples).map(|i| (f(i), (weight(f(i)) / total).sqrt())).collect()
 }
 
 /// How far the `power`th power of a filter lies from that of its target, √(Σ w(f)·|(H/T)ᵐ − 1|²): 0 is perfect.
-pub(super) fn error(
-    coefficients: &[Complex64],
-    target: impl Fn(f64) -> Complex64,
-    power: usize,
-) -> f64 {
+pub(super) fn error(coefficients: &[Complex64], target: impl Fn(f64) -> Complex64, power: usize) -> f64 {
     let squares = weights(SAMPLES).into_iter().map(|(f, weight)| {
         let ratio = gain(coefficients, f) * target(f).conj();
         (weight * (ratio.powu(power as u32) - 1.0)).norm_sqr()
@@ -82,11 +72,7 @@ pub(super) fn once(radius: usize, target: impl Fn(f64) -> Complex64) -> Coeffici
 }
 
 /// The filter of `radius` coefficients whose powers up to `steps` stay nearest to those of `target`, |target| = 1.
-pub(super) fn powers(
-    radius: usize,
-    steps: usize,
-    target: impl Fn(f64) -> Complex64,
-) -> Coefficients {
+pub(super) fn powers(radius: usize, steps: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
     let samples: Vec<_> = (weights(SAMPLES).into_iter())
         .map(|(f, weight)| Sample {
             weight,
@@ -117,12 +103,7 @@ struct Sample {
 impl Sample {
     /// H/T.
     fn ratio(&self, coefficients: &[Complex64]) -> Complex64 {
-        let gain: Complex64 = self
-            .basis
-            .iter()
-            .zip(coefficients)
-            .map(|(b, c)| c * b)
-            .sum();
+        let gain: Complex64 = self.basis.iter().zip(coefficients).map(|(b, c)| c * b).sum();
         (gain + 1.0) * self.target
     }
 }

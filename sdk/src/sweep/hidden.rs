@@ -183,11 +183,7 @@ struct Work {
 impl Hidden {
     /// Plans the search in (`height`, `width`) frames as far as `reach` pixels.
     pub fn new(height: usize, width: usize, reach: usize) -> Self {
-        Hidden {
-            height,
-            width,
-            reach,
-        }
+        Hidden { height, width, reach }
     }
 
     /// Working memory for one call at a time, for the current thread pool.
@@ -221,14 +217,7 @@ impl Hidden {
     }
 
     /// The rows from `top` on that `first` and `second` hold.
-    fn band(
-        &self,
-        depth: &[f32],
-        top: usize,
-        first: &mut [u32],
-        second: &mut [u32],
-        work: &mut Work,
-    ) {
+    fn band(&self, depth: &[f32], top: usize, first: &mut [u32], second: &mut [u32], work: &mut Work) {
         let (width, reach) = (self.width, self.reach as u32);
         let row = |y: usize| &depth[y * width..][..width];
         let rows = first.len() / width;
@@ -244,9 +233,7 @@ impl Hidden {
         columns.fill(Found::NOTHING);
         busy.fill(false);
         for y in top.saturating_sub(before) + 1..top + rows {
-            let layers = y
-                .checked_sub(top)
-                .map(|y| &mut layers[y * width..][..width]);
+            let layers = y.checked_sub(top).map(|y| &mut layers[y * width..][..width]);
             step(columns, busy, row(y - 1), row(y), reach, layers, |x, d| {
                 (y - d as usize) * width + x
             });
@@ -376,8 +363,7 @@ pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Ve
                 (width as isize, height - 1 - y),
             ];
             for (step, room) in sides {
-                let at =
-                    |distance: usize| (y * width + x).wrapping_add_signed(step * distance as isize);
+                let at = |distance: usize| (y * width + x).wrapping_add_signed(step * distance as isize);
                 let mut found = Found::NOTHING;
                 for distance in (0..room.min(reach + 1)).rev() {
                     found = found.next(depth[at(distance + 1)], depth[at(distance)], reach as u32);

@@ -11,12 +11,7 @@ use num_complex::{Complex32, Complex64};
 ///
 /// # Errors
 /// As [`super::SweepPlan::new`].
-pub fn field(
-    frame: &RgbdFrame,
-    display: &Display,
-    sweep: Sweep,
-    z_m: f64,
-) -> Result<Vec<Complex32>> {
+pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Result<Vec<Complex32>> {
     sweep.check(display)?;
     let (height, width) = frame.shape();
     let (rgb, depth) = frame.values();
@@ -87,11 +82,7 @@ impl Plane {
     fn convolve(&mut self, taps: &[[f32; 2]]) {
         for (step, length) in [(1, self.width), (self.width, self.height)] {
             let position = |i: usize| {
-                if step == 1 {
-                    i % self.width
-                } else {
-                    i / self.width
-                }
+                if step == 1 { i % self.width } else { i / self.width }
             };
             let filtered = (0..self.values.len()).map(|i| {
                 let mut sum = Complex64::ZERO;

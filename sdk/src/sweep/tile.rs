@@ -1,9 +1,9 @@
 //! One tile of the sweep: the planes that hold points in the tile or its halo, back to front.
 //!
 //! Light reaches a pixel of the hologram from no farther than light can spread on its way, so from plane k a tile needs
-//! only a halo of that many pixels, and the field that is needed shrinks plane by plane to the tile itself. Nor is there
-//! light farther from the points behind a plane than it can have spread since: each row's field is computed from the
-//! leftmost to the rightmost pixel that light can be at, its [`Span`].
+//! only a halo of that many pixels, and the field that is needed shrinks plane by plane to the tile itself. Nor is
+//! there light farther from the points behind a plane than it can have spread since: each row's field is computed from
+//! the leftmost to the rightmost pixel that light can be at, its [`Span`].
 
 use super::filters::Filters;
 use super::hidden::NOTHING;
@@ -61,15 +61,9 @@ impl Layout {
         filters: &[Filters; 3],
     ) -> Self {
         let halos: Vec<usize> = (0..planes).map(|k| reach(k) + MARGIN).collect();
-        let part = (filters.iter().map(Filters::longest_part))
-            .max()
-            .unwrap_or(0);
+        let part = (filters.iter().map(Filters::longest_part)).max().unwrap_or(0);
         let end = (0..planes)
-            .flat_map(|k| {
-                filters
-                    .iter()
-                    .map(move |f| f.end(k - f.before_end(k)).len() - 1)
-            })
+            .flat_map(|k| filters.iter().map(move |f| f.end(k - f.before_end(k)).len() - 1))
             .max()
             .unwrap_or(0);
         let widest = halos.last().copied().unwrap_or(0);
@@ -226,10 +220,7 @@ impl<'a> Tile<'a> {
             self.find(layer, scratch);
         }
         let TileScratch {
-            starts,
-            found,
-            points,
-            ..
+            starts, found, points, ..
         } = scratch;
         for k in 1..starts.len() {
             starts[k] += starts[k - 1];
@@ -255,9 +246,8 @@ impl<'a> Tile<'a> {
             ..
         } = self.surfaces;
         let widest = self.layout.halos.last().copied().unwrap_or(0);
-        let around = |side: &Range<usize>, size: usize| {
-            side.start.saturating_sub(widest)..(side.end + widest).min(size)
-        };
+        let around =
+            |side: &Range<usize>, size: usize| side.start.saturating_sub(widest)..(side.end + widest).min(size);
         let columns = around(&self.columns, width);
         for y in around(&self.rows, height) {
             let row = y * width;
@@ -298,14 +288,7 @@ impl<'a> Tile<'a> {
 
     /// Adds the points of row `y` and `columns` of the frame, as far as they are in the plane's halo; the first one's
     /// colour is at `from`.
-    fn add(
-        &self,
-        plane: u16,
-        y: usize,
-        columns: Range<usize>,
-        from: usize,
-        scratch: &mut TileScratch,
-    ) {
+    fn add(&self, plane: u16, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let k = usize::from(plane);
         let halo = self.layout.halos[k];
@@ -356,21 +339,11 @@ impl<'a> Tile<'a> {
     }
 
     /// From plane `at` to plane `to`, through empty space.
-    fn cross(
-        &self,
-        mut at: usize,
-        to: usize,
-        filters: &Filters,
-        scratch: &mut TileScratch,
-    ) -> usize {
+    fn cross(&self, mut at: usize, to: usize, filters: &Filters, scratch: &mut TileScratch) -> usize {
         while at > to {
             let (taps, steps) = filters.part(at - to);
             at -= steps;
-            widen(
-                &mut scratch.lit,
-                &mut scratch.wider,
-                self.layout.spread[steps],
-            );
+            widen(&mut scratch.lit, &mut scratch.wider, self.layout.spread[steps]);
             self.filter(taps, self.layout.halos[at], scratch);
         }
         at
@@ -384,11 +357,7 @@ impl<'a> Tile<'a> {
         let points = scratch.starts[k] as usize..scratch.starts[k + 1] as usize;
         let rows = self.layout.rows();
         let spans = &scratch.point_spans[k * rows..][..rows];
-        for (y, span) in spans
-            .iter()
-            .enumerate()
-            .filter(|(_, span)| span[0] < span[1])
-        {
+        for (y, span) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {
             let around = [span[0] - MARGIN.min(span[0]), span[1] + MARGIN];
             for lit in &mut scratch.lit[y - MARGIN.min(y)..(y + MARGIN + 1).min(rows)] {
                 *lit = join(*lit, around);
@@ -429,8 +398,8 @@ impl<'a> Tile<'a> {
 
     /// Filters the field in place where it is lit, in the tile and `halo` around it.
     ///
-    /// Columns are taken in strips so narrow that the rows in use stay in the nearest cache. In a strip, a row is filtered
-    /// along x into the ring, and as soon as its neighbours below are there too, along y back into the field.
+    /// Columns are taken in strips so narrow that the rows in use stay in the nearest cache. In a strip, a row is
+    /// filtered along x into the ring, and as soon as its neighbours below are there too, along y back into the field.
     fn filter(&self, taps: &[[f32; 2]], halo: usize, scratch: &mut TileScratch) {
         let border = self.layout.border;
         let radius = taps.len() - 1;
@@ -459,13 +428,7 @@ impl<'a> Tile<'a> {
         }
     }
 
-    fn filter_strip(
-        &self,
-        taps: &[[f32; 2]],
-        rows: Range<usize>,
-        strip: &Strip,
-        scratch: &mut TileScratch,
-    ) {
+    fn filter_strip(&self, taps: &[[f32; 2]], rows: Range<usize>, strip: &Strip, scratch: &mut TileScratch) {
         let stride = self.layout.stride;
         let radius = taps.len() - 1;
         let TileScratch {
@@ -518,8 +481,7 @@ impl<'a> Tile<'a> {
             }
             if !strip.last {
                 for (field, kept) in field.iter().zip(&mut *kept) {
-                    kept[row * radius..][..radius]
-                        .copy_from_slice(&field[at + end - radius..at + end]);
+                    kept[row * radius..][..radius].copy_from_slice(&field[at + end - radius..at + end]);
                 }
             }
             // Row r needs rows up to r + radius, which is the one that has just come.
@@ -558,22 +520,19 @@ impl<'a> Tile<'a> {
     }
 }
 
-/// Columns of the field that are filtered together. What the strip before has overwritten is kept for those that are not
-/// the first.
+/// Columns of the field that are filtered together. What the strip before has overwritten is kept for those that are
+/// not the first.
 struct Strip {
     columns: Range<usize>,
     first: bool,
     last: bool,
 }
 
-/// Columns of a strip: as many as let the rows of a filter's ring stay in the nearest cache, but no fewer than the filter
-/// looks back.
+/// Columns of a strip: as many as let the rows of a filter's ring stay in the nearest cache, but no fewer than the
+/// filter looks back.
 fn strip(radius: usize) -> usize {
     const RING: usize = 3072;
-    (RING / (2 * radius + 1))
-        .max(radius)
-        .max(2 * RUN)
-        .next_multiple_of(RUN)
+    (RING / (2 * radius + 1)).max(radius).max(2 * RUN).next_multiple_of(RUN)
 }
 
 /// Spans `by` pixels wider in all directions; `wider` is memory.
@@ -588,11 +547,7 @@ fn widen(spans: &mut Vec<Span>, wider: &mut Vec<Span>, by: usize) {
 /// Each row's span joined with those of the rows up to `by` above and below, into `wider`.
 fn widen_down(spans: &[Span], wider: &mut [Span], by: usize) {
     wider.fill(NOWHERE);
-    for (y, span) in spans
-        .iter()
-        .enumerate()
-        .filter(|(_, span)| span[0] < span[1])
-    {
+    for (y, span) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {
         let rows = y - by.min(y)..(y + by + 1).min(spans.len());
         for wider in &mut wider[rows] {
             *wider = join(*wider, *span);

@@ -45,22 +45,19 @@ impl Target {
     /// Bytes that are not such a file, or not all of it; values that cannot be; a table for another display.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let short = || refuse("is cut short");
-        let rest = bytes.strip_prefix(MAGIC.as_slice()).ok_or_else(|| {
-            refuse("does not begin with PFCALIB1; `phasefront calibrate pack` writes one")
-        })?;
+        let rest = bytes
+            .strip_prefix(MAGIC.as_slice())
+            .ok_or_else(|| refuse("does not begin with PFCALIB1; `phasefront calibrate pack` writes one"))?;
         let (length, rest) = rest.split_first_chunk().ok_or_else(short)?;
         let length = u32::from_le_bytes(*length) as usize;
         let (text, rest) = rest.split_at_checked(length).ok_or_else(short)?;
         let text = std::str::from_utf8(text).map_err(refuse)?;
-        let header: Header =
-            toml::from_str(text).map_err(|e| refuse(e.message().trim().replace('\n', " ")))?;
+        let header: Header = toml::from_str(text).map_err(|e| refuse(e.message().trim().replace('\n', " ")))?;
         let [rows, columns] = header.laser.unwrap_or_default();
         if rows > MOST_NODES || columns > MOST_NODES {
             return Err(refuse(format!("holds a laser's map of {columns}×{rows}")));
         }
-        let (laser, table) = rest
-            .split_at_checked(12 * rows * columns)
-            .ok_or_else(short)?;
+        let (laser, table) = rest.split_at_checked(12 * rows * columns).ok_or_else(short)?;
         if table.len() != header.per_pixel {
             return Err(refuse(format!(
                 "holds {} bytes of a table, its header says {}",
@@ -74,8 +71,7 @@ impl Target {
                 let amplitude: Vec<f32> = (laser.chunks_exact(4))
                     .map(|b| 1.0 / f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
                     .collect();
-                let amplitude =
-                    ArrayView3::from_shape((3, rows, columns), &amplitude).map_err(refuse)?;
+                let amplitude = ArrayView3::from_shape((3, rows, columns), &amplitude).map_err(refuse)?;
                 Some(Illumination::new(amplitude)?)
             }
         };
@@ -83,11 +79,11 @@ impl Target {
             (None, []) => Target::from(&header.display).response,
             (Some(levels), []) => {
                 let count = levels.len();
-                Response::lut(levels.try_into().map_err(|_| {
-                    refuse(format!(
-                        "holds {count} levels of a look-up table; there are 256"
-                    ))
-                })?)
+                Response::lut(
+                    levels
+                        .try_into()
+                        .map_err(|_| refuse(format!("holds {count} levels of a look-up table; there are 256")))?,
+                )
             }
             (None, table) => Response::PerPixel(Arc::new(PerPixel::from_bytes(table)?)),
             (Some(_), _) => return Err(refuse("holds both a table and one for each pixel")),
@@ -146,8 +142,7 @@ mod tests {
             .collect();
         let turns = vec![6.0; 3 * rows * columns];
         let table = PerPixel::new(24, 40, 16, 4, &levels, &turns).unwrap();
-        let amplitude =
-            Array3::from_shape_fn((3, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
+        let amplitude = Array3::from_shape_fn((3, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
         Target {
             display,
             response: Response::PerPixel(Arc::new(table)),
@@ -207,10 +202,7 @@ mod tests {
         let error = other.to_bytes().unwrap_err().to_string();
         assert!(error.contains("40×24"), "{error}");
         // The same of a file whose display was changed by hand.
-        let at = bytes
-            .windows(10)
-            .position(|part| part == b"width = 40")
-            .unwrap();
+        let at = bytes.windows(10).position(|part| part == b"width = 40").unwrap();
         let mut changed = bytes.clone();
         changed[at..at + 10].copy_from_slice(b"width = 48");
         let error = Target::from_bytes(&changed).unwrap_err().to_string();

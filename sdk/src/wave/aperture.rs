@@ -61,11 +61,7 @@ impl Aperture {
                 let fx = kx.min(width - kx) as f64 / width as f64;
                 for (ky, value) in column.iter_mut().enumerate() {
                     let fy = ky.min(height - ky) as f64 / height as f64;
-                    *value *= if passes(fx, fy, self.radius) {
-                        scale
-                    } else {
-                        0.0
-                    };
+                    *value *= if passes(fx, fy, self.radius) { scale } else { 0.0 };
                 }
             },
             scratch,

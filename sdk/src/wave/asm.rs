@@ -71,9 +71,7 @@ pub fn padded_shape(
     }
     let padded = |n: usize| -> f64 {
         match padding {
-            Padding::Reach => {
-                n as f64 + (reach_m(distance_m, wavelength_m, pitch_m) / pitch_m).ceil()
-            }
+            Padding::Reach => n as f64 + (reach_m(distance_m, wavelength_m, pitch_m) / pitch_m).ceil(),
             Padding::Double => 2.0 * n as f64,
             Padding::Circular => n as f64,
         }
@@ -154,11 +152,7 @@ impl Transfer {
     ) -> Self {
         let scale = 1.0 / (padded_height * padded_width) as f64;
         let frequency = |k: usize, n: usize| {
-            let k = if 2 * k < n {
-                k as f64
-            } else {
-                k as f64 - n as f64
-            };
+            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
             k / (n as f64 * pitch_m)
         };
         let mut factors = Vec::with_capacity(padded_height * padded_width);
@@ -277,13 +271,7 @@ impl Propagator {
         Ok(Propagator {
             shape: (height, width),
             fft: Arc::new(Fft2::new(height, width, padded.0, padded.1)),
-            transfer: Arc::new(Transfer::new(
-                padded,
-                pitch_m,
-                wavelength_m,
-                distance_m,
-                keep,
-            )),
+            transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
         })
     }
 
@@ -308,19 +296,13 @@ impl Propagator {
             Propagator {
                 shape: (height, width),
                 fft: fft.clone(),
-                transfer: Arc::new(Transfer::new(
-                    padded,
-                    pitch_m,
-                    wavelength_m,
-                    distance_m,
-                    keep,
-                )),
+                transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
             }
         }))
     }
 
-    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is that of a
-    /// modulator of `modulator_pitch_m`, on its way.
+    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is
+    /// that of a modulator of `modulator_pitch_m`, on its way.
     ///
     /// # Errors
     /// As [`padded_shape`], the light that the correction moves counted in.
@@ -339,13 +321,9 @@ impl Propagator {
         let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
         let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
         Ok([0, 1, 2].map(|colour| {
-            let transfer = Transfer::corrected(
-                padded,
-                pitch_m,
-                wavelengths_m[colour],
-                distance_m,
-                |mu, nu| aberration.phase(colour, mu, nu, modulator_pitch_m),
-            );
+            let transfer = Transfer::corrected(padded, pitch_m, wavelengths_m[colour], distance_m, |mu, nu| {
+                aberration.phase(colour, mu, nu, modulator_pitch_m)
+            });
             Propagator {
                 shape: (height, width),
                 fft: fft.clone(),

@@ -1,8 +1,8 @@
 //! A filter in the Fourier domain of a zero-padded plane.
 //!
-//! [`Fft2::convolve`] is the whole of it, three sweeps through memory. Who wants the spectrum itself, or several filters
-//! of one plane, takes the passes one by one: [`Fft2::rows_forward`], [`Fft2::columns`], [`Fft2::rows_inverse`]. Neither
-//! transforms rows or columns that hold only padding.
+//! [`Fft2::convolve`] is the whole of it, three sweeps through memory. Who wants the spectrum itself, or several
+//! filters of one plane, takes the passes one by one: [`Fft2::rows_forward`], [`Fft2::columns`],
+//! [`Fft2::rows_inverse`]. Neither transforms rows or columns that hold only padding.
 //!
 //! The 1D transforms are rustfft's: any length, mixed radix. Transforms here are unnormalized; a filter carries the
 //! 1/(H·W).

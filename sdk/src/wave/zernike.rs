@@ -68,11 +68,7 @@ impl Aberration {
     /// # Errors
     /// A coefficient that is not finite or beyond ±10⁴.
     pub fn new(coefficients: [Coefficients; 3]) -> Result<Self> {
-        match coefficients
-            .iter()
-            .flatten()
-            .find(|a| a.is_nan() || a.abs() > MOST)
-        {
+        match coefficients.iter().flatten().find(|a| a.is_nan() || a.abs() > MOST) {
             Some(a) => Err(Error::Plan(format!(
                 "an aberration coefficient of {a} rad; it must lie in -10000..=10000"
             ))),
@@ -112,9 +108,8 @@ impl Aberration {
 
     /// `1 − t` of this one and `t` of `other`.
     pub fn mix(&self, other: &Self, t: f64) -> Self {
-        let mix = |c: usize, j: usize| {
-            self.coefficients[c][j] + (other.coefficients[c][j] - self.coefficients[c][j]) * t
-        };
+        let mix =
+            |c: usize, j: usize| self.coefficients[c][j] + (other.coefficients[c][j] - self.coefficients[c][j]) * t;
         Aberration {
             coefficients: std::array::from_fn(|c| std::array::from_fn(|j| mix(c, j))),
         }
@@ -283,10 +278,7 @@ mod tests {
                 let mut a = [0.0; 5];
                 a[j] = 1.7;
                 let ours = terms(&a, rho * theta.cos(), rho * theta.sin());
-                assert!(
-                    (ours - 1.7 * expected).abs() < 1e-12,
-                    "{j}: {ours} {expected}"
-                );
+                assert!((ours - 1.7 * expected).abs() < 1e-12, "{j}: {ours} {expected}");
             }
         }
     }
@@ -294,20 +286,10 @@ mod tests {
     #[test]
     fn coefficients_run_piecewise_linearly_over_depth() {
         let of = |a: f64| Aberration::new([[a; 5], [2.0 * a; 5], [0.0; 5]]).unwrap();
-        let all =
-            Aberrations::new(vec![(-1e-3, of(1.0)), (0.0, of(2.0)), (2e-3, of(4.0))]).unwrap();
-        for (z, a) in [
-            (-5e-3, 1.0),
-            (-1e-3, 1.0),
-            (-0.5e-3, 1.5),
-            (1e-3, 3.0),
-            (9e-3, 4.0),
-        ] {
+        let all = Aberrations::new(vec![(-1e-3, of(1.0)), (0.0, of(2.0)), (2e-3, of(4.0))]).unwrap();
+        for (z, a) in [(-5e-3, 1.0), (-1e-3, 1.0), (-0.5e-3, 1.5), (1e-3, 3.0), (9e-3, 4.0)] {
             let at = all.at(z);
-            assert!(
-                (at.coefficients()[1][4] - 2.0 * a).abs() < 1e-12,
-                "{z}: {at:?}"
-            );
+            assert!((at.coefficients()[1][4] - 2.0 * a).abs() < 1e-12, "{z}: {at:?}");
         }
         assert!(all.constant().is_none());
         let same = Aberrations::new(vec![(0.0, of(1.0)), (1e-3, of(1.0))]).unwrap();
@@ -332,14 +314,8 @@ mod tests {
                 for j in -10..=10 {
                     let (mu, nu) = (f64::from(i) / 20.0 / PITCH, f64::from(j) / 20.0 / PITCH);
                     let at = |mu: f64, nu: f64| aberration.phase(1, mu, nu, PITCH);
-                    for slope in [
-                        at(mu + df, nu) - at(mu - df, nu),
-                        at(mu, nu + df) - at(mu, nu - df),
-                    ] {
-                        assert!(
-                            (slope / (4.0 * PI * df)).abs() <= reach * 1.001,
-                            "{a:?} {i} {j}"
-                        );
+                    for slope in [at(mu + df, nu) - at(mu - df, nu), at(mu, nu + df) - at(mu, nu - df)] {
+                        assert!((slope / (4.0 * PI * df)).abs() <= reach * 1.001, "{a:?} {i} {j}");
                     }
                 }
             }
@@ -354,17 +330,10 @@ mod tests {
         let aberration = Aberration::new([a; 3]).unwrap();
         for distance in [14e-3, -14e-3] {
             let literal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &a).unwrap();
-            let ideal =
-                corrected_transfer_function(n, n, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
+            let ideal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
             let (mut square, mut count) = (0.0, 0.0);
             for ((ky, kx), value) in literal.indexed_iter() {
-                let signed = |k: usize| {
-                    (if 2 * k < n {
-                        k as f64
-                    } else {
-                        k as f64 - n as f64
-                    }) / n as f64
-                };
+                let signed = |k: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
                 let (fx, fy) = (signed(kx), signed(ky));
                 if fx.hypot(fy) > 0.4 {
                     continue;

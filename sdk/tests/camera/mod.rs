@@ -2,8 +2,7 @@
 #![allow(dead_code)]
 
 use phasefront::input::{
-    CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Plane,
-    YuvEncoding, YuvMatrix,
+    CameraFrame, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Plane, YuvEncoding, YuvMatrix,
 };
 use phasefront::{Display, Method, Network, Result, SessionOptions};
 use rand::{RngExt, SeedableRng};
@@ -15,10 +14,7 @@ pub(crate) fn colour_formats() -> Vec<ColourFormat> {
     let mut formats = vec![ColourFormat::Rgba, ColourFormat::Bgra, ColourFormat::Rgb];
     for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
         for video_range in [false, true] {
-            let encoding = YuvEncoding {
-                matrix,
-                video_range,
-            };
+            let encoding = YuvEncoding { matrix, video_range };
             formats.extend([ColourFormat::Nv12(encoding), ColourFormat::Yuv420(encoding)]);
         }
     }
@@ -47,12 +43,7 @@ pub(crate) struct Memory {
 impl Memory {
     /// Bytes at random for (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and after rows, and
     /// not one byte behind the last pixel.
-    pub(crate) fn random(
-        random: &mut ChaCha8Rng,
-        (height, width): (usize, usize),
-        pixel: usize,
-        gap: usize,
-    ) -> Self {
+    pub(crate) fn random(random: &mut ChaCha8Rng, (height, width): (usize, usize), pixel: usize, gap: usize) -> Self {
         let pixel_stride = pixel + gap;
         let row_stride = width * pixel_stride + gap;
         let length = (height - 1) * row_stride + (width - 1) * pixel_stride + pixel;
@@ -76,12 +67,7 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    pub(crate) fn new(
-        seed: u64,
-        format: ColourFormat,
-        (height, width): (usize, usize),
-        gap: usize,
-    ) -> Self {
+    pub(crate) fn new(seed: u64, format: ColourFormat, (height, width): (usize, usize), gap: usize) -> Self {
         let random = &mut ChaCha8Rng::seed_from_u64(seed);
         let half = (height.div_ceil(2), width.div_ceil(2));
         let planes: &[((usize, usize), usize)] = match format {
@@ -116,9 +102,7 @@ pub(crate) struct Scene {
 impl Scene {
     /// The square starts `at` pixels from the left.
     pub(crate) fn new(height: usize, width: usize, at: usize) -> Self {
-        let square = |x: usize, y: usize| {
-            (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y)
-        };
+        let square = |x: usize, y: usize| (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y);
         let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         Scene {
             width,
@@ -140,8 +124,7 @@ impl Scene {
 
     pub(crate) fn colour(&self) -> ColourImage<'_> {
         let plane = Plane::new(&self.rgba, 4 * self.width, 4);
-        ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane])
-            .expect("a whole image")
+        ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane]).expect("a whole image")
     }
 
     /// The depth's bytes in `format`.
@@ -163,20 +146,9 @@ impl Scene {
 }
 
 /// A depth image over `bytes`, tightly packed.
-pub(crate) fn depth(
-    bytes: &[u8],
-    format: DepthFormat,
-    width: usize,
-    height: usize,
-) -> DepthImage<'_> {
+pub(crate) fn depth(bytes: &[u8], format: DepthFormat, width: usize, height: usize) -> DepthImage<'_> {
     let pixel = format.pixel_bytes();
-    DepthImage::new(
-        format,
-        width,
-        height,
-        Plane::new(bytes, width * pixel, pixel),
-    )
-    .expect("a whole image")
+    DepthImage::new(format, width, height, Plane::new(bytes, width * pixel, pixel)).expect("a whole image")
 }
 
 /// A frame of `scene` with depth in metres over `metres`, its bytes.
@@ -192,20 +164,13 @@ pub(crate) fn with_confidence<'a>(
     width: usize,
     height: usize,
 ) -> Result<DepthImage<'a>> {
-    depth.with_confidence(
-        ConfidenceFormat::U8,
-        width,
-        height,
-        Plane::new(map, width, 1),
-    )
+    depth.with_confidence(ConfidenceFormat::U8, width, height, Plane::new(map, width, 1))
 }
 
 /// A small display and the shipped network.
 pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
     let method = Method::Network(Arc::new(network.expect("a hologram network")));
-    let display = Display::from_toml(&format!(
-        "width = {width}\nheight = {height}\noffset_mm = 2"
-    ));
+    let display = Display::from_toml(&format!("width = {width}\nheight = {height}\noffset_mm = 2"));
     SessionOptions::new(display.expect("a display"), method)
 }

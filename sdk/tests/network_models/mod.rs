@@ -135,12 +135,7 @@ impl Model {
             if last && self.tanh {
                 b.node("Tanh", "tanh", &[&end], "field");
             } else if !last {
-                b.node(
-                    "Relu",
-                    &format!("relu{i}"),
-                    &[&end],
-                    &format!("relu{i}_out"),
-                );
+                b.node("Relu", &format!("relu{i}"), &[&end], &format!("relu{i}_out"));
                 outputs.push(format!("relu{i}_out"));
             }
         }
@@ -179,12 +174,7 @@ impl Model {
         let (s, z) = (format!("{x}_scale"), format!("{x}_zero"));
         b.f32s(&s, &[], &[scale]);
         b.bytes(&z, &[], 2, vec![zero_point]);
-        b.node(
-            "QuantizeLinear",
-            &format!("{x}/q"),
-            &[x, &s, &z],
-            &format!("{x}_q"),
-        );
+        b.node("QuantizeLinear", &format!("{x}/q"), &[x, &s, &z], &format!("{x}_q"));
         b.node(
             "DequantizeLinear",
             &format!("{x}/dq"),
@@ -195,27 +185,18 @@ impl Model {
     }
 
     fn weights(&self, b: &mut Builder, i: usize, reads: usize, writes: usize, input_scale: f32) {
-        let spread = (6.0 / (9.0 * reads as f32)).sqrt()
-            * if i > 1 && i.is_multiple_of(2) {
-                0.7
-            } else {
-                1.0
-            };
+        let spread = (6.0 / (9.0 * reads as f32)).sqrt() * if i > 1 && i.is_multiple_of(2) { 0.7 } else { 1.0 };
         let count = reads * writes * 9;
         let (w, bias) = (format!("w{i}"), format!("b{i}"));
         let shape = [writes as i64, reads as i64, 3, 3];
         if !self.int8 {
-            let kernel: Vec<f32> = (0..count)
-                .map(|_| b.rng.random_range(-spread..spread))
-                .collect();
+            let kernel: Vec<f32> = (0..count).map(|_| b.rng.random_range(-spread..spread)).collect();
             b.f32s(&w, &shape, &kernel);
             let values: Vec<f32> = (0..writes).map(|_| b.rng.random_range(-0.1..0.1)).collect();
             b.f32s(&bias, &[writes as i64], &values);
             return;
         }
-        let kernel: Vec<u8> = (0..count)
-            .map(|_| b.rng.random_range(-127i8..=127) as u8)
-            .collect();
+        let kernel: Vec<u8> = (0..count).map(|_| b.rng.random_range(-127i8..=127) as u8).collect();
         let scales: Vec<f32> = (0..writes)
             .map(|_| spread / 127.0 * b.rng.random_range(0.7f32..1.0))
             .collect();
@@ -236,11 +217,7 @@ impl Model {
                 kind,
                 vec![0; writes * if kind == 6 { 4 } else { 1 }],
             );
-            let inputs = [
-                format!("{name}_q"),
-                format!("{name}_scale"),
-                format!("{name}_zero"),
-            ];
+            let inputs = [format!("{name}_q"), format!("{name}_scale"), format!("{name}_zero")];
             let inputs = [&inputs[0][..], &inputs[1], &inputs[2]];
             b.node("DequantizeLinear", &format!("{name}/dq"), &inputs, name)
                 .attribute

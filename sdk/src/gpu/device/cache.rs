@@ -59,12 +59,7 @@ fn header(programs: &[u8], info: &wgpu::AdapterInfo) -> [u8; HEADER] {
     let mut maker = DefaultHasher::new();
     maker.write_u32(info.vendor);
     maker.write_u32(info.device);
-    for text in [
-        info.backend.to_str(),
-        &info.name,
-        &info.driver,
-        &info.driver_info,
-    ] {
+    for text in [info.backend.to_str(), &info.name, &info.driver, &info.driver_info] {
         maker.write_usize(text.len());
         maker.write(text.as_bytes());
     }
@@ -82,18 +77,14 @@ fn header(programs: &[u8], info: &wgpu::AdapterInfo) -> [u8; HEADER] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::super::testing::software;
+    use super::super::testing::{or_skip, software};
     use super::super::{Device, DeviceOptions};
     use super::*;
 
     /// The device with what is kept, where there is one that lets programs be kept.
     fn device(programs: Option<Vec<u8>>) -> Option<Device> {
-        let options = DeviceOptions {
-            programs,
-            ..software()
-        };
-        let Ok(device) = Device::open(&options) else {
-            println!("skipped: no driver in software (mesa-vulkan-drivers)");
+        let options = DeviceOptions { programs, ..software() };
+        let Some(device) = or_skip(Device::open(&options)) else {
             return None;
         };
         if device.programs().is_none() {
@@ -147,25 +138,13 @@ mod tests {
             ("nothing", Vec::new(), "header"),
             ("three bytes", vec![1, 2, 3], "header"),
             ("another file", vec![0x55; programs.len()], "version"),
-            (
-                "the driver's bytes bare",
-                programs[HEADER..].to_vec(),
-                "version",
-            ),
+            ("the driver's bytes bare", programs[HEADER..].to_vec(), "version"),
             ("another version", changed(15), "version"),
             ("another GPU", changed(16), "another GPU"),
             ("another digest", changed(24), "damaged"),
             ("the first byte changed", changed(HEADER), "damaged"),
-            (
-                "the last byte changed",
-                changed(programs.len() - 1),
-                "damaged",
-            ),
-            (
-                "cut short",
-                programs[..programs.len() - 1].to_vec(),
-                "damaged",
-            ),
+            ("the last byte changed", changed(programs.len() - 1), "damaged"),
+            ("cut short", programs[..programs.len() - 1].to_vec(), "damaged"),
             ("empty", programs[..HEADER].to_vec(), "damaged"),
             ("longer", longer, "damaged"),
         ];
@@ -194,9 +173,6 @@ mod tests {
             driver_info: format!("{} and later", info.driver_info),
             ..info
         };
-        assert_eq!(
-            unseal(&sealed, &update),
-            Err("they are of another GPU or driver")
-        );
+        assert_eq!(unseal(&sealed, &update), Err("they are of another GPU or driver"));
     }
 }

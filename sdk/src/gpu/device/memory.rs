@@ -23,9 +23,7 @@ impl Constants {
 impl Device {
     /// Memory of `bytes`, zeros, for programs and copies.
     pub(crate) fn buffer(&self, what: &str, bytes: usize) -> Result<wgpu::Buffer> {
-        let usage = wgpu::BufferUsages::STORAGE
-            | wgpu::BufferUsages::COPY_SRC
-            | wgpu::BufferUsages::COPY_DST;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let most = self
             .limits
             .max_storage_buffer_binding_size
@@ -61,10 +59,7 @@ impl Device {
     pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
         if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
-            return Err(GpuError::Refused(format!(
-                "{what} do not fit {}",
-                self.name()
-            )));
+            return Err(GpuError::Refused(format!("{what} do not fit {}", self.name())));
         }
         let usage = match uniform {
             true => wgpu::BufferUsages::UNIFORM,
@@ -82,10 +77,7 @@ impl Device {
     pub(crate) fn table(&self, what: &str, contents: &[u8]) -> Result<Constants> {
         let buffer = self.buffer(what, contents.len())?;
         self.queue.write_buffer(&buffer, 0, contents);
-        Ok(Constants {
-            buffer,
-            uniform: false,
-        })
+        Ok(Constants { buffer, uniform: false })
     }
 
     /// Copies `bytes` to `at` of `to`, which is a multiple of 4. Copies take whole words, so what is missing is 0.
@@ -95,8 +87,7 @@ impl Device {
         if !rest.is_empty() {
             let mut word = [0; 4];
             word[..rest.len()].copy_from_slice(rest);
-            self.queue
-                .write_buffer(to, (at + words.len()) as u64, &word);
+            self.queue.write_buffer(to, (at + words.len()) as u64, &word);
         }
     }
 
@@ -113,11 +104,7 @@ impl Device {
     }
 
     /// Maps a readable buffer that `submission` writes.
-    pub(crate) fn map(
-        &self,
-        buffer: &wgpu::Buffer,
-        submission: &wgpu::SubmissionIndex,
-    ) -> Result<()> {
+    pub(crate) fn map(&self, buffer: &wgpu::Buffer, submission: &wgpu::SubmissionIndex) -> Result<()> {
         let (send, receive) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
             // The receiver waits below, or has given up.

@@ -1,21 +1,23 @@
 //! What the tests of stages share.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../../../tests/driver.rs"]
+mod driver;
+
+use super::super::Result;
 use super::{Device, DeviceOptions};
+pub(crate) use driver::or_skip;
 use num_complex::Complex32;
 use std::sync::{Arc, OnceLock};
 
 /// The device of all tests: a GPU, or a driver in software; none where there is neither, which is said.
 pub(crate) fn device() -> Option<Arc<Device>> {
-    static DEVICE: OnceLock<Option<Arc<Device>>> = OnceLock::new();
+    static DEVICE: OnceLock<Result<Arc<Device>>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
         let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
-        opened.ok().map(Arc::new)
+        opened.map(Arc::new)
     });
-    if opened.is_none() {
-        println!("skipped: no GPU and no driver in software (mesa-vulkan-drivers)");
-    }
-    opened.clone()
+    or_skip(opened.as_ref()).cloned()
 }
 
 pub(crate) fn software() -> DeviceOptions {
@@ -27,9 +29,7 @@ pub(crate) fn software() -> DeviceOptions {
 
 pub(crate) fn upload(device: &Device, field: &[Complex32]) -> wgpu::Buffer {
     let buffer = device.buffer("field", size_of_val(field)).unwrap();
-    device
-        .queue
-        .write_buffer(&buffer, 0, bytemuck::cast_slice(field));
+    device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(field));
     buffer
 }
 
@@ -59,9 +59,5 @@ pub(crate) fn apart(a: &[Complex32], b: &[Complex32]) -> f32 {
     assert_eq!(a.len(), b.len());
     let most = b.iter().map(|v| v.norm()).fold(0.0, f32::max);
     let worst = |worst: f32, d: f32| if d > worst || d.is_nan() { d } else { worst };
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| (a - b).norm())
-        .fold(0.0, worst)
-        / most
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, worst) / most
 }

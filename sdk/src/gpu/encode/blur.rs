@@ -16,11 +16,7 @@ pub(super) struct Blur<'a> {
 
 impl Blur<'_> {
     /// Along x, with the mean phase taken out where `turn` says it, then along y back into `field`.
-    pub(super) fn steps(
-        &self,
-        field: &wgpu::Buffer,
-        turn: Option<&wgpu::Buffer>,
-    ) -> Result<[Dispatch; 2]> {
+    pub(super) fn steps(&self, field: &wgpu::Buffer, turn: Option<&wgpu::Buffer>) -> Result<[Dispatch; 2]> {
         let (height, width) = self.size;
         let room = (self.device).buffer("the blurred field", 24 * height * width)?;
         Ok([
@@ -55,10 +51,6 @@ impl Blur<'_> {
             (3, to.as_entire_binding()),
             (4, turn.unwrap_or(from).as_entire_binding()),
         ];
-        program.on(
-            device,
-            &arguments,
-            [self.size.1.div_ceil(COLUMNS), self.size.0, 3],
-        )
+        program.on(device, &arguments, [self.size.1.div_ceil(COLUMNS), self.size.0, 3])
     }
 }

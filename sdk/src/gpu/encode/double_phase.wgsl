@@ -1,5 +1,6 @@
-// From the field at the modulator to levels: blur, light, double phase, response. `peak` finds the largest amplitude that
-// `encode` then scales by. The header that double_phase.rs writes before this text gives the constants in capitals.
+// From the field at the modulator to levels: blur, light, double phase, response. `peak` finds the largest amplitude
+// that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants in
+// capitals.
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
 // The centre tap of the blur and those to one side; the fixed scale.
@@ -14,8 +15,8 @@ struct Settings { taps: vec3f, scale: f32 }
 @group(0) @binding(5) var<storage, read> found: array<u32>;
 @group(0) @binding(6) var<storage, read_write> levels: array<u32>;
 @group(0) @binding(7) var shown: texture_storage_2d<rgba8unorm, write>;
-// With TABLE the level of each step; with PIXELS the curves of nodes, K + 1 knots each, then their turns; all else is not
-// read. See slm.rs and slm/per_pixel.rs.
+// With TABLE the level of each step; with PIXELS the curves of nodes, K + 1 knots each, then their turns; all else is
+// not read. See slm.rs and slm/per_pixel.rs.
 @group(0) @binding(8) var<storage, read> response: array<u32>;
 
 // One over the amplitude of the lasers' light at the nodes, three planes; see illumination.rs.

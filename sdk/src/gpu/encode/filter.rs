@@ -34,11 +34,7 @@ pub(super) struct Filtered<'a> {
 }
 
 impl Filter {
-    pub(super) fn new<'a>(
-        device: &Device,
-        job: &EncoderJob<'a>,
-        frame: &Constants,
-    ) -> Result<(Self, Filtered<'a>)> {
+    pub(super) fn new<'a>(device: &Device, job: &EncoderJob<'a>, frame: &Constants) -> Result<(Self, Filtered<'a>)> {
         let size = job.size;
         let mut rest = Filtered {
             field: job.field.clone(),
@@ -102,12 +98,7 @@ pub(super) struct Prefilter {
 }
 
 impl Prefilter {
-    fn new(
-        device: &Device,
-        network: &Network,
-        job: &EncoderJob<'_>,
-        frame: &Constants,
-    ) -> Result<Self> {
+    fn new(device: &Device, network: &Network, job: &EncoderJob<'_>, frame: &Constants) -> Result<Self> {
         let (size, kind) = (job.size, network.input());
         if !kind.is_field() {
             let why = format!("a pre-filter takes 'field', this network '{kind}'");
@@ -132,11 +123,7 @@ impl Prefilter {
         let end = End::Field(network.head(), kind);
         let (input, fusion) = (&packer.input, job.chain.fusion);
         let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
-        Ok(Prefilter {
-            blur,
-            packer,
-            chain,
-        })
+        Ok(Prefilter { blur, packer, chain })
     }
 
     fn run(&self, pass: &mut wgpu::ComputePass<'_>) {

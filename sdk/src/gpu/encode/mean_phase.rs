@@ -14,11 +14,7 @@ impl MeanPhase {
     pub(crate) fn new(device: &Device, partial: &wgpu::Buffer, parts: usize) -> Result<Self> {
         let parts = device.constants("parts", bytemuck::cast_slice(&[parts as u32, 0, 0, 0]))?;
         let turn = device.buffer("the mean phase", 24)?;
-        let program = device.program(
-            "the mean phase",
-            include_str!("mean_phase.wgsl").into(),
-            "find",
-        );
+        let program = device.program("the mean phase", include_str!("mean_phase.wgsl").into(), "find");
         let arguments = [
             (0, parts.buffer.as_entire_binding()),
             (1, partial.as_entire_binding()),
@@ -47,13 +43,9 @@ mod tests {
         // Sums of parts, as the last layer leaves them.
         for parts in [1, 7, 1000] {
             let mut sums = field(parts);
-            let partial: Vec<Complex32> = (0..3 * parts)
-                .map(|i| sums[i % 3 * parts + i / 3])
-                .collect();
+            let partial: Vec<Complex32> = (0..3 * parts).map(|i| sums[i % 3 * parts + i / 3]).collect();
             let buffer = upload(&device, &partial);
-            let mean = device
-                .guarded(|| MeanPhase::new(&device, &buffer, parts))
-                .unwrap();
+            let mean = device.guarded(|| MeanPhase::new(&device, &buffer, parts)).unwrap();
             run(&device, |pass| mean.run(pass));
             let turn = read(&device, &mean.turn, 3);
             let expected: Vec<Complex32> = sums
@@ -68,9 +60,7 @@ mod tests {
         }
         // Darkness has no phase and is left alone.
         let buffer = upload(&device, &[Complex32::ZERO; 3]);
-        let mean = device
-            .guarded(|| MeanPhase::new(&device, &buffer, 1))
-            .unwrap();
+        let mean = device.guarded(|| MeanPhase::new(&device, &buffer, 1)).unwrap();
         run(&device, |pass| mean.run(pass));
         assert_eq!(read(&device, &mean.turn, 3), [Complex32::ONE; 3]);
     }

@@ -35,9 +35,7 @@ impl Camera {
             bytes += room;
         }
         let (levels, matrix) = match format {
-            ColourFormat::Nv12(encoding) | ColourFormat::Yuv420(encoding) => {
-                yuv_constants(encoding)
-            }
+            ColourFormat::Nv12(encoding) | ColourFormat::Yuv420(encoding) => yuv_constants(encoding),
             _ => ([0.0; 4], [0.0; 4]),
         };
         let mut all = [0u32; 20];
@@ -61,19 +59,12 @@ impl Camera {
     }
 
     /// Sends an image on its way to the colour buffer.
-    pub(super) fn upload(
-        &self,
-        device: &Device,
-        to: &wgpu::Buffer,
-        image: &ColourImage<'_>,
-    ) -> Result<()> {
+    pub(super) fn upload(&self, device: &Device, to: &wgpu::Buffer, image: &ColourImage<'_>) -> Result<()> {
         let format = image.format();
         let (height, width) = image.shape();
         let mut planes = image.planes().to_vec();
         let mut tight = Vec::new();
-        for ((plane, (_, pixel_bytes, share)), (_, room)) in
-            planes.iter_mut().zip(format.layout()).zip(&self.places)
-        {
+        for ((plane, (_, pixel_bytes, share)), (_, room)) in planes.iter_mut().zip(format.layout()).zip(&self.places) {
             let (rows, columns) = (height.div_ceil(*share), width.div_ceil(*share));
             let last = (rows - 1) * plane.row_stride + (columns - 1) * plane.pixel_stride;
             plane.bytes = &plane.bytes[..last + pixel_bytes];
@@ -111,10 +102,7 @@ impl Camera {
 /// The constants that say where the taps of each axis lie in a table, and the table.
 fn taps(plan: &ColourPlan) -> (String, Vec<u32>) {
     let (mut constants, mut table) = (String::new(), Vec::new());
-    for (name, axis) in ["X", "Y", "OTHER_X", "OTHER_Y"]
-        .into_iter()
-        .zip(plan.axes())
-    {
+    for (name, axis) in ["X", "Y", "OTHER_X", "OTHER_Y"].into_iter().zip(plan.axes()) {
         let (starts, weights, count) = axis.tables();
         let (other, side) = match name.strip_prefix("OTHER_") {
             Some(side) => ("OTHER_", side),

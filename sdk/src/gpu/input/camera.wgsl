@@ -1,6 +1,6 @@
-// Colour from a camera's image, turned upright, cropped, resized and converted: the twin of frame/convert.rs, whose taps
-// come as a table: for each of four axes (x and y of the first channel, x and y of the others) the first sample of each
-// pixel, then its weights.
+// Colour from a camera's image, turned upright, cropped, resized and converted: the twin of frame/convert.rs, whose
+// taps come as a table: for each of four axes (x and y of the first channel, x and y of the others) the first sample of
+// each pixel, then its weights.
 
 struct Camera {
     // Of each channel the byte of the upright picture's first sample, and the steps to the right and down.

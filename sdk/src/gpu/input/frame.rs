@@ -75,12 +75,7 @@ impl<'a> Frame<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Frame`] for data of another size, or values that no frame has.
-    pub fn read(
-        &self,
-        orientation: Orientation,
-        height: usize,
-        width: usize,
-    ) -> crate::Result<RgbdFrame> {
+    pub fn read(&self, orientation: Orientation, height: usize, width: usize) -> crate::Result<RgbdFrame> {
         let rgb = match &self.colour {
             ColourData::Planar(values) => values.to_vec(),
             ColourData::Camera(image) => {
@@ -95,14 +90,11 @@ impl<'a> Frame<'a> {
             DepthData::U16(words) => words.iter().map(|&w| f32::from(w) / 65535.0).collect(),
         };
         let wrong = |what: &str, is: usize| {
-            crate::Error::Frame(format!(
-                "{what} has {is} values; the frame is {width}×{height}"
-            ))
+            crate::Error::Frame(format!("{what} has {is} values; the frame is {width}×{height}"))
         };
         let (colours, depths) = (rgb.len(), depth.len());
         RgbdFrame::new(
-            Array3::from_shape_vec((3, height, width), rgb)
-                .map_err(|_| wrong("colour", colours))?,
+            Array3::from_shape_vec((3, height, width), rgb).map_err(|_| wrong("colour", colours))?,
             Array2::from_shape_vec((height, width), depth).map_err(|_| wrong("depth", depths))?,
         )
     }

@@ -3,8 +3,8 @@
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
 
-// The f32 that is nearest to w/65535, which repeats the bits of w behind the point: drivers' divisions are not exact, and
-// a sweep asks for the plane that a pixel belongs to.
+// The f32 that is nearest to w/65535, which repeats the bits of w behind the point: drivers' divisions are not exact,
+// and a sweep asks for the plane that a pixel belongs to.
 fn normalized(w: u32) -> f32 {
     if (w == 0u) { return 0.0; }
     let bits = (w << 16u) | w;

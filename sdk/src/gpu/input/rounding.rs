@@ -9,14 +9,12 @@ use crate::network::chain::{Chain, Quantisation};
 pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
     let rounding = |i: usize| {
         let layer = &chain.layers[i];
-        layer.quantisation.input.ok_or_else(|| {
-            GpuError::Core(crate::Error::Network(format!(
-                "layer {i}'s input is not rounded"
-            )))
-        })
+        layer
+            .quantisation
+            .input
+            .ok_or_else(|| GpuError::Core(crate::Error::Network(format!("layer {i}'s input is not rounded"))))
     };
-    let (first, last): (Quantisation, Quantisation) =
-        (rounding(0)?, rounding(chain.layers.len() - 1)?);
+    let (first, last): (Quantisation, Quantisation) = (rounding(0)?, rounding(chain.layers.len() - 1)?);
     let concatenated = |real: f32| match chain.concat_rounded_input {
         true => last.quantise(first.dequantise(first.quantise(real))),
         false => last.quantise(real),
@@ -30,13 +28,7 @@ pub(super) fn steps(device: &Device, chain: &Chain) -> Result<Constants> {
 /// there is none.
 fn thresholds(rounded: impl Fn(f32) -> u8) -> Vec<f32> {
     // The order of floats as that of integers.
-    let float = |key: i32| {
-        f32::from_bits(if key < 0 {
-            !key as u32 | 1 << 31
-        } else {
-            key as u32
-        })
-    };
+    let float = |key: i32| f32::from_bits(if key < 0 { !key as u32 | 1 << 31 } else { key as u32 });
     let key = |real: f32| {
         let bits = real.to_bits();
         if bits >> 31 == 1 {

@@ -44,12 +44,7 @@ pub(super) struct Frames {
 
 impl Reader {
     /// For pixels of so many `channels`.
-    pub(super) fn new(
-        device: &Device,
-        source: Source<'_>,
-        channels: usize,
-        size: (usize, usize),
-    ) -> Result<Self> {
+    pub(super) fn new(device: &Device, source: Source<'_>, channels: usize, size: (usize, usize)) -> Result<Self> {
         let reader = |text: &str, first| Reader {
             header: String::new(),
             text: text.to_owned(),
@@ -80,12 +75,7 @@ impl Reader {
         })
     }
 
-    fn of_frames(
-        device: &Device,
-        colour: Colour,
-        depth: Depth,
-        size: (usize, usize),
-    ) -> Result<Self> {
+    fn of_frames(device: &Device, colour: Colour, depth: Depth, size: (usize, usize)) -> Result<Self> {
         let (height, width) = size;
         let area = height * width;
         let mut header = format!("const WORDS: bool = {};\n", depth == Depth::U16);
@@ -134,9 +124,7 @@ impl Frames {
                 "{what} has {is} values; {right} are right"
             ))),
         };
-        let other = |what: &str| {
-            crate::Error::Frame(format!("{what} comes in another form than was planned"))
-        };
+        let other = |what: &str| crate::Error::Frame(format!("{what} comes in another form than was planned"));
         let (colour, depth) = self.formats;
         match (frame.colour, colour, &self.camera) {
             (ColourData::Planar(values), Colour::Planar, _) => {

@@ -1,7 +1,7 @@
 //! A filter in three sweeps through memory: rows there, columns there and back, rows back.
 //!
-//! Between the sweeps the spectrum of rows lies in tiles, column by column, so that all of them read and write memory in
-//! long runs.
+//! Between the sweeps the spectrum of rows lies in tiles, column by column, so that all of them read and write memory
+//! in long runs.
 
 use super::{Fft2, parts};
 use num_complex::Complex32;
@@ -73,8 +73,8 @@ impl Fft2 {
         });
     }
 
-    /// Transforms each column of the tiles, padded, hands it to `filter` and transforms it back; columns of tiles are the
-    /// parts.
+    /// Transforms each column of the tiles, padded, hands it to `filter` and transforms it back; columns of tiles are
+    /// the parts.
     fn filter_tiles<F>(&self, filter: F, scratch: &mut ConvolveScratch)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
@@ -100,11 +100,9 @@ impl Fft2 {
                         }
                         let (frame, padding) = column.split_at_mut(height);
                         let tiles = tiles.chunks_exact(TILE_VALUES);
-                        wide!(
-                            for (run, tile) in frame.chunks_mut(TILE).zip(tiles.clone()) {
-                                copy_run(&tile[k * TILE..], run);
-                            }
-                        );
+                        wide!(for (run, tile) in frame.chunks_mut(TILE).zip(tiles.clone()) {
+                            copy_run(&tile[k * TILE..], run);
+                        });
                         padding.fill(Complex32::ZERO);
                         forward.process_with_scratch(column, work);
                         filter(first + k, column);

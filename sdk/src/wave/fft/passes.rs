@@ -63,10 +63,7 @@ impl Fft2 {
             .zip(plane.par_chunks(per_part * width))
             .zip(work.buffer.par_chunks_mut(work.piece))
             .for_each(|((rows, plane), work)| {
-                for (row, source) in rows
-                    .chunks_exact_mut(padded_width)
-                    .zip(plane.chunks_exact(width))
-                {
+                for (row, source) in rows.chunks_exact_mut(padded_width).zip(plane.chunks_exact(width)) {
                     row[..width].copy_from_slice(source);
                     row[width..].fill(Complex32::new(0.0, 0.0));
                     fft.process_with_scratch(row, work);
@@ -76,13 +73,8 @@ impl Fft2 {
 
     /// From transformed `rows`, (H, W'), to filtered `columns`, (W', H'): each is gathered, padded,
     /// transformed, handed to `filter`, and transformed back.
-    pub fn columns<F>(
-        &self,
-        rows: &[Complex32],
-        columns: &mut [Complex32],
-        filter: F,
-        work: &mut Work,
-    ) where
+    pub fn columns<F>(&self, rows: &[Complex32], columns: &mut [Complex32], filter: F, work: &mut Work)
+    where
         F: Fn(usize, &mut [Complex32]) + Sync,
     {
         let inverse = &self.column[1];
@@ -99,21 +91,12 @@ impl Fft2 {
 
     /// From transformed `rows`, (H, W'), to the spectrum's `columns`, (W', H'), each handed to `then`
     /// with its index and the transform's scratch.
-    pub fn spectrum<F>(
-        &self,
-        rows: &[Complex32],
-        columns: &mut [Complex32],
-        then: F,
-        work: &mut Work,
-    ) where
+    pub fn spectrum<F>(&self, rows: &[Complex32], columns: &mut [Complex32], then: F, work: &mut Work)
+    where
         F: Fn(usize, &mut [Complex32], &mut [Complex32]) + Sync,
     {
-        let (height, padded_height, padded_width) =
-            (self.height, self.padded_height, self.padded_width);
-        let per_part = self
-            .padded_width
-            .div_ceil(work.parts)
-            .next_multiple_of(BLOCK);
+        let (height, padded_height, padded_width) = (self.height, self.padded_height, self.padded_width);
+        let per_part = self.padded_width.div_ceil(work.parts).next_multiple_of(BLOCK);
         let forward = &self.column[0];
         columns
             .par_chunks_mut(per_part * padded_height)
@@ -214,20 +197,11 @@ impl Fft2 {
 
 /// Transposes a strip: `to[i][j] = from[j][first + i]` for j < `count`, rows of `to_stride` and
 /// `from_stride` values.
-fn gather(
-    from: &[Complex32],
-    from_stride: usize,
-    first: usize,
-    to: &mut [Complex32],
-    to_stride: usize,
-    count: usize,
-) {
+fn gather(from: &[Complex32], from_stride: usize, first: usize, to: &mut [Complex32], to_stride: usize, count: usize) {
     let lanes = to.len() / to_stride;
     if lanes == BLOCK {
         for (j, line) in from.chunks_exact(from_stride).take(count).enumerate() {
-            let line: &[Complex32; BLOCK] = line[first..first + BLOCK]
-                .try_into()
-                .expect("a slice of BLOCK values");
+            let line: &[Complex32; BLOCK] = line[first..first + BLOCK].try_into().expect("a slice of BLOCK values");
             for (i, value) in line.iter().enumerate() {
                 to[i * to_stride + j] = *value;
             }

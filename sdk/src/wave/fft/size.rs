@@ -1,7 +1,7 @@
 //! Lengths that transform fast.
 
-/// A length of at least `n` that transforms fast: of all 2^a·3^b·5^c·7^d the one that costs the least. Powers of two are
-/// so much faster than others that a few more values are worth it.
+/// A length of at least `n` that transforms fast: of all 2^a·3^b·5^c·7^d the one that costs the least. Powers of two
+/// are so much faster than others that a few more values are worth it.
 pub fn fast_size(n: usize) -> usize {
     // What rustfft takes for a value and a prime factor, measured, in units of a factor 2; the constant is what the
     // rest of a pass takes.
