@@ -442,6 +442,7 @@ mod write {
         .unwrap()
     }
 
+    #[expect(clippy::too_many_lines, reason = "case after case")]
     pub(super) fn suite() {
         let mut frames = Frames::default();
         let (w, h) = DISPLAY;

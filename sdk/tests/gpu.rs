@@ -248,6 +248,7 @@ fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn whole_frames_are_those_of_the_cpu() {
     let Some(device) = device() else { return };
     let (int8, f32) = (int8_network(), f32_network());
@@ -616,6 +617,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
 
 /// An app draws the levels from the texture that they were written to, on the device that computed them.
 #[test]
+#[expect(clippy::too_many_lines, reason = "what an app does, from its shader to its picture")]
 fn an_app_shows_the_texture_itself() {
     let Some(device) = device() else { return };
     let (h, w) = (33, 45);

@@ -160,6 +160,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
     fn levels_are_those_of_the_cpu() {
         let Some(device) = device() else { return };
         let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));

@@ -60,6 +60,7 @@ impl Model {
         self.proto().encode_to_vec()
     }
 
+    #[expect(clippy::too_many_lines, reason = "one graph, node after node")]
     pub fn proto(&self) -> ModelProto {
         let mut b = Builder {
             rng: rand_chacha::ChaCha8Rng::seed_from_u64(self.seed),

@@ -84,9 +84,7 @@ mod tests {
     /// The device with what is kept, where there is one that lets programs be kept.
     fn device(programs: Option<Vec<u8>>) -> Option<Device> {
         let options = DeviceOptions { programs, ..software() };
-        let Some(device) = or_skip(Device::open(&options)) else {
-            return None;
-        };
+        let device = or_skip(Device::open(&options))?;
         if device.programs().is_none() {
             println!("skipped: {device:?} keeps its programs itself");
             return None;
