@@ -44,7 +44,8 @@ pub fn built_in_pair(offset_mm: f64) -> Result<DeepPair, PhasefrontError> {
         let display = phasefront::Display::default().with_offset_m(offset_mm * 1e-3)?;
         let pair = built_in::pair(&display).ok_or_else(|| {
             PhasefrontError::Network(format!(
-                "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for 0, 6 and 12 where the feature built-in-network is on, or take a network without a pre-filter"
+                "network: no pair for an offset of {offset_mm} mm is built in; {}, or take a network without a pre-filter",
+                built_in::offsets()
             ))
         })?;
         Ok(pair)
@@ -62,6 +63,12 @@ mod built_in {
         phasefront_models::network("rgbd-8", Int8)
     }
 
+    /// Which pairs there are.
+    pub(super) fn offsets() -> String {
+        let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+        format!("there are pairs for {} mm", offsets.collect::<Vec<_>>().join(", "))
+    }
+
     pub(super) fn pair(display: &phasefront::Display) -> Option<DeepPair> {
         let pair = phasefront_models::pair_for(display, Int8)?;
         let of = |core| Arc::new(Network { core });
@@ -77,6 +84,10 @@ mod built_in {
 mod built_in {
     pub(super) fn network() -> Option<std::sync::Arc<phasefront::Network>> {
         None
+    }
+
+    pub(super) fn offsets() -> String {
+        "the feature built-in-network has them".into()
     }
 
     pub(super) fn pair(_: &phasefront::Display) -> Option<super::DeepPair> {

@@ -150,6 +150,14 @@ pub struct SessionOptions {
     pub encoding: Encoding,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
+    /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
+    /// the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+    #[uniffi(default = None)]
+    pub dark: Option<f32>,
+    /// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
+    /// the encoding: 1, and 0 with a pre-filter.
+    #[uniffi(default = None)]
+    pub local_steps: Option<u32>,
     /// Which metres are shown at the ends of the volume.
     pub depth_range: DepthRange,
     /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
@@ -221,9 +229,9 @@ impl Method {
     }
 }
 
-/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
-/// pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near
-/// and far by percentiles.
+/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of correction,
+/// or, without a method, by the network that is built in, by the plane sweep where it was not trained for the display;
+/// steady brightness, near and far by percentiles.
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
@@ -290,6 +298,8 @@ impl SessionOptions {
                 phasefront::Brightness::Fixed(scale) => Brightness::Fixed { scale },
                 phasefront::Brightness::FrameMax => Brightness::FrameMax,
             },
+            dark: None,
+            local_steps: None,
             depth_range: match core.depth.range {
                 input::DepthRange::Percentiles => DepthRange::Percentiles,
                 input::DepthRange::Fixed { near_m, far_m } => DepthRange::Fixed { near_m, far_m },
@@ -326,7 +336,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             .collect();
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
-        to.encoder.encoding = match &options.encoding {
+        let usual = phasefront::EncoderOptions::from(match &options.encoding {
             Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
                 sigma: *sigma,
@@ -334,6 +344,11 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             },
             Encoding::BandLimit { k } => phasefront::Encoding::BandLimit { k: *k },
             Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
+        });
+        to.encoder = phasefront::EncoderOptions {
+            dark: options.dark.unwrap_or(usual.dark),
+            local_steps: options.local_steps.map_or(usual.local_steps, |steps| steps as usize),
+            ..usual
         };
         to.encoder.brightness = match options.brightness {
             Brightness::Steady => phasefront::Brightness::Steady,

@@ -132,7 +132,10 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         None => Encoding::ANTI_ALIAS,
     };
     let plain = Target::from(&target.display);
-    let options = EncoderOptions { encoding, brightness };
+    let options = EncoderOptions {
+        brightness,
+        ..encoding.into()
+    };
     let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
     let Times {
         stages,
@@ -196,8 +199,8 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
     let (width, height) = case.size;
     let (name, _) = named(case.method);
     let options = EncoderOptions {
-        encoding: Encoding::ANTI_ALIAS,
         brightness: Brightness::Fixed(1.0),
+        ..Encoding::ANTI_ALIAS.into()
     };
     let by_table = (target.response.shape())
         .map(|_| Modulator::new((height, width), target, &options))

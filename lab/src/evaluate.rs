@@ -27,11 +27,12 @@ use phasefront::unstable::sweep::{
     hidden::{Hidden, NOTHING},
     hidden_reach,
 };
-use phasefront::{Brightness, Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
+use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Bins of a scene's depth histogram.
 pub const DEPTH_BINS: usize = 200;
@@ -49,6 +50,8 @@ pub struct Method<'a> {
     /// What it is called in tables and file names.
     pub name: String,
     field: Box<MakeField<'a>>,
+    /// What the field is trained for: takes the place of every encoding.
+    prefilter: Option<Arc<Network>>,
 }
 
 impl<'a> Method<'a> {
@@ -57,6 +60,7 @@ impl<'a> Method<'a> {
         Method {
             name: name.into(),
             field: Box::new(field),
+            prefilter: None,
         }
     }
 
@@ -145,9 +149,36 @@ impl<'a> Method<'a> {
                 true => plan.field(ldi, values, &mut plan.scratch())?,
                 false => plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?,
             }
-            remove_mean_phase(values);
             Ok(field)
         }))
+    }
+
+    /// A network with the pre-filter that it was trained with, which is part of every encoding.
+    ///
+    /// # Errors
+    /// As [`Self::network`].
+    pub fn pair(
+        name: impl Into<String>,
+        network: &Network,
+        prefilter: Arc<Network>,
+        size: usize,
+        display: &Display,
+    ) -> Result<Self> {
+        Ok(Method {
+            prefilter: Some(prefilter),
+            ..Self::network(name, network, size, display)?
+        })
+    }
+
+    /// How a field of this method becomes levels by `options`.
+    fn encoder(&self, options: &EncoderOptions) -> EncoderOptions {
+        EncoderOptions {
+            encoding: match &self.prefilter {
+                Some(prefilter) => Encoding::Deep(prefilter.clone()),
+                None => options.encoding.clone(),
+            },
+            ..options.clone()
+        }
     }
 }
 
@@ -202,8 +233,8 @@ pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
 pub struct Shown {
     /// What it is called in tables and file names.
     pub name: String,
-    /// How it becomes phases; `None`: it is shown as the complex field it is.
-    pub encoding: Option<Encoding>,
+    /// By what levels; `None`: it is shown as the complex field it is.
+    pub levels: Option<(Target, EncoderOptions)>,
 }
 
 impl Shown {
@@ -211,7 +242,14 @@ impl Shown {
     pub fn complex() -> Self {
         Shown {
             name: "complex".into(),
-            encoding: None,
+            levels: None,
+        }
+    }
+
+    fn of(&self, method: &Method<'_>) -> Self {
+        Shown {
+            name: self.name.clone(),
+            levels: (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options))),
         }
     }
 }
@@ -271,11 +309,11 @@ pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
 /// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration
 /// that is one for all depths, it looks through that (the paper's Fig. 8).
 pub struct Viewer {
-    display: Display,
     size: usize,
     optics: Option<AberratedOptics>,
     complex: Refocus,
-    apertured: Refocus,
+    /// z of the volume's ends.
+    ends_m: [f64; 2],
 }
 
 impl Viewer {
@@ -284,9 +322,8 @@ impl Viewer {
     /// # Errors
     /// A volume that cannot be propagated through, or an aberration that is none.
     pub fn new(manifest: &Manifest) -> Result<Self> {
-        let display = manifest.display.clone();
-        let ends = [0.5, -0.5].map(|part| part * display.volume_depth_m());
-        let plan = |aperture| Refocus::new(manifest.size, manifest.size, &display, &ends, aperture);
+        let display = &manifest.display;
+        let ends_m = [0.5, -0.5].map(|part| part * display.volume_depth_m());
         let correction = match manifest.aberration.is_empty() {
             true => None,
             false => match table::aberrations(&manifest.aberration)? {
@@ -297,35 +334,36 @@ impl Viewer {
         let shape = (manifest.size, manifest.size);
         Ok(Viewer {
             optics: correction
-                .map(|correction| AberratedOptics::new(shape, &display, &correction))
+                .map(|correction| AberratedOptics::new(shape, display, &correction))
                 .transpose()?,
-            complex: plan(None)?,
-            apertured: plan(Some(APERTURE_RADIUS))?,
+            complex: Refocus::new(manifest.size, manifest.size, display, &ends_m, None)?,
             size: manifest.size,
-            display,
+            ends_m,
         })
     }
 
-    /// The amplitudes of `field`, (3, H, W), at each of `z_m`, metres, where it is shown by `shown`.
+    /// The amplitudes of the midpoint hologram `field`, (3, H, W), at each of `z_m`, metres, where it is shown by `shown`.
     ///
     /// # Errors
-    /// A z outside of the volume, or an encoding that cannot be planned.
+    /// A z outside of the volume, or levels that cannot be planned.
     pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
-        let refocus = match shown.encoding.clone() {
+        let of_levels;
+        let refocus = match &shown.levels {
             None => &self.complex,
-            Some(encoding) => {
-                let target = Target::from(&self.display);
-                let options = EncoderOptions {
-                    encoding,
-                    brightness: Brightness::FrameMax,
-                };
-                let modulator = Modulator::new((size, size), &target, &options)?;
+            Some((target, options)) => {
+                let modulator = Modulator::new((size, size), target, options)?;
+                let mut scratch = modulator.scratch();
+                if !modulator.keeps_phase() {
+                    remove_mean_phase(&mut values);
+                }
+                modulator.propagate(&mut values, &mut scratch);
                 let mut levels = vec![0; values.len()];
-                let modulation = modulator.modulate(&mut values, &mut levels, &mut modulator.scratch());
+                let modulation = modulator.modulate(&mut values, &mut levels, &mut scratch);
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
-                &self.apertured
+                of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(APERTURE_RADIUS))?;
+                &of_levels
             }
         };
         if let Some(optics) = &self.optics {
@@ -372,7 +410,7 @@ pub fn evaluate(
             for method in methods {
                 let field = (method.field)(&pair.ldi)?;
                 for shown in shown {
-                    figures.push(judge(&viewer.views(&field, shown, &z_m)?, &truth)?);
+                    figures.push(judge(&viewer.views(&field, &shown.of(method), &z_m)?, &truth)?);
                 }
             }
             done();
@@ -430,7 +468,9 @@ pub fn write_picture(
 ) -> Result<()> {
     let viewer = Viewer::new(manifest)?;
     let pair = dataset::read_pair(manifest, dir, index)?;
-    let ours = viewer.views(&(method.field)(&pair.ldi)?, shown, &[0.0])?.remove(0);
+    let ours = viewer
+        .views(&(method.field)(&pair.ldi)?, &shown.of(method), &[0.0])?
+        .remove(0);
     let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.remove(0);
     let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
     let gap = Array3::from_elem((3, manifest.size, 4), 1.0);

@@ -2,15 +2,16 @@
 
 use crate::error::{Error, Result};
 use phasefront::Network;
+use phasefront_models::NETWORKS;
 pub use phasefront_models::Precision;
-use phasefront_models::{NETWORKS, PAIRS};
 use std::path::Path;
 use std::sync::Arc;
 
 /// The name of the seeded network that comes along.
 pub const SEEDED: &str = "seeded-6";
 
-/// The name of the networks that come along with a pre-filter, for the deep double phase method.
+/// The name of the pairs that come along with a pre-filter, for the deep double phase method: the one for the offset is
+/// meant.
 pub const DEEP: &str = "ddpm-8";
 
 /// The network called `name`, `8` and `15` being short for `rgbd-8` and `rgbd-15`, where one comes along; or of an ONNX
@@ -28,8 +29,7 @@ pub fn network(name: &str, precision: Precision) -> Result<Arc<Network>> {
     }
     let path = Path::new(name);
     let bytes = std::fs::read(path).map_err(|e| {
-        let names = NETWORKS.iter().map(|model| model.name);
-        let names: Vec<_> = names.chain(PAIRS.iter().map(|pair| pair.name)).collect();
+        let names: Vec<_> = NETWORKS.iter().map(|model| model.name).chain([DEEP]).collect();
         Error::file(
             path,
             format!(

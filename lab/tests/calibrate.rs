@@ -279,8 +279,8 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
     // The same light for both: by its largest amplitude the corrected field, which has higher peaks, would be dimmer by
     // a quarter.
     let options = EncoderOptions {
-        encoding: Encoding::ANTI_ALIAS,
         brightness: Brightness::Fixed(1.0),
+        ..Encoding::ANTI_ALIAS.into()
     };
     let encoded = |field: &Array3<Complex32>, correct: bool| {
         let target = Target {

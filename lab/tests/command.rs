@@ -654,18 +654,47 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
     let whole = [&other[..], &["--network", "ddpm-8"]].concat();
     folder.refuses(&whole, 1, &["brings its own --encoder"]);
     assert!(!folder.path("h.png").exists());
-    for (more, encoder) in [
-        (&[][..], "deep"),
-        (&["--network", "ddpm-8"], "deep"),
-        (&["--offset-mm", "6"], "deep"),
-        (&["--offset-mm", "3"], "anti-alias"),
-        (&["--network", "8"], "anti-alias"),
-        (&["--method", "sweep"], "anti-alias"),
-    ] {
+    let made = |more: &[&str]| -> serde_json::Value {
         let call = [&with(&["-o", "h.png", "--json"])[..], more].concat();
-        let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&call)).unwrap();
-        assert_eq!(made["encoder"], encoder, "{more:?}: {made}");
+        serde_json::from_str(&folder.succeeds(&call)).unwrap()
+    };
+    for more in [&["--network", "ddpm-8"][..], &["--encoder", "deep", "--offset-mm", "6"]] {
+        let made = made(more);
+        assert_eq!(made["encoder"], "deep", "{more:?}: {made}");
+        assert_eq!(
+            (made["dark"].as_f64(), made["local_steps"].as_u64()),
+            (Some(0.0), Some(0))
+        );
     }
+    for more in [
+        &[][..],
+        &["--offset-mm", "6"],
+        &["--network", "8"],
+        &["--method", "sweep"],
+    ] {
+        let made = made(more);
+        assert_eq!(made["encoder"], "anti-alias", "{more:?}: {made}");
+        assert!((made["dark"].as_f64().unwrap() - 0.4).abs() < 1e-6 && made["local_steps"] == 1);
+    }
+    let plain = made(&["--dark", "0", "--local-steps", "0"]);
+    assert_eq!(
+        (plain["dark"].as_f64(), plain["local_steps"].as_u64()),
+        (Some(0.0), Some(0))
+    );
+    let call = with(&["-o", "h.png"]);
+    folder.refuses(&[&call[..], &["--local-steps", "9"]].concat(), 1, &["at most 8"]);
+    folder.refuses(&[&call[..], &["--dark", "1.5"]].concat(), 1, &["from 0 to 1"]);
+}
+
+#[test]
+fn a_display_that_no_network_was_trained_for_gets_the_sweep() {
+    let folder = Folder::new().with_frame();
+    fs::write(folder.path("fine.toml"), "pitch_um = 3.74").unwrap();
+    let call = with(&["-o", "h.png", "--json", "--display", "fine.toml"]);
+    let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&call)).unwrap();
+    assert_eq!(made["method"], "sweep", "{made}");
+    let named = [&call[..], &["--network", "8"]].concat();
+    folder.refuses(&named, 1, &["pitch"]);
 }
 
 #[test]

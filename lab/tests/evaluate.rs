@@ -64,10 +64,14 @@ impl Data {
     }
 }
 
-fn encoded(name: &str, encoding: Encoding) -> Shown {
+fn encoded(display: &Display, name: &str, encoding: Encoding) -> Shown {
+    let options = EncoderOptions {
+        brightness: Brightness::FrameMax,
+        ..encoding.into()
+    };
     Shown {
         name: name.into(),
-        encoding: Some(encoding),
+        levels: Some((display.into(), options)),
     }
 }
 
@@ -204,18 +208,15 @@ fn encoded_fields_are_judged_as_their_files_look() {
     let data = Data::new();
     let display = &data.manifest.display;
     let shown = [
-        encoded("double", Encoding::DoublePhase),
-        encoded("anti-alias", Encoding::ANTI_ALIAS),
+        encoded(display, "double", Encoding::DoublePhase),
+        encoded(display, "anti-alias", Encoding::ANTI_ALIAS),
     ];
     let rows = data.evaluate(&[Method::layers(display, PLANES)], &shown);
     for (row, shown) in rows.iter().zip(&shown) {
         assert_eq!(row.shown, shown.name);
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
-        let options = EncoderOptions {
-            encoding: shown.encoding.clone().unwrap(),
-            brightness: Brightness::FrameMax,
-        };
-        let modulator = Modulator::new((SIZE, SIZE), &display.into(), &options).unwrap();
+        let (target, options) = shown.levels.as_ref().unwrap();
+        let modulator = Modulator::new((SIZE, SIZE), target, options).unwrap();
         let mut field = pair.hologram.clone();
         let mut levels = Array3::zeros((3, SIZE, SIZE));
         let modulation = modulator.modulate(
@@ -306,9 +307,9 @@ fn the_command_prints_figures_and_draws_the_worst() {
         names,
         [
             ("rgb", "complex"),
-            ("rgb", "band-limit"),
+            ("rgb", "band-limit, dark 0.4, 1 steps"),
             ("visible", "complex"),
-            ("visible", "band-limit")
+            ("visible", "band-limit, dark 0.4, 1 steps")
         ]
     );
     let worst = |i: usize| {
@@ -318,6 +319,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
         worst[0].as_u64().unwrap()
     };
     for (i, (method, shown)) in names.iter().enumerate() {
+        let shown = shown.replace(", ", "-").replace(' ', "-");
         let name = format!("{method}-{shown}-worst-1-scene-{:06}.png", worst(i));
         let picture = files::read_rgb(&pictures.join(name)).unwrap();
         assert_eq!(picture.dim(), (3, SIZE, 4 * SIZE + 12));

@@ -9,7 +9,7 @@
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 
-use phasefront::{Display, Encoding, Method, Network, SessionOptions, Sweep, Target};
+use phasefront::{Display, Method, Network, SessionOptions, Sweep, Target};
 use std::sync::Arc;
 
 /// Numbers that a network computes in.
@@ -151,20 +151,20 @@ pub fn pair_for(display: &Display, precision: Precision) -> Option<DeepPair> {
     pairs.find(|pair| pair.prefilter.check_prefilter(display).is_ok())
 }
 
-/// What is usual for `target`: the pair that was trained for its display, in int8; the plane sweep where there is none.
+/// The network that is usual for `display`: 8 layers, in int8; None where it was not trained for it.
+pub fn usual_network(display: &Display) -> Option<Arc<Network>> {
+    network("rgbd-8", Precision::Int8).filter(|network| network.check_display(display).is_ok())
+}
+
+/// What is usual for `target`: a network where one was trained for its display, else the plane sweep; AA-DPM with one
+/// local step.
 pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     let target = target.into();
-    match pair_for(&target.display, Precision::Int8) {
-        Some(pair) => {
-            let mut options = SessionOptions::new(target, Method::Network(pair.hologram));
-            options.encoder.encoding = Encoding::Deep(pair.prefilter);
-            options
-        }
-        None => {
-            let sweep = Sweep::for_display(&target.display);
-            SessionOptions::new(target, Method::Sweep(sweep))
-        }
-    }
+    let method = match usual_network(&target.display) {
+        Some(network) => Method::Network(network),
+        None => Method::Sweep(Sweep::for_display(&target.display)),
+    };
+    SessionOptions::new(target, method)
 }
 
 /// The README's code compiles.
@@ -198,16 +198,18 @@ mod tests {
     }
 
     #[test]
-    fn a_display_gets_its_pair_or_the_sweep() {
-        for (offset_mm, paired) in [(0.0, true), (6.0, true), (12.0, true), (3.0, false)] {
-            let display = Display::default().with_offset_m(offset_mm * 1e-3).unwrap();
+    fn a_display_gets_a_network_that_was_trained_for_it_or_the_sweep() {
+        for (display, trained, paired) in [
+            ("offset_mm = 0", true, true),
+            ("offset_mm = 6", true, true),
+            ("offset_mm = 3", true, false),
+            ("pitch_um = 3.74", false, false),
+        ] {
+            let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
-            let options = session_options(display);
-            let deep = matches!(options.encoder.encoding, Encoding::Deep(_));
-            assert_eq!(deep, paired, "{offset_mm} mm");
-            assert_eq!(matches!(options.ladder[0].method, Method::Sweep(_)), !paired);
+            let method = &session_options(display).ladder[0].method;
+            assert_eq!(matches!(method, Method::Network(_)), trained, "{method:?}");
+            assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");
         }
-        let other = Display::from_toml("pitch_um = 3.74").unwrap();
-        assert!(pair_for(&other, Precision::Int8).is_none());
     }
 }

@@ -58,7 +58,7 @@ fn encode(bencher: Bencher<'_, '_>, name: &str) {
         "band-limit" => Encoding::BAND_LIMIT,
         _ => Encoding::DoublePhase,
     };
-    let encoder = Encoder::new(SIZE, &Target::default(), &encoding).unwrap();
+    let encoder = Encoder::new(SIZE, &Target::default(), &encoding.into()).unwrap();
     let (mut field, mut scratch) = (field(3), encoder.scratch());
     let mut levels = vec![0; field.len()];
     let run = || encoder.encode_levels(&mut field, Some(1.0), &mut levels, &mut scratch);

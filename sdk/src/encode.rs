@@ -6,21 +6,17 @@
 
 pub mod anti_alias;
 pub mod band_limit;
+mod dark;
 pub mod deep;
 pub mod double_phase;
+mod encoder;
+pub mod local;
+mod start;
 
 use crate::brightness::Brightness;
 use crate::error::{Error, Result};
-use crate::illumination::Illumination;
 use crate::network::Network;
-use crate::slm::Response;
-use crate::target::Target;
-use crate::wave::fft::ConvolveScratch;
-use anti_alias::{AntiAlias, AntiAliasScratch};
-use band_limit::BandLimit;
-use deep::{Deep, DeepScratch};
-use num_complex::Complex32;
-use rayon::prelude::*;
+pub use encoder::{Encoder, EncoderScratch};
 use std::sync::Arc;
 
 /// A way from a field to phases.
@@ -64,205 +60,59 @@ pub struct EncoderOptions {
     pub encoding: Encoding,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
+    /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase, which
+    /// shows noise there as coloured speckle. 0 leaves phases as they are.
+    pub dark: f32,
+    /// Steps of local correction: each draws what is shown behind the display's aperture toward the field that is
+    /// wanted. The first brings most; 8 at most.
+    pub local_steps: usize,
+}
+
+impl EncoderOptions {
+    /// The usual [`Self::dark`], chosen on validation scenes.
+    pub const DARK: f32 = 0.4;
+
+    /// # Errors
+    /// A number out of its range.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.brightness.check()?;
+        if !(0.0..=1.0).contains(&self.dark) {
+            return Err(Error::Plan(format!(
+                "dark is {}; it must be a share of full light from 0 to 1",
+                self.dark
+            )));
+        }
+        if self.local_steps > local::MAX_STEPS {
+            return Err(Error::Plan(format!(
+                "{} local steps; there must be at most {}, and after the second they bring nothing",
+                self.local_steps,
+                local::MAX_STEPS
+            )));
+        }
+        Ok(())
+    }
 }
 
 impl Default for EncoderOptions {
-    /// AA-DPM, steady brightness.
+    /// AA-DPM, corrected by one local step; steady brightness.
     fn default() -> Self {
         Encoding::ANTI_ALIAS.into()
     }
 }
 
 impl From<Encoding> for EncoderOptions {
-    /// This encoding, the rest as usual.
+    /// This encoding, steady brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two: with
+    /// it both are 0.
     fn from(encoding: Encoding) -> Self {
+        let (dark, local_steps) = match encoding {
+            Encoding::Deep(_) => (0.0, 0),
+            _ => (Self::DARK, 1),
+        };
         EncoderOptions {
             encoding,
             brightness: Brightness::default(),
+            dark,
+            local_steps,
         }
-    }
-}
-
-/// A plan for one encoding and shape. Immutable; shared between threads.
-pub struct Encoder {
-    height: usize,
-    width: usize,
-    prefilter: Prefilter,
-    /// With (H, W) of the modulator, in whose middle the hologram stands.
-    /// With (H, W) of the modulator, in whose middle the hologram stands.
-    illumination: Option<(Illumination, (usize, usize))>,
-    response: Response,
-}
-
-enum Prefilter {
-    None,
-    AntiAlias(AntiAlias),
-    BandLimit(BandLimit),
-    Deep(Deep),
-}
-
-/// Working memory of an [`Encoder`] for one call at a time.
-pub struct EncoderScratch {
-    prefilter: Option<PrefilterScratch>,
-    /// The largest |u|² of each row.
-    most: Vec<f32>,
-}
-
-enum PrefilterScratch {
-    AntiAlias(AntiAliasScratch),
-    Spectrum(ConvolveScratch),
-    Deep(DeepScratch),
-}
-
-impl Encoder {
-    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
-    /// divided by the light that falls there.
-    ///
-    /// # Errors
-    /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
-    pub fn new(shape: (usize, usize), target: &Target, encoding: &Encoding) -> Result<Self> {
-        let (height, width) = shape;
-        if height == 0 || width == 0 {
-            return Err(Error::Plan(format!(
-                "a plane of {width}×{height} is empty; each side must be at least 1"
-            )));
-        }
-        target.check()?;
-        let prefilter = match encoding {
-            Encoding::DoublePhase => Prefilter::None,
-            Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
-            Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, *k)?),
-            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network)?),
-        };
-        let illumination = target.illumination.clone();
-        Ok(Encoder {
-            height,
-            width,
-            prefilter,
-            illumination: illumination.map(|light| (light, target.modulator())),
-            response: target.response.clone().centred(height, width)?,
-        })
-    }
-
-    /// Working memory for one call at a time.
-    pub fn scratch(&self) -> EncoderScratch {
-        let prefilter = match &self.prefilter {
-            Prefilter::None => None,
-            Prefilter::AntiAlias(plan) => Some(PrefilterScratch::AntiAlias(plan.scratch(self.width))),
-            Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
-            Prefilter::Deep(plan) => Some(PrefilterScratch::Deep(plan.scratch())),
-        };
-        EncoderScratch {
-            prefilter,
-            most: vec![0.0; 3 * self.height],
-        }
-    }
-
-    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it used, the amplitude
-    /// that full light stands for: `scale`, or the field's largest amplitude. `field` is worked on: what it holds
-    /// afterwards means nothing. Allocates nothing.
-    ///
-    /// # Panics
-    /// If `field` or `phase` has not 3·H·W values.
-    pub fn encode(
-        &self,
-        field: &mut [Complex32],
-        scale: Option<f32>,
-        phase: &mut [f32],
-        scratch: &mut EncoderScratch,
-    ) -> f32 {
-        let scale = self.prepare(field, scale, scratch);
-        self.rows(field, phase, scratch, |row, values, phases| {
-            double_phase::encode_row(values, row % self.height, scale, phases);
-        });
-        scale
-    }
-
-    /// [`Self::encode`] straight to the target's levels.
-    ///
-    /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
-    pub fn encode_levels(
-        &self,
-        field: &mut [Complex32],
-        scale: Option<f32>,
-        levels: &mut [u8],
-        scratch: &mut EncoderScratch,
-    ) -> f32 {
-        let scale = self.prepare(field, scale, scratch);
-        self.rows(field, levels, scratch, |row, values, levels| {
-            let (y, first) = (row % self.height, row * self.width);
-            double_phase::encode_row_levels(values, y, scale, &self.response, first, levels);
-        });
-        scale
-    }
-
-    /// The filters that need the whole field at once, the light where no filter by rows comes after it, and the scale.
-    fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
-        let plane = self.height * self.width;
-        assert_eq!(field.len(), 3 * plane);
-        match (&self.prefilter, &mut scratch.prefilter) {
-            (Prefilter::BandLimit(plan), Some(PrefilterScratch::Spectrum(scratch))) => {
-                for plane in field.chunks_exact_mut(plane) {
-                    plan.filter(plane, scratch);
-                }
-            }
-            (Prefilter::Deep(plan), Some(PrefilterScratch::Deep(scratch))) => {
-                plan.filter(field, scratch);
-            }
-            _ => {}
-        }
-        if let Some((illumination, modulator)) = &self.illumination
-            && !matches!(self.prefilter, Prefilter::AntiAlias(_))
-        {
-            illumination.divide(field, (self.height, self.width), *modulator);
-        }
-        match scale {
-            Some(scale) => scale,
-            None => {
-                let mut most = std::mem::take(&mut scratch.most);
-                self.rows(field, &mut most, scratch, |_, values, most| {
-                    most[0] = double_phase::max_norm_sqr(values);
-                });
-                let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
-                scratch.most = most;
-                scale
-            }
-        }
-    }
-
-    /// Hands each row of `field`, filtered by what needs some rows alone, and divided by the light, to `then`: its
-    /// index in the stack, its values, and its part of `out`.
-    fn rows<T: Send>(
-        &self,
-        field: &[Complex32],
-        out: &mut [T],
-        scratch: &mut EncoderScratch,
-        then: impl Fn(usize, &[Complex32], &mut [T]) + Sync,
-    ) {
-        let (height, width) = (self.height, self.width);
-        let per_row = out.len() / (3 * height);
-        assert!(out.len() == 3 * height * per_row && (per_row == 1 || per_row == width));
-        if let (Prefilter::AntiAlias(plan), Some(PrefilterScratch::AntiAlias(scratch))) =
-            (&self.prefilter, &mut scratch.prefilter)
-        {
-            let planes = field.chunks_exact(height * width);
-            let outs = out.chunks_exact_mut(height * per_row);
-            for (colour, (plane, out)) in planes.zip(outs).enumerate() {
-                plan.rows(plane, width, out, scratch, |y, values, out| {
-                    let row = colour * height + y;
-                    if let Some((illumination, modulator)) = &self.illumination {
-                        illumination.divide_row(values, row, height, *modulator);
-                    }
-                    then(row, values, out);
-                });
-            }
-            return;
-        }
-        field
-            .par_chunks_exact(width)
-            .zip(out.par_chunks_exact_mut(per_row))
-            .enumerate()
-            .for_each(|(row, (values, out))| then(row, values, out));
     }
 }

@@ -107,6 +107,11 @@ impl Illumination {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 
+    /// The laser's amplitude on row `row` of a stack of planes of `height` rows, 1 at its brightest.
+    pub(crate) fn light_row(&self, light: &mut [f32], row: usize, height: usize, modulator: (usize, usize)) {
+        wide!(self.change_row(light, row, height, modulator, |light, gain| *light = 1.0 / gain));
+    }
+
     fn each_row(
         &self,
         field: &mut [Complex32],
@@ -122,13 +127,13 @@ impl Illumination {
     }
 
     #[inline(always)]
-    fn change_row(
+    fn change_row<T>(
         &self,
-        mut values: &mut [Complex32],
+        mut values: &mut [T],
         row: usize,
         height: usize,
         modulator: (usize, usize),
-        change: impl Fn(&mut Complex32, f32),
+        change: impl Fn(&mut T, f32),
     ) {
         let width = values.len();
         let (rows, columns) = (modulator.0.max(height), modulator.1.max(width));

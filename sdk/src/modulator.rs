@@ -57,7 +57,6 @@ impl Modulator {
     /// # Errors
     /// As [`Self::new`].
     pub(crate) fn from_z(shape: (usize, usize), z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
-        options.brightness.check()?;
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
         }
@@ -66,7 +65,7 @@ impl Modulator {
             height: shape.0,
             width: shape.1,
             offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
-            encoder: Encoder::new(shape, target, &options.encoding)?,
+            encoder: Encoder::new(shape, target, options)?,
             keeps_phase: options.encoding.keeps_phase(),
             brightness: options.brightness,
         })

@@ -219,8 +219,8 @@ mod tests {
             ..home.into()
         };
         let options = EncoderOptions {
-            encoding: Encoding::DoublePhase,
             brightness: Brightness::FrameMax,
+            ..Encoding::DoublePhase.into()
         };
         let home = Modulator::new(SHAPE, &target, &options).unwrap();
         let mut scratch = home.scratch();

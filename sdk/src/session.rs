@@ -105,7 +105,7 @@ impl SessionOptions {
             )));
         }
         self.target.check()?;
-        self.encoder.brightness.check()?;
+        self.encoder.check()?;
         self.depth.check()
     }
 }

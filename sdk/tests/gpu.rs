@@ -232,7 +232,10 @@ fn planned(
     brightness: Brightness,
 ) -> Job {
     Job {
-        encoder: EncoderOptions { encoding, brightness },
+        encoder: EncoderOptions {
+            brightness,
+            ..encoding.into()
+        },
         ..Job::new(shape, method, display)
     }
 }

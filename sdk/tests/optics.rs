@@ -37,13 +37,13 @@ fn propagated(plane: &[Complex32], (h, w): (usize, usize), s: f64, padding: Padd
 /// Each frame by its largest amplitude.
 fn largest(encoding: Encoding) -> EncoderOptions {
     EncoderOptions {
-        encoding,
         brightness: Brightness::FrameMax,
+        ..encoding.into()
     }
 }
 
 fn double_phase_encoder(shape: (usize, usize)) -> Encoder {
-    Encoder::new(shape, &Target::default(), &Encoding::DoublePhase).unwrap()
+    Encoder::new(shape, &Target::default(), &Encoding::DoublePhase.into()).unwrap()
 }
 
 fn energy(plane: &[Complex32]) -> f64 {
@@ -221,7 +221,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
     };
     let field = Array3::from_shape_fn((3, h, w), |(c, y, x)| smooth(c, y, x));
     for encoding in [Encoding::DoublePhase, Encoding::ANTI_ALIAS, Encoding::BAND_LIMIT] {
-        let encoder = Encoder::new((h, w), &Target::default(), &encoding).unwrap();
+        let encoder = Encoder::new((h, w), &Target::default(), &encoding.clone().into()).unwrap();
         let mut phase = vec![0.0; 3 * h * w];
         let mut given = field.clone().into_raw_vec_and_offset().0;
         let scale = encoder.encode(&mut given, None, &mut phase, &mut encoder.scratch());
@@ -387,8 +387,8 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         ..display.into()
     };
     let options = EncoderOptions {
-        encoding: Encoding::ANTI_ALIAS,
         brightness: Brightness::Fixed(2.5),
+        ..Encoding::ANTI_ALIAS.into()
     };
     let plan = Modulator::new((h, w), &target, &options).unwrap();
     let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
@@ -508,7 +508,7 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                 for threads in [1, 3] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                     pool.build().unwrap().install(|| {
-                        let encoder = Encoder::new((h, w), &target, &encoding).unwrap();
+                        let encoder = Encoder::new((h, w), &target, &encoding.clone().into()).unwrap();
                         let mut scratch = encoder.scratch();
                         let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
                         let scaled = encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);

@@ -249,22 +249,44 @@ def test_networks_that_are_none_are_named(tmp_path):
     assert (info.layers, info.pitch_um) == (8, 8.0)
 
 
-def test_the_pair_that_is_built_in_is_usual():
-    for offset_mm in (0, 6, 12):
+def test_the_network_that_is_built_in_is_usual():
+    for offset_mm in (0, 3, 12):
         display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
         options = session_options(target=display)
-        assert isinstance(options.encoding, Encoding.DEEP)
+        assert isinstance(options.ladder[0].method, Method.TRAINED)
+        assert isinstance(options.encoding, Encoding.ANTI_ALIAS)
         with Session(options) as session:
-            frame = Frame(numpy.full((48, 64, 3), 200, numpy.uint8), numpy.ones((48, 64), numpy.float32))
-            assert session.process(frame).levels.shape == (3, 48, 64)
+            assert session.process(still()).levels.shape == (3, 48, 64)
 
 
-def test_without_a_pair_the_sweep_is_usual():
-    options = session_options(target=phasefront.Display(width=64, height=48, offset_mm=3))
+def test_the_pair_that_is_built_in_can_be_taken():
+    pair = phasefront.built_in_pair(6)
+    display = phasefront.Display(width=64, height=48, offset_mm=6)
+    options = session_options(pair.hologram, display, encoding=Encoding.DEEP(prefilter=pair.prefilter))
+    with Session(options) as session:
+        assert session.process(still()).levels.shape == (3, 48, 64)
+
+
+def test_steps_and_dark_can_be_set(display):
+    def levels(**changes):
+        with Session(session_options(target=display, **changes)) as session:
+            return session.process(still()).levels
+
+    usual = levels()
+    assert (levels(dark=0.4, local_steps=1) == usual).all()
+    assert (levels(local_steps=0) != usual).any()
+    with pytest.raises(PhasefrontError, match="at most 8"):
+        levels(local_steps=9)
+    with pytest.raises(PhasefrontError, match="from 0 to 1"):
+        levels(dark=2.0)
+
+
+def test_without_a_network_the_sweep_is_usual():
+    options = session_options(target=phasefront.Display(width=64, height=48, pitch_um=3.74))
     assert isinstance(options.ladder[0].method, Method.SWEEP)
     with Session(options) as session:
         assert session.process(still()).levels.shape == (3, 48, 64)
-    with pytest.raises(PhasefrontError.Network, match="pairs for 0, 6 and 12"):
+    with pytest.raises(PhasefrontError.Network, match="pairs for 0, 6, 12 mm"):
         phasefront.built_in_pair(3)
 
 

@@ -274,19 +274,42 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(try Session(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
     }
 
-    func testThePairThatIsBuiltInIsUsual() throws {
-        for offset in [0.0, 6, 12] {
+    func testTheNetworkThatIsBuiltInIsUsual() throws {
+        for offset in [0.0, 3, 12] {
             let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
-            guard case .deep = usual.encoding else { return XCTFail("\(usual.encoding)") }
+            guard case .trained = usual.ladder[0].method else { return XCTFail("\(usual.ladder)") }
+            guard case .antiAlias = usual.encoding else { return XCTFail("\(usual.encoding)") }
             _ = try Session(usual, mode: .image).process(still())
         }
     }
 
-    func testWithoutAPairTheSweepIsUsual() throws {
-        let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: 3))
+    func testThePairThatIsBuiltInCanBeTaken() throws {
+        let pair = try builtInPair(offsetMm: 6)
+        let display = Display(width: 64, height: 48, offsetMm: 6)
+        var options = try SessionOptions(display: display, network: pair.hologram)
+        options.encoding = .deep(prefilter: pair.prefilter)
+        _ = try Session(options, mode: .image).process(still())
+    }
+
+    func testStepsAndDarkCanBeSet() throws {
+        let usual = try SessionOptions(display: smallDisplay)
+        let levels = try Session(usual, mode: .image).process(still()).levels()
+        var options = usual
+        (options.dark, options.localSteps) = (0.4, 1)
+        XCTAssertEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        options.localSteps = 0
+        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        options.localSteps = 9
+        assertRefused("at most 8") { try Session(options, mode: .image) }
+        (options.dark, options.localSteps) = (2, nil)
+        assertRefused("from 0 to 1") { try Session(options, mode: .image) }
+    }
+
+    func testWithoutANetworkTheSweepIsUsual() throws {
+        let usual = try SessionOptions(display: Display(width: 64, height: 48, pitchUm: 3.74))
         guard case .sweep = usual.ladder[0].method else { return XCTFail("\(usual.ladder)") }
         _ = try Session(usual, mode: .image).process(still())
-        assertRefused("pairs for 0, 6 and 12") { try builtInPair(offsetMm: 3) }
+        assertRefused("pairs for 0, 6, 12 mm") { try builtInPair(offsetMm: 3) }
     }
 
     func testMessagesReachTheLog() throws {

@@ -437,8 +437,8 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
     let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
     // Where the laser is weakest the modulator must be able to make up for it.
     let options = EncoderOptions {
-        encoding: Encoding::DoublePhase,
         brightness: Brightness::Fixed(1.0),
+        ..Encoding::DoublePhase.into()
     };
     let plan = Modulator::new(shape, target, &options)?;
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));

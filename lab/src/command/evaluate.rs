@@ -4,8 +4,9 @@ use super::flags::EncoderName;
 use super::flags::progress_bar;
 use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
+use phasefront::target::Response;
 use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
-use phasefront::{Display, Sweep};
+use phasefront::{Display, EncoderOptions, Sweep, Target};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Method, Row, Shown};
 use phasefront_lab::{Error, Result, models};
@@ -25,7 +26,7 @@ pub(crate) struct Evaluate {
         value_enum,
         value_name = "NAME,…",
         value_delimiter = ',',
-        required_unless_present = "network"
+        required_unless_present_any = ["network", "pair"]
     )]
     method: Vec<MethodName>,
     /// Networks to judge, separated by commas: one that comes along, or an ONNX file
@@ -34,9 +35,24 @@ pub(crate) struct Evaluate {
     /// Numbers that networks which come along compute in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
     precision: PrecisionName,
+    /// Judge the pair of networks that comes along for the offset as well; its pre-filter takes the place of --encoder
+    #[arg(long)]
+    pair: bool,
     /// Encoders to judge as well, separated by commas; the complex field always is
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     encoder: Vec<EncoderName>,
+    /// Each encoder with each of these amounts of dark: shares of full light below which phases are drawn to 0
+    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK])]
+    dark: Vec<f32>,
+    /// Each encoder with each of these numbers of local steps of correction
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1])]
+    local_steps: Vec<usize>,
+    /// z of encoded holograms against the middle of the volume, mm, positive toward the viewer
+    #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
+    offset_mm: f64,
+    /// Bits of the modulator that encoded holograms are for
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    bits: u32,
     /// Which pairs
     #[arg(long, value_enum, default_value_t = Split::Test)]
     split: Split,
@@ -99,19 +115,7 @@ impl Evaluate {
         };
         let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
         let methods = self.methods(&manifest)?;
-        let mut shown = vec![Shown::complex()];
-        for encoder in &self.encoder {
-            let encoding = encoder.encoding(None).map_err(|_| {
-                Error::Input(format!(
-                    "--encoder {} needs the network that its pre-filter was trained with: `python -m phasefront_training evaluate-encoding` judges the pair",
-                    encoder.name()
-                ))
-            })?;
-            shown.push(Shown {
-                name: encoder.name().into(),
-                encoding: Some(encoding),
-            });
-        }
+        let shown = self.shown(&manifest.display)?;
         if let Some(dir) = &self.pictures {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }
@@ -127,7 +131,7 @@ impl Evaluate {
                     let name = format!(
                         "{}-{}-worst-{}-scene-{index:06}.png",
                         file_stem(&row.method),
-                        row.shown,
+                        row.shown.replace(", ", "-").replace(' ', "-"),
                         rank + 1
                     );
                     evaluate::write_picture(&dir.join(name), &manifest, &self.data, index, method, shown)?;
@@ -137,6 +141,7 @@ impl Evaluate {
         let value = json!({
             "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
             "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
+            "offset_mm": self.offset_mm, "bits": self.bits,
             "focal_stack": {
                 "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
             },
@@ -144,6 +149,35 @@ impl Evaluate {
         });
         super::print(json, &value, table(&rows, scenes.len(), split));
         Ok(())
+    }
+
+    fn shown(&self, display: &Display) -> Result<Vec<Shown>> {
+        let target = Target {
+            response: Response::linear(self.bits)?,
+            ..display.clone().with_offset_m(self.offset_mm / 1e3)?.into()
+        };
+        let mut shown = vec![Shown::complex()];
+        for encoder in &self.encoder {
+            let encoding = encoder.encoding(None).map_err(|_| {
+                Error::Input(format!(
+                    "--encoder {} needs the network that its pre-filter was trained with: --pair judges those that come along, `python -m phasefront_training evaluate-encoding` others",
+                    encoder.name()
+                ))
+            })?;
+            let each = (self.dark.iter()).flat_map(|dark| self.local_steps.iter().map(move |steps| (*dark, *steps)));
+            shown.extend(each.map(|(dark, local_steps)| Shown {
+                name: format!("{}, dark {dark}, {local_steps} steps", encoder.name()),
+                levels: Some((
+                    target.clone(),
+                    EncoderOptions {
+                        dark,
+                        local_steps,
+                        ..encoding.clone().into()
+                    },
+                )),
+            }));
+        }
+        Ok(shown)
     }
 
     fn sweep(&self, display: &Display) -> Sweep {
@@ -175,6 +209,22 @@ impl Evaluate {
             let method = Method::network(label, &network, manifest.size, &manifest.display);
             methods.push(method.map_err(|e| Error::file(name, e))?);
         }
+        if self.pair {
+            let target = display.clone().with_offset_m(self.offset_mm / 1e3)?;
+            let pair = phasefront_models::pair_for(&target, self.precision.precision()).ok_or_else(|| {
+                Error::Input(format!(
+                    "no pair comes along for an offset of {} mm and this display",
+                    self.offset_mm
+                ))
+            })?;
+            methods.push(Method::pair(
+                "pair",
+                &pair.hologram,
+                pair.prefilter,
+                manifest.size,
+                &target,
+            )?);
+        }
         Ok(methods)
     }
 }
@@ -191,8 +241,14 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
         .max()
         .unwrap_or(0)
         .max(6);
+    let ways = rows
+        .iter()
+        .map(|row| row.shown.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(10);
     let mut text = format!(
-        "{:width$}  {:10}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "{:width$}  {:ways$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  worst PSNR dB (scene)   ({scenes} scenes of {split})",
         "method", "shown"
     );
     for row in rows {
@@ -203,7 +259,7 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
             .map(|(_, f)| f.amplitude_psnr)
             .fold(f64::INFINITY, f64::min);
         text += &format!(
-            "\n{:width$}  {:10}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {least:13.2} ({worst})",
+            "\n{:width$}  {:ways$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {least:13.2} ({worst})",
             row.method,
             row.shown,
             row.mean.amplitude_psnr,

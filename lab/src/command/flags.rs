@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use phasefront::unstable::depth::DepthUnit;
 use phasefront::unstable::gpu::DeviceOptions;
-use phasefront::{Display, Encoding, Network, RgbdFrame};
+use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::models::Precision;
 use phasefront_lab::rgbd::{self, DepthOptions};
@@ -39,19 +39,33 @@ impl DisplayFlags {
 /// How the field becomes phases.
 #[derive(Args)]
 pub(crate) struct EncoderFlags {
-    /// How the field becomes phases [default: deep by the networks that come along, where they are for the display, its
-    /// offset, and no other network or method is asked for; else anti-alias]
+    /// How the field becomes phases [default: anti-alias; deep with --network ddpm-8]
     #[arg(long, value_enum)]
     encoder: Option<EncoderName>,
     /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: the one of --network ddpm-8]
     #[arg(long, value_name = "FILE")]
     prefilter: Option<String>,
+    /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0 with
+    /// --encoder deep]
+    #[arg(long, value_name = "D")]
+    dark: Option<f32>,
+    /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
+    #[arg(long, value_name = "N")]
+    local_steps: Option<usize>,
 }
 
 /// How a field becomes phases, and what it is called.
+#[derive(Clone)]
 pub(crate) struct Encoder {
-    pub(crate) encoding: Encoding,
+    pub(crate) options: EncoderOptions,
     pub(crate) name: &'static str,
+}
+
+impl Encoder {
+    pub(crate) fn describe(&self) -> String {
+        let EncoderOptions { dark, local_steps, .. } = &self.options;
+        format!("{}, dark {dark}, local steps {local_steps}", self.name)
+    }
 }
 
 impl EncoderFlags {
@@ -62,14 +76,28 @@ impl EncoderFlags {
             None => None,
         };
         let name = self.encoder.unwrap_or(EncoderName::AntiAlias);
-        Ok(Encoder {
-            encoding: name.encoding(prefilter)?,
-            name: name.name(),
-        })
+        Ok(self.encoder(name.encoding(prefilter)?, name))
     }
 
-    /// The network called `network`, and the encoder that belongs to it or is asked for: with neither named, the pair
-    /// that comes along for `display`.
+    fn encoder(&self, encoding: Encoding, name: EncoderName) -> Encoder {
+        let usual = EncoderOptions::from(encoding);
+        Encoder {
+            options: EncoderOptions {
+                dark: self.dark.unwrap_or(usual.dark),
+                local_steps: self.local_steps.unwrap_or(usual.local_steps),
+                ..usual
+            },
+            name: name.name(),
+        }
+    }
+
+    /// Whether the pre-filter is asked for by name.
+    pub(crate) fn is_deep(&self) -> bool {
+        matches!(self.encoder, Some(EncoderName::Deep))
+    }
+
+    /// The network called `network`, and the encoder that belongs to it or is asked for: the pair that comes along for
+    /// `display` by its name or for --encoder deep, else 8 layers.
     pub(crate) fn with_network(
         &self,
         network: Option<&str>,
@@ -77,21 +105,19 @@ impl EncoderFlags {
         display: &Display,
     ) -> Result<(Arc<Network>, Encoder)> {
         let by_name = network == Some(models::DEEP);
-        let deep = matches!(self.encoder, None | Some(EncoderName::Deep));
+        let deep = self.is_deep() || (by_name && self.encoder.is_none());
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
-            if let Some(pair) = phasefront_models::pair_for(display, precision) {
-                let name = EncoderName::Deep.name();
-                let encoding = Encoding::Deep(pair.prefilter);
-                return Ok((pair.hologram, Encoder { encoding, name }));
-            }
-            if by_name || self.encoder.is_some() {
+            let Some(pair) = phasefront_models::pair_for(display, precision) else {
                 let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
                 return Err(Error::Input(format!(
                     "networks for the deep encoder come along for offsets of {} mm and the usual display; train a pair for this one, or take --network 8 --encoder anti-alias",
                     offsets.collect::<Vec<_>>().join(", ")
                 )));
-            }
-        } else if by_name {
+            };
+            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::Deep);
+            return Ok((pair.hologram, encoder));
+        }
+        if by_name {
             return Err(Error::Input(format!(
                 "--network {} brings its own --encoder, deep, and --prefilter; leave them out",
                 models::DEEP

@@ -8,7 +8,7 @@ use phasefront::unstable::depth::sharpness;
 use phasefront::unstable::gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::network::{Engine, InputKind};
-use phasefront::{Brightness, EncoderOptions, Encoding, Pipeline, RgbdFrame, Sweep};
+use phasefront::{Brightness, EncoderOptions, Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
@@ -16,6 +16,7 @@ use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
+use phasefront_models::usual_network;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,10 +30,11 @@ pub(crate) struct Hologram {
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
     #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
     ldi: Option<PathBuf>,
-    /// How the midpoint hologram is made [default: network; layers with --ldi and no --network]
+    /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi and no
+    /// --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder); seeded-6 with --method
+    /// A network that comes along, or an ONNX file [default: 8; seeded-6 with --method
     /// seeded]
     #[arg(long, value_name = "ddpm-8|8|15|seeded-6|FILE")]
     network: Option<String>,
@@ -136,9 +138,10 @@ pub(super) fn sweep_for(display: &phasefront::Display, planes: Option<usize>, ta
 
 /// A field at the modulator, its levels, and how long each stage took.
 struct Made {
+    method: &'static str,
     field: Option<Array3<Complex32>>,
     levels: Array3<u8>,
-    encoder: &'static str,
+    encoder: Encoder,
     scale: f32,
     stages: Vec<(&'static str, Duration)>,
     engine: Option<String>,
@@ -163,6 +166,7 @@ impl Hologram {
     fn make(&self, display: &DisplayFile) -> Result<Made> {
         let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
             (Some(_), None) => Method::Layers,
+            (None, None) if !self.encoder.is_deep() => Method::Auto,
             _ => Method::Network,
         });
         let device = self.backend.device()?;
@@ -175,10 +179,13 @@ impl Hologram {
             ));
         }
         let method = match (method, &self.ldi) {
-            (Method::Auto, None) => match sharpness::measure(&self.frame.read()?).is_sharp() {
-                true => Method::Sweep,
-                false => Method::Network,
-            },
+            (Method::Auto, None) => {
+                let trained = self.network.is_some() || usual_network(&display.target.display).is_some();
+                match trained && !sharpness::measure(&self.frame.read()?).is_sharp() {
+                    true => Method::Network,
+                    false => Method::Sweep,
+                }
+            }
             (method, _) => method,
         };
         match (method, &self.ldi) {
@@ -221,7 +228,7 @@ impl Hologram {
         let info = HologramInfo {
             calibrated: display.calibrated(true),
             display: display.target.display.clone(),
-            encoder: Some(made.encoder.into()),
+            encoder: Some(made.encoder.name.into()),
             scale: Some(made.scale),
             lut: display.lut.map(Vec::from),
         };
@@ -263,7 +270,7 @@ impl Hologram {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let target = display.corrected()?;
-        let options = self.encoder_options(encoder.encoding);
+        let options = self.encoder_options(&encoder.options);
         let pipeline = Pipeline::new((height, width), method, &target, &options)?;
         let mut scratch = pipeline.scratch();
         let mut levels = Array3::zeros((3, height, width));
@@ -275,9 +282,10 @@ impl Hologram {
         let modulation = pipeline.modulate(values, bytes, &mut scratch);
         let engine = pipeline.method().engine();
         Ok(Made {
+            method: stage,
             field: kept.map(|values| stack(values, height, width)),
             levels,
-            encoder: encoder.name,
+            encoder,
             scale: modulation.scale,
             stages: vec![
                 (stage, predict),
@@ -300,7 +308,7 @@ impl Hologram {
         let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let mut job = Job::new((height, width), method, display.corrected()?);
-        job.encoder = self.encoder_options(encoder.encoding);
+        job.encoder = self.encoder_options(&encoder.options);
         let device = Arc::new(Device::open(options)?);
         probe(&device, &job)?;
         let mut pipeline = GpuPipeline::new(&device, &job)?;
@@ -310,9 +318,10 @@ impl Hologram {
         gpu::keep_programs(&device);
         let times = report.times.unwrap_or_default();
         Ok(Made {
+            method: stage,
             field: None,
             levels,
-            encoder: encoder.name,
+            encoder,
             scale: report.scale,
             stages: vec![
                 ("input", times.input),
@@ -334,7 +343,7 @@ impl Hologram {
             (_, Err(e)) => return Err(e),
         };
         let display = &target.display;
-        let options = self.encoder_options(encoder.encoding);
+        let options = self.encoder_options(&encoder.options);
         let modulator = Modulator::new((height, width), &target, &options)?;
         let mut scratch = modulator.scratch();
         let planes = self.planes.unwrap_or(DEFAULT_PLANES);
@@ -385,9 +394,10 @@ impl Hologram {
         let kept = self.complex.as_ref().map(|_| values.to_vec());
         let modulation = modulator.modulate(values, bytes, &mut scratch);
         Ok(Made {
+            method: stage,
             field: kept.map(|values| stack(values, height, width)),
             levels,
-            encoder: encoder.name,
+            encoder,
             scale: modulation.scale,
             stages: vec![
                 (stage, waved - start),
@@ -414,10 +424,10 @@ impl Hologram {
         Ok(network)
     }
 
-    fn encoder_options(&self, encoding: Encoding) -> EncoderOptions {
+    fn encoder_options(&self, usual: &EncoderOptions) -> EncoderOptions {
         EncoderOptions {
-            encoding,
             brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
+            ..usual.clone()
         }
     }
 
@@ -435,9 +445,17 @@ impl Hologram {
             json,
             &json!({
                 "output": self.output, "complex": self.complex, "width": width, "height": height,
-                "encoder": made.encoder, "scale": made.scale, "engine": made.engine, "stage_ms": stages, "total_ms": ms(&total),
+                "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
+                "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
+                "stage_ms": stages, "total_ms": ms(&total),
             }),
-            format!("{}: {width}×{height}, {}", self.output.display(), list.join(", ")),
+            format!(
+                "{}: {width}×{height} by {}; {}: {}",
+                self.output.display(),
+                made.method,
+                made.encoder.describe(),
+                list.join(", ")
+            ),
         );
     }
 }

@@ -33,7 +33,7 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = MethodName::Network)]
     method: MethodName,
-    /// A network that comes along, or an ONNX file [default: ddpm-8, else 8 (see --encoder)]
+    /// A network that comes along, or an ONNX file [default: 8]
     #[arg(long, value_name = "ddpm-8|8|15|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
@@ -307,7 +307,7 @@ impl Video {
             }
         };
         let mut options = SessionOptions::new(target, method);
-        options.encoder.encoding = encoder.encoding;
+        options.encoder = encoder.options;
         options.encoder.brightness = match self.brightness {
             BrightnessName::Steady => Brightness::Steady,
             BrightnessName::Max => Brightness::FrameMax,

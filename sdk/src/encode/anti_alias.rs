@@ -50,45 +50,12 @@ impl AntiAlias {
         }
     }
 
-    /// Hands each row of `plane`, (H, W), blurred, to `then`: its index, its values, to be worked on, and its part of
-    /// `out`, which is cut into H parts of one size.
-    pub fn rows<T: Send>(
-        &self,
-        plane: &[Complex32],
-        width: usize,
-        out: &mut [T],
-        scratch: &mut AntiAliasScratch,
-        then: impl Fn(usize, &mut [Complex32], &mut [T]) + Sync,
-    ) {
-        let height = plane.len() / width;
-        let per_row = out.len() / height;
-        let band = height.div_ceil(scratch.rows.len() / scratch.part);
-        out.par_chunks_mut(band * per_row)
-            .zip(scratch.rows.par_chunks_exact_mut(scratch.part))
-            .enumerate()
-            .for_each(|(part, (out, own))| {
-                let first = part * band;
-                let (ring, blurred) = own.split_at_mut(own.len() - width);
-                let half = self.taps.len() - 1;
-                let count = ring.len() / width;
-                // The next row to be blurred along itself; rows outside of the plane are those at its edge.
-                let mut next = first.saturating_sub(half);
-                for (i, out) in out.chunks_exact_mut(per_row).enumerate() {
-                    let y = first + i;
-                    wide!({
-                        while next <= (y + half).min(height - 1) {
-                            let ring = &mut ring[next % count * width..][..width];
-                            self.blur_row(&plane[next * width..][..width], ring);
-                            next += 1;
-                        }
-                        self.blur_down(ring, y, height, blurred);
-                    });
-                    then(y, blurred, out);
-                }
-            });
+    /// Taps to one side of the centre.
+    pub(super) fn half(&self) -> usize {
+        self.taps.len() - 1
     }
 
-    /// Replaces `plane`, (H, W), by itself blurred. The bits of [`Self::rows`]; allocates nothing.
+    /// Replaces `plane`, (H, W), by itself blurred. Allocates nothing.
     pub fn in_place(&self, plane: &mut [Complex32], width: usize, scratch: &mut AntiAliasScratch) {
         let height = plane.len() / width;
         let half = self.taps.len() - 1;
@@ -144,7 +111,7 @@ impl AntiAlias {
 
     /// Row `y` of `height` blurred, of a ring of rows that are blurred along themselves.
     #[inline(always)]
-    fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
+    pub(super) fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
         let width = blurred.len();
         let count = ring.len() / width;
         let row = |y: usize| values(&ring[y % count * width..][..width]);
@@ -162,7 +129,7 @@ impl AntiAlias {
         }
     }
 
-    /// The blur of `plane`, (H, W), value by value: the oracle of [`Self::rows`], to the bit.
+    /// The blur of `plane`, (H, W), value by value: the oracle of the faster forms, to the bit.
     pub fn filter(&self, plane: &mut [Complex32], width: usize) {
         let height = plane.len() / width;
         // What stands `i` places before and after the value at `at`, of `count` that are `step` apart.
@@ -184,7 +151,7 @@ impl AntiAlias {
 
     /// The blur of `row` along itself into `out`.
     #[inline(always)]
-    fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
+    pub(super) fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
         let (last, half) = (row.len() - 1, self.taps.len() - 1);
         let inner = half..row.len().saturating_sub(half).max(half);
         for x in (0..half.min(row.len())).chain(inner.end..row.len()) {
@@ -222,7 +189,7 @@ fn values_mut(row: &mut [Complex32]) -> &mut [f32] {
     bytemuck::cast_slice_mut(row)
 }
 
-/// Working memory of [`AntiAlias::rows`].
+/// Working memory of [`AntiAlias::in_place`].
 pub struct AntiAliasScratch {
     rows: Vec<Complex32>,
     /// Values of a part.
@@ -255,12 +222,8 @@ mod tests {
         let plane: Vec<_> = (0..h * w)
             .map(|i| Complex32::new((i as f32).sin(), (i as f32 * 2.0).cos()))
             .collect();
-        let mut out = plane.clone();
-        let copy = |_, row: &mut [Complex32], out: &mut [Complex32]| out.copy_from_slice(row);
-        plan.rows(&plane, w, &mut out, &mut plan.scratch(w), copy);
         let mut naive = plane.clone();
         plan.filter(&mut naive, w);
-        assert_eq!(out, naive);
         let mut in_place = plane.clone();
         plan.in_place(&mut in_place, w, &mut plan.scratch(w));
         assert_eq!(in_place, naive);
@@ -278,7 +241,7 @@ mod tests {
                         expected += plane[yy * w + xx] * k as f32;
                     }
                 }
-                let got = out[y as usize * w + x as usize];
+                let got = naive[y as usize * w + x as usize];
                 assert!((got - expected).norm() < 1e-5, "{h}×{w}, {taps} taps: {x},{y}");
             }
         }

@@ -85,6 +85,34 @@ pub fn encode_row_levels(
     });
 }
 
+/// The phases of a row's own values, in \[0, 2π), to 1e-6 rad; 0 for the origin.
+pub fn phase_row(values: &[Complex32], phases: &mut [f32]) {
+    wide!(phase_run(values, phases));
+}
+
+/// [`phase_row`] and [`Response::level`] in one sweep. The row begins at value `first` of the stack (3, H, W).
+pub fn phase_row_levels(values: &[Complex32], response: &Response, first: usize, levels: &mut [u8]) {
+    const RUN: usize = 256;
+    wide!({
+        let mut phases = [0.0; RUN];
+        let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
+        for (run, (values, levels)) in runs.enumerate() {
+            let phases = &mut phases[..values.len()];
+            phase_run(values, phases);
+            response.levels(phases, first + run * RUN, levels);
+        }
+    });
+}
+
+#[inline(always)]
+fn phase_run(values: &[Complex32], phases: &mut [f32]) {
+    for (value, phase) in values.iter().zip(phases) {
+        let angle = atan2(value.im, value.re);
+        let turned = if angle < 0.0 { angle + TAU } else { angle };
+        *phase = if turned < TAU { turned } else { 0.0 };
+    }
+}
+
 /// One value's phase; without branches, so that loops over it vectorise.
 #[inline(always)]
 fn encode_one(value: Complex32, inverse: f32, sign: f32) -> f32 {

@@ -132,7 +132,7 @@ impl GpuPipeline {
         job.method.check(display)?;
         let size = job.shape;
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
-        job.encoder.brightness.check()?;
+        job.encoder.check()?;
         job.target.check()?;
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;

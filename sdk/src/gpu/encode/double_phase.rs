@@ -1,29 +1,41 @@
-//! Double phase and the modulator's response: from a filtered field to levels, in one sweep.
+//! Dark, double phase and the modulator's response: from a filtered field to levels, in one sweep.
 
 use super::filter::Filtered;
+use super::local::Local;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::brightness::Brightness;
 use crate::gpu::Result;
-use crate::gpu::device::{Constants, Device, Dispatch};
+use crate::gpu::device::{Constants, Device, Dispatch, Program};
 use crate::slm::{Response, per_pixel};
 
 /// Double phase of one field into several buffers.
 pub(super) struct DoublePhase {
     /// Finds the largest amplitude, where it is what full light stands for.
     peak: Option<Dispatch>,
-    /// For each of the buffers.
+    /// For each of the buffers, where nothing is corrected.
     encode: Vec<Dispatch>,
+    local: Option<Local>,
 }
 
-impl DoublePhase {
-    /// `largest` is what the scale is read from, and for [`Brightness::FrameMax`] first written to.
+/// What the programs of double phase and of local correction share.
+pub(super) struct Shared<'a> {
+    pub(super) frame: &'a Constants,
+    pub(super) filtered: &'a Filtered<'a>,
+    /// What the scale is read from, and for [`Brightness::FrameMax`] first written to.
+    pub(super) largest: &'a wgpu::Buffer,
+    pub(super) source: String,
+    settings: Constants,
+    gains: Constants,
+    response: Constants,
+}
+
+impl<'a> Shared<'a> {
     pub(super) fn new(
         device: &Device,
         job: &EncoderJob<'_>,
-        frame: &Constants,
-        filtered: &Filtered<'_>,
-        largest: &wgpu::Buffer,
-        buffers: &[LevelsBuffers],
+        frame: &'a Constants,
+        filtered: &'a Filtered<'a>,
+        largest: &'a wgpu::Buffer,
     ) -> Result<Self> {
         let fixed = match job.options.brightness {
             Brightness::Fixed(scale) => scale,
@@ -31,43 +43,93 @@ impl DoublePhase {
         };
         let mut settings = [0.0, 0.0, 0.0, fixed];
         settings[..filtered.taps.len()].copy_from_slice(&filtered.taps);
-        let settings = device.constants("settings", bytemuck::cast_slice(&settings))?;
         static UNLIT: [f32; 12] = [1.0; 12];
         let light = job.target.illumination.as_ref();
         let gains = light.map_or(&UNLIT[..], |light| light.gains());
-        let gains = device.table("light", bytemuck::cast_slice(gains))?;
         let curves = Curves::of(job.response, job.size);
-        let source = header(job, filtered, &curves) + include_str!("double_phase.wgsl");
-        let response = device.table("the response", bytemuck::cast_slice(&curves.table))?;
-        let turn = filtered.turn.unwrap_or(&response.buffer);
-        let common = [
-            (9, gains.buffer.as_entire_binding()),
-            (0, frame.buffer.as_entire_binding()),
-            (1, settings.buffer.as_entire_binding()),
-            (2, filtered.field.as_entire_binding()),
-            (3, turn.as_entire_binding()),
-        ];
+        Ok(Shared {
+            frame,
+            filtered,
+            largest,
+            source: header(job, filtered, &curves) + include_str!("double_phase.wgsl"),
+            settings: device.constants("settings", bytemuck::cast_slice(&settings))?,
+            gains: device.table("light", bytemuck::cast_slice(gains))?,
+            response: device.table("the response", bytemuck::cast_slice(&curves.table))?,
+        })
+    }
+
+    /// The arguments at these bindings, of 0 to 3, 5, 8 and 9.
+    pub(super) fn arguments(&self, bindings: &[u32]) -> Vec<(u32, wgpu::BindingResource<'_>)> {
+        let of = |binding: &u32| {
+            let buffer = match binding {
+                0 => &self.frame.buffer,
+                1 => &self.settings.buffer,
+                2 => &self.filtered.field,
+                // Something, where nothing is turned.
+                3 => self.filtered.turn.unwrap_or(&self.response.buffer),
+                5 => self.largest,
+                8 => &self.response.buffer,
+                _ => &self.gains.buffer,
+            };
+            (*binding, buffer.as_entire_binding())
+        };
+        bindings.iter().map(of).collect()
+    }
+
+    /// A program that writes levels, for each of `buffers`, on these arguments and those of the levels.
+    pub(super) fn levels_program(
+        &self,
+        device: &Device,
+        program: &Program,
+        arguments: &[(u32, wgpu::BindingResource<'_>)],
+        grid: [usize; 3],
+        buffers: &[LevelsBuffers],
+    ) -> Result<Vec<Dispatch>> {
+        let into = |buffers: &LevelsBuffers| {
+            let view = buffers.texture.create_view(&Default::default());
+            let mut arguments = arguments.to_vec();
+            arguments.push((6, buffers.levels.as_entire_binding()));
+            arguments.push((7, wgpu::BindingResource::TextureView(&view)));
+            program.on(device, &arguments, grid)
+        };
+        buffers.iter().map(into).collect()
+    }
+}
+
+impl DoublePhase {
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        shared: &Shared<'_>,
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
         let grid = [job.size.1.div_ceil(COLUMNS), job.size.0, 1];
         let peak = if job.options.brightness == Brightness::FrameMax {
-            let program = device.program("the largest amplitude", source.clone(), "peak");
-            let mut arguments = common.to_vec();
-            arguments.push((4, largest.as_entire_binding()));
+            let program = device.program("the largest amplitude", shared.source.clone(), "peak");
+            let mut arguments = shared.arguments(&[0, 1, 2, 3, 9]);
+            arguments.push((4, shared.largest.as_entire_binding()));
             Some(program.on(device, &arguments, grid)?)
         } else {
             None
         };
-        let program = device.program("double phase", source, "encode");
-        let into = |buffers: &LevelsBuffers| {
-            let view = buffers.texture.create_view(&Default::default());
-            let mut arguments = common.to_vec();
-            arguments.push((5, largest.as_entire_binding()));
-            arguments.push((6, buffers.levels.as_entire_binding()));
-            arguments.push((7, wgpu::BindingResource::TextureView(&view)));
-            arguments.push((8, response.buffer.as_entire_binding()));
-            program.on(device, &arguments, grid)
+        let (local, encode) = if job.options.local_steps > 0 {
+            (Some(Local::new(device, job, shared, buffers)?), Vec::new())
+        } else {
+            let program = device.program("double phase", shared.source.clone(), "encode");
+            let arguments = shared.arguments(&[0, 1, 2, 3, 5, 8, 9]);
+            (
+                None,
+                shared.levels_program(device, &program, &arguments, grid, buffers)?,
+            )
         };
-        let encode = buffers.iter().map(into).collect::<Result<_>>()?;
-        Ok(DoublePhase { peak, encode })
+        Ok(DoublePhase { peak, encode, local })
+    }
+
+    /// To be called before the field is filtered.
+    pub(super) fn keep(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(local) = &self.local {
+            local.keep(pass);
+        }
     }
 
     /// Encodes into the buffers of that index.
@@ -75,7 +137,10 @@ impl DoublePhase {
         if let Some(peak) = &self.peak {
             peak.run(pass);
         }
-        self.encode[buffers].run(pass);
+        match &self.local {
+            Some(local) => local.run(pass, buffers),
+            None => self.encode[buffers].run(pass),
+        }
     }
 }
 
@@ -128,6 +193,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         "const HALF: i32 = {};
         const TURN: bool = {};
         const FIXED: bool = {};
+        const DARK: f32 = {:?};
         const STEPS: u32 = {}u;
         const TABLE: bool = {};
         const PIXELS: bool = {};
@@ -144,6 +210,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         filtered.taps.len() - 1,
         filtered.turn.is_some(),
         matches!(job.options.brightness, Brightness::Fixed(_)),
+        job.options.dark,
         curves.steps,
         curves.table.len() > 1,
         curves.pixels,

@@ -1,5 +1,5 @@
-// From the field at the modulator to levels: blur, light, double phase, response. `peak` finds the largest amplitude
-// that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants in
+// From the field at the modulator to levels: dark, blur, light, double phase, response. `peak` finds the largest
+// amplitude that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants in
 // capitals.
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
@@ -50,25 +50,48 @@ fn gain(colour: u32, x: u32, y: u32) -> f32 {
     return left + (right - left) * fx;
 }
 
+fn turned(colour: u32, u: vec2f) -> vec2f {
+    let v = turn[colour];
+    return vec2f(u.x * v.x - u.y * v.y, u.x * v.y + u.y * v.x);
+}
+
+// The amplitude that full light stands for.
+fn full_light() -> f32 {
+    if (FIXED) { return settings.scale; }
+    return sqrt(bitcast<f32>(found[0]));
+}
+
+// 1 over the amplitude below which values are drawn to the real axis; 0 where none is.
+fn per_dark(scale: f32) -> f32 { return select(0.0, 1.0 / (DARK * scale), DARK * scale > 0.0); }
+
+// The field at a pixel, drawn to the real axis where it is dark; see encode/dark.rs.
+fn source(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
+    var u = field[colour * frame.plane + u32(y * frame.width + x)];
+    if (per_dark > 0.0) {
+        if (TURN) { u = turned(colour, u); }
+        let amplitude = sqrt(dot(u, u));
+        let weight = min(amplitude * per_dark, 1.0);
+        u = vec2f(weight * u.x + (1.0 - weight) * amplitude, weight * u.y);
+    }
+    return u;
+}
+
 // A colour's value at a pixel: blurred, turned where nothing before did it, and divided by the light.
-fn value(colour: u32, x: i32, y: i32) -> vec2f {
+fn value(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
     var sum = vec2f(0);
     if (HALF == 0) {
-        sum = field[colour * frame.plane + u32(y * frame.width + x)];
+        sum = source(colour, x, y, per_dark);
     } else {
         for (var dy = -HALF; dy <= HALF; dy++) {
             let j = clamp(y + dy, 0, frame.height - 1);
             for (var dx = -HALF; dx <= HALF; dx++) {
                 let i = clamp(x + dx, 0, frame.width - 1);
                 let weight = settings.taps[abs(dx)] * settings.taps[abs(dy)];
-                sum += weight * field[colour * frame.plane + u32(j * frame.width + i)];
+                sum += weight * source(colour, i, j, per_dark);
             }
         }
     }
-    if (TURN) {
-        let v = turn[colour];
-        sum = vec2f(sum.x * v.x - sum.y * v.y, sum.x * v.y + sum.y * v.x);
-    }
+    if (TURN && per_dark == 0.0) { sum = turned(colour, sum); }
     if (LIT) { sum *= gain(colour, u32(x), u32(y)); }
     return sum;
 }
@@ -135,16 +158,18 @@ fn pixel_level(phase: f32, colour: u32, x: u32, y: u32) -> u32 {
     return u32(clamp(here + (next - here) * (t - f32(k)) + 0.5, 0.0, 255.0));
 }
 
-fn level(v: vec2f, inverse: f32, colour: u32, x: i32, y: i32) -> u32 {
-    let even = ((x + y) & 1) == 0;
-    let amplitude = min(sqrt(dot(v, v)) * inverse, 1.0);
-    let half = arc_cosine(amplitude);
-    let sum = angle(v) + select(-half, half, even);
-    let phase = select(sum, sum + TAU, sum < 0.0);
+// The level of a phase from -3π/2 to 3π/2.
+fn level(angle: f32, colour: u32, x: i32, y: i32) -> u32 {
+    let phase = select(angle, angle + TAU, angle < 0.0);
     if (PIXELS) { return pixel_level(select(phase, 0.0, phase >= TAU), colour, u32(x), u32(y)); }
     let step = u32(phase * (f32(STEPS) / TAU) + 0.5) & (STEPS - 1u);
     if (TABLE) { return response[step]; }
     return step;
+}
+
+fn put(x: i32, y: i32, rgb: vec3u) {
+    levels[u32(y * frame.width + x)] = rgb.x | (rgb.y << 8u) | (rgb.z << 16u) | 0xff000000u;
+    textureStore(shown, vec2i(x, y), vec4f(vec3f(rgb) / 255.0, 1.0));
 }
 
 @compute @workgroup_size(64)
@@ -152,16 +177,15 @@ fn encode(@builtin(global_invocation_id) at: vec3u) {
     let x = i32(at.x);
     let y = i32(at.y);
     if (x >= frame.width) { return; }
-    var scale = settings.scale;
-    if (!FIXED) { scale = sqrt(bitcast<f32>(found[0])); }
+    let scale = full_light();
     let inverse = select(0.0, 1.0 / scale, scale > 0.0);
-    let rgb = vec3u(
-        level(value(0u, x, y), inverse, 0u, x, y),
-        level(value(1u, x, y), inverse, 1u, x, y),
-        level(value(2u, x, y), inverse, 2u, x, y),
-    );
-    levels[u32(y * frame.width + x)] = rgb.x | (rgb.y << 8u) | (rgb.z << 16u) | 0xff000000u;
-    textureStore(shown, vec2i(x, y), vec4f(vec3f(rgb) / 255.0, 1.0));
+    var rgb = vec3u(0);
+    for (var c = 0u; c < 3u; c++) {
+        let v = value(c, x, y, per_dark(scale));
+        let half = arc_cosine(min(sqrt(dot(v, v)) * inverse, 1.0));
+        rgb[c] = level(angle(v) + select(-half, half, ((x + y) & 1) == 0), c, x, y);
+    }
+    put(x, y, rgb);
 }
 
 @compute @workgroup_size(64)
@@ -171,7 +195,7 @@ fn peak(@builtin(global_invocation_id) at: vec3u, @builtin(local_invocation_inde
     var square = 0.0;
     if (x < frame.width) {
         for (var c = 0u; c < 3u; c++) {
-            let v = value(c, x, y);
+            let v = value(c, x, y, 0.0);
             square = max(square, dot(v, v));
         }
     }

@@ -6,11 +6,11 @@ use crate::encode::Encoding;
 use crate::encode::anti_alias::AntiAlias;
 use crate::encode::band_limit::BandLimit;
 use crate::encode::deep;
-use crate::gpu::Result;
 use crate::gpu::chain::{ChainPlan, End, Numbers};
 use crate::gpu::device::{Constants, Device, Dispatch};
 use crate::gpu::fft::{Convolution, Planes, quadrant};
 use crate::gpu::input::{Form, Packer, Source};
+use crate::gpu::{GpuError, Result};
 use crate::network::Network;
 
 /// Taps to one side up to which the blur is done in the same sweep as double phase.
@@ -31,6 +31,8 @@ pub(super) struct Filtered<'a> {
     pub(super) turn: Option<&'a wgpu::Buffer>,
     /// A blur: the centre tap and those to one side.
     pub(super) taps: Vec<f32>,
+    /// Whether nothing is left of the field as it came, or it is not this one.
+    pub(super) replaces: bool,
 }
 
 impl Filter {
@@ -40,6 +42,7 @@ impl Filter {
             field: job.field.clone(),
             turn: job.turn,
             taps: vec![1.0],
+            replaces: false,
         };
         let filter = match &job.options.encoding {
             Encoding::DoublePhase => Filter::None,
@@ -49,6 +52,13 @@ impl Filter {
                     rest.taps = blur.taps().to_vec();
                     Filter::None
                 } else {
+                    if job.options.dark > 0.0 {
+                        return Err(GpuError::Refused(format!(
+                            "a blur over {width} pixels with dark; up to {} pixels, dark 0, or the CPU are right",
+                            2 * FUSED_HALF + 1
+                        )));
+                    }
+                    rest.replaces = true;
                     let blur = Blur {
                         device,
                         frame,
@@ -59,6 +69,7 @@ impl Filter {
                 }
             }
             Encoding::BandLimit { k } => {
+                rest.replaces = true;
                 let limit = BandLimit::new(size.0, size.1, *k)?;
                 let kept = quadrant(size, |kx, ky| f32::from(u8::from(limit.keeps(kx, ky))));
                 let planes = Planes {
@@ -72,6 +83,7 @@ impl Filter {
             }
             Encoding::Deep(network) => {
                 let made = Prefilter::new(device, network, job, frame)?;
+                rest.replaces = true;
                 rest.field = made.chain.field.clone();
                 Filter::Network(Box::new(made))
             }

@@ -283,20 +283,39 @@ class SessionTest {
     }
 
     @Test
-    fun thePairThatIsBuiltInIsUsual() {
-        for (offset in listOf(0.0, 6.0, 12.0)) {
+    fun theNetworkThatIsBuiltInIsUsual() {
+        for (offset in listOf(0.0, 3.0, 12.0)) {
             val usual = sessionOptions(display.copy(offsetMm = offset))
-            assertTrue(usual.encoding is Encoding.Deep)
+            assertIs<Method.Trained>(usual.ladder[0].method)
+            assertTrue(usual.encoding is Encoding.AntiAlias)
             Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         }
     }
 
     @Test
-    fun withoutAPairTheSweepIsUsual() {
-        val usual = sessionOptions(display.copy(offsetMm = 3.0))
+    fun thePairThatIsBuiltInCanBeTaken() {
+        val pair = builtInPair(6.0)
+        val options = sessionOptions(display.copy(offsetMm = 6.0), pair.hologram).copy(encoding = Encoding.Deep(pair.prefilter))
+        Session(options, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+    }
+
+    @Test
+    fun stepsAndDarkCanBeSet() {
+        fun levels(options: SessionOptions) =
+            Session(options, RunningMode.IMAGE).use { session -> session.process(still()).use { it.levels() } }
+        val usual = sessionOptions(display)
+        assertContentEquals(levels(usual), levels(usual.copy(dark = 0.4f, localSteps = 1u)))
+        assertTrue(!levels(usual).contentEquals(levels(usual.copy(localSteps = 0u))))
+        assertRefused<PhasefrontException>("at most 8") { Session(usual.copy(localSteps = 9u), RunningMode.IMAGE) }
+        assertRefused<PhasefrontException>("from 0 to 1") { Session(usual.copy(dark = 2f), RunningMode.IMAGE) }
+    }
+
+    @Test
+    fun withoutANetworkTheSweepIsUsual() {
+        val usual = sessionOptions(display.copy(pitchUm = 3.74))
         assertIs<Method.Sweep>(usual.ladder[0].method)
         Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
-        assertRefused<PhasefrontException.Network>("pairs for 0, 6 and 12") { builtInPair(3.0) }
+        assertRefused<PhasefrontException.Network>("pairs for 0, 6, 12 mm") { builtInPair(3.0) }
     }
 
     @Test

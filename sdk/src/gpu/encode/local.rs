@@ -1,0 +1,101 @@
+//! Local correction: one dispatch for the start, one for each step, the last of which writes levels. The twin of
+//! [`crate::encode::local`].
+
+use super::double_phase::Shared;
+use super::{COLUMNS, EncoderJob, LevelsBuffers};
+use crate::encode::local::LocalFilter;
+use crate::gpu::Result;
+use crate::gpu::device::{Device, Dispatch};
+
+/// Pixels along each side that a workgroup corrects.
+const SIDE: usize = 16;
+
+/// The correction of one field, into several buffers.
+pub(super) struct Local {
+    /// Where a filter leaves nothing of the field that is wanted.
+    keep: Option<Dispatch>,
+    /// The start, and all steps but the last.
+    begin: Vec<Dispatch>,
+    /// The last step, for each of the buffers.
+    finish: Vec<Dispatch>,
+}
+
+impl Local {
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        shared: &Shared<'_>,
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
+        let (height, width) = job.size;
+        let bytes = 24 * height * width;
+        // A field that is kept is turned on the way, another where it is read.
+        let replaces = shared.filtered.replaces;
+        let source = format!(
+            "const KEEP_TURN: bool = {};\nconst GOAL_TURN: bool = {};\n{}{}",
+            job.turn.is_some(),
+            !replaces && job.turn.is_some(),
+            shared.source,
+            include_str!("local.wgsl")
+        );
+        let by_rows = [width.div_ceil(COLUMNS), height, 3];
+        let (keep, wanted) = if replaces {
+            let wanted = device.buffer("the wanted field", bytes)?;
+            let program = device.program("the wanted field", source.clone(), "keep");
+            let arguments = [
+                (0, shared.frame.buffer.as_entire_binding()),
+                (2, job.field.as_entire_binding()),
+                (3, job.turn.unwrap_or(job.field).as_entire_binding()),
+                (12, wanted.as_entire_binding()),
+            ];
+            (Some(program.on(device, &arguments, by_rows)?), wanted)
+        } else {
+            (None, job.field.clone())
+        };
+        let rooms = [
+            device.buffer("what is missing", bytes)?,
+            device.buffer("what is missing after a step", bytes)?,
+        ];
+        let taps = LocalFilter::of_aperture(1.0);
+        let taps = device.constants("the aperture's taps", bytemuck::cast_slice(taps.taps()))?;
+
+        let program = device.program("the start", source.clone(), "begin");
+        let mut arguments = shared.arguments(&[0, 1, 2, 3, 5, 9]);
+        arguments.push((10, wanted.as_entire_binding()));
+        arguments.push((12, rooms[0].as_entire_binding()));
+        let mut begin = vec![program.on(device, &arguments, by_rows)?];
+
+        let of_step = |step: usize, bindings: &[u32]| {
+            let mut arguments = shared.arguments(bindings);
+            arguments.push((10, wanted.as_entire_binding()));
+            arguments.push((11, rooms[step % 2].as_entire_binding()));
+            arguments.push((13, taps.buffer.as_entire_binding()));
+            arguments
+        };
+        let grid = [width.div_ceil(SIDE), height.div_ceil(SIDE)];
+        let last = job.options.local_steps - 1;
+        let program = device.program("a local step", source.clone(), "step_on");
+        for step in 0..last {
+            let mut arguments = of_step(step, &[0, 1, 3, 5, 9]);
+            arguments.push((12, rooms[(step + 1) % 2].as_entire_binding()));
+            begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
+        }
+        let program = device.program("the last local step", source, "finish");
+        let arguments = of_step(last, &[0, 1, 3, 5, 8]);
+        let finish = shared.levels_program(device, &program, &arguments, [grid[0], grid[1], 1], buffers)?;
+        Ok(Local { keep, begin, finish })
+    }
+
+    /// To be called before the field is filtered.
+    pub(super) fn keep(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(keep) = &self.keep {
+            keep.run(pass);
+        }
+    }
+
+    /// Corrects into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
+        self.begin.iter().for_each(|step| step.run(pass));
+        self.finish[buffers].run(pass);
+    }
+}
