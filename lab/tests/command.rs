@@ -364,7 +364,11 @@ fn options_that_cannot_be_meant_are_named() {
 fn displays_that_cannot_be_used_are_named() {
     let folder = Folder::new().with_frame();
     let cases: [(&str, &str, &[&str]); 4] = [
-        ("a pitch in µm", "pitch_um = 3.74", &["pitch", "3.740"]),
+        (
+            "a wavelength in µm",
+            "wavelengths_nm = [0.638, 520, 450]",
+            &["wavelengths_nm"],
+        ),
         ("12 bits", "bits = 12", &["display.toml", "bits"]),
         ("a table that is not there", "lut = \"none.txt\"", &["none.txt"]),
         ("a table of 3", "lut = \"lut.txt\"", &["lut.txt", "256"]),

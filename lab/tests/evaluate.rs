@@ -307,9 +307,9 @@ fn the_command_prints_figures_and_draws_the_worst() {
         names,
         [
             ("rgb", "complex"),
-            ("rgb", "band-limit, dark 0.4, 1 steps"),
+            ("rgb", "band-limit, dark 0.4, steps 1"),
             ("visible", "complex"),
-            ("visible", "band-limit, dark 0.4, 1 steps")
+            ("visible", "band-limit, dark 0.4, steps 1")
         ]
     );
     let worst = |i: usize| {

@@ -4,6 +4,7 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::brightness::{Brightness, Past, Percentile};
+use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::error::Result;
 use crate::target::Target;
@@ -21,6 +22,7 @@ pub struct Modulator {
     /// None where the field stands at the modulator and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
     encoder: Encoder,
+    midpoint: Option<MidpointSteps>,
     keeps_phase: bool,
     brightness: Brightness,
 }
@@ -29,7 +31,16 @@ pub struct Modulator {
 pub struct ModulatorScratch {
     propagation: Option<ConvolveScratch>,
     encoder: EncoderScratch,
+    midpoint: Option<OfMidpoint>,
     percentile: Percentile,
+}
+
+/// What steps at the midpoint work on.
+struct OfMidpoint {
+    /// The field before it was encoded.
+    wanted: Vec<Complex32>,
+    phases: Vec<f32>,
+    scratch: MidpointScratch,
 }
 
 /// What became of a field on the modulator.
@@ -66,6 +77,10 @@ impl Modulator {
             width: shape.1,
             offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
             encoder: Encoder::new(shape, target, options)?,
+            midpoint: match options.midpoint_steps {
+                0 => None,
+                steps => Some(MidpointSteps::new(shape, target, steps)?),
+            },
             keeps_phase: options.encoding.keeps_phase(),
             brightness: options.brightness,
         })
@@ -87,6 +102,11 @@ impl Modulator {
         ModulatorScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
+            midpoint: self.midpoint.as_ref().map(|plan| OfMidpoint {
+                wanted: vec![Complex32::ZERO; 3 * self.height * self.width],
+                phases: vec![0.0; 3 * self.height * self.width],
+                scratch: plan.scratch(),
+            }),
             percentile: Percentile::new(),
         }
     }
@@ -122,7 +142,16 @@ impl Modulator {
     ) -> Modulation {
         let start = Instant::now();
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-        let scale = self.encoder.encode_levels(field, scale, levels, &mut scratch.encoder);
+        let scale = match (&self.midpoint, &mut scratch.midpoint) {
+            (Some(plan), Some(of)) => {
+                of.wanted.copy_from_slice(field);
+                let scale = (self.encoder).encode(field, scale, &mut of.phases, &mut scratch.encoder);
+                plan.correct(&of.wanted, scale, &mut of.phases, &mut of.scratch);
+                self.encoder.levels(&of.phases, levels);
+                scale
+            }
+            _ => (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder),
+        };
         Modulation {
             scale,
             encode: start.elapsed(),
@@ -139,7 +168,13 @@ impl Modulator {
     ) -> Modulation {
         let start = Instant::now();
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+        if let Some(of) = &mut scratch.midpoint {
+            of.wanted.copy_from_slice(field);
+        }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
+        if let (Some(plan), Some(of)) = (&self.midpoint, &mut scratch.midpoint) {
+            plan.correct(&of.wanted, scale, phases, &mut of.scratch);
+        }
         Modulation {
             scale,
             encode: start.elapsed(),

@@ -4,13 +4,16 @@
 #[path = "../../tests/reference.rs"]
 mod reference;
 
-use ndarray::Array3;
+use ndarray::{Array2, Array3};
 use phasefront::target::{Illumination, Response};
 use phasefront::unstable::encode::Encoder;
 use phasefront::unstable::encode::band_limit::BandLimit;
 use phasefront::unstable::encode::local::{self, LocalFilter};
+use phasefront::unstable::encode::midpoint::{self, MidpointSteps};
+use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::wave::aperture::Aperture;
-use phasefront::{Display, EncoderOptions, Encoding, Target};
+use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use reference::test_plane;
 use rustfft::num_complex::{Complex32, Complex64};
 
@@ -193,6 +196,118 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
     }
 }
 
+/// What a colour of (H, W) = `shape` becomes over `distance_m`, the carrier left out, through an aperture of radius 1.
+fn through_aperture(
+    plane: &[Complex64],
+    (h, w): (usize, usize),
+    padded: (usize, usize),
+    wavelength_m: f64,
+    distance_m: f64,
+) -> Vec<Complex64> {
+    let mut all = Array2::from_elem(padded, Complex64::ZERO);
+    for (i, value) in plane.iter().enumerate() {
+        all[(i / w, i % w)] = *value;
+    }
+    let mut spectrum = reference::fft2(&all, false);
+    let pitch_m = Display::default().pitch_m();
+    for ((y, x), value) in spectrum.indexed_iter_mut() {
+        let frequency = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
+        let square = frequency(y, padded.0).powi(2) + frequency(x, padded.1).powi(2);
+        let f2 = square / pitch_m.powi(2);
+        let root = (1.0 - wavelength_m.powi(2) * f2).sqrt();
+        let phase = -2.0 * std::f64::consts::PI * distance_m * wavelength_m * f2 / (1.0 + root);
+        *value *= if square <= 0.25 {
+            Complex64::from_polar(1.0, phase)
+        } else {
+            Complex64::ZERO
+        };
+    }
+    let back = reference::fft2(&spectrum, true);
+    (0..h * w).map(|i| back[(i / w, i % w)]).collect()
+}
+
+#[test]
+fn steps_at_the_midpoint_agree_with_sums_in_f64() {
+    const SCALE: f32 = 1.3;
+    let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
+    let laser = Illumination::new(beam.view()).unwrap();
+    for (shape @ (h, w), offset_m, light, steps) in [
+        ((61, 47), 0.0, None, 1),
+        ((40, 66), 2e-3, Some(&laser), 2),
+        ((1, 9), -1e-3, None, 3),
+        ((1, 1), 0.0, None, 1),
+    ] {
+        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let target = Target {
+            illumination: light.cloned(),
+            ..display.clone().with_size(h, w).unwrap().into()
+        };
+        let field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 40 + c)).collect();
+        let start: Vec<f32> = (0..field.len()).map(|i| (i * 37 % 628) as f32 / 100.0).collect();
+        let mut results = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+                let mut phases = start.clone();
+                plan.correct(&field, SCALE, &mut phases, &mut plan.scratch());
+                phases
+            })
+        });
+        assert!(results[0] == results[1], "{w}×{h}: other bits on other threads");
+        let phases = std::mem::take(&mut results[0]);
+        let colours = display.wavelengths_m();
+        let plans = Propagator::for_colours(h, w, display.pitch_m(), colours, offset_m, Padding::Reach).unwrap();
+        let padded = plans[0].padded_shape();
+        for (c, (got, field)) in phases.chunks_exact(h * w).zip(field.chunks_exact(h * w)).enumerate() {
+            let light = |i: usize| light.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, shape)));
+            let light: Vec<f64> = (0..h * w).map(light).collect();
+            let mut wanted = field.to_vec();
+            let back = Propagator::for_colours(h, w, display.pitch_m(), colours, -offset_m, Padding::Reach).unwrap();
+            back[c].propagate(&mut wanted, &mut back[c].scratch());
+            let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
+            let wanted: Vec<Complex64> = wanted.iter().map(goal).collect();
+            let start = start[c * h * w..].iter().zip(&light);
+            let start = start
+                .map(|(phase, light)| Complex64::from_polar(*light, f64::from(*phase)))
+                .collect();
+            let to =
+                |distance_m: f64| move |u: &[Complex64]| through_aperture(u, shape, padded, colours[c], distance_m);
+            let expected = midpoint::reference(to(-offset_m), to(offset_m), &wanted, start, &light, steps);
+            let apart =
+                |(e, phase): (&Complex64, &f32)| (e / e.norm() - Complex64::from_polar(1.0, f64::from(*phase))).norm();
+            let squares: f64 = expected.iter().zip(got).map(apart).map(|d| d * d).sum();
+            let error = (squares / (h * w) as f64).sqrt();
+            assert!(error < 2e-3, "{w}×{h} at {offset_m}, colour {c}: {error}");
+        }
+    }
+}
+
+#[test]
+fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
+    let shape @ (h, w) = (48, 70);
+    let target = Target::from(Display::from_toml("width = 70\nheight = 48\noffset_mm = 1").unwrap());
+    let field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+    let levels = |midpoint_steps: usize| {
+        let options = EncoderOptions {
+            midpoint_steps,
+            brightness: Brightness::Fixed(1.2),
+            ..Default::default()
+        };
+        let plan = Modulator::new(shape, &target, &options).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        plan.modulate(&mut field.clone(), &mut levels, &mut plan.scratch());
+        levels
+    };
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let mut phases = vec![0.0; field.len()];
+    encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
+    assert!((levels(0).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
+    let plan = MidpointSteps::new(shape, &target, 2).unwrap();
+    plan.correct(&field, 1.2, &mut phases, &mut plan.scratch());
+    assert!((levels(2).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
+    assert_ne!(levels(0), levels(2));
+}
+
 #[test]
 fn a_dark_frame_is_dark() {
     let options = EncoderOptions {
@@ -234,4 +349,9 @@ fn more_steps_than_bring_anything_are_refused() {
         ..Default::default()
     };
     refused(options, "at most 8");
+    let options = EncoderOptions {
+        midpoint_steps: 101,
+        ..Default::default()
+    };
+    refused(options, "at most 100");
 }

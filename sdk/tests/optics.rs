@@ -43,7 +43,7 @@ fn largest(encoding: Encoding) -> EncoderOptions {
 }
 
 fn double_phase_encoder(shape: (usize, usize)) -> Encoder {
-    Encoder::new(shape, &Target::default(), &Encoding::DoublePhase.into()).unwrap()
+    Encoder::new(shape, &Target::default(), &EncoderOptions::plain(Encoding::DoublePhase)).unwrap()
 }
 
 fn energy(plane: &[Complex32]) -> f64 {
@@ -388,7 +388,7 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     };
     let options = EncoderOptions {
         brightness: Brightness::Fixed(2.5),
-        ..Encoding::ANTI_ALIAS.into()
+        ..EncoderOptions::plain(Encoding::ANTI_ALIAS)
     };
     let plan = Modulator::new((h, w), &target, &options).unwrap();
     let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
@@ -508,7 +508,8 @@ fn one_sweep_from_field_to_levels_is_stage_after_stage() {
                 for threads in [1, 3] {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                     pool.build().unwrap().install(|| {
-                        let encoder = Encoder::new((h, w), &target, &encoding.clone().into()).unwrap();
+                        let options = EncoderOptions::plain(encoding.clone());
+                        let encoder = Encoder::new((h, w), &target, &options).unwrap();
                         let mut scratch = encoder.scratch();
                         let (mut field, mut got) = (given.clone(), vec![0; 3 * h * w]);
                         let scaled = encoder.encode_levels(&mut field, scale, &mut got, &mut scratch);

@@ -47,6 +47,9 @@ pub(crate) struct Evaluate {
     /// Each encoder with each of these numbers of local steps of correction
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1])]
     local_steps: Vec<usize>,
+    /// Each encoder with each of these numbers of steps at the midpoint
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0])]
+    midpoint_steps: Vec<usize>,
     /// z of encoded holograms against the middle of the volume, mm, positive toward the viewer
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
     offset_mm: f64,
@@ -164,18 +167,25 @@ impl Evaluate {
                     encoder.name()
                 ))
             })?;
-            let each = (self.dark.iter()).flat_map(|dark| self.local_steps.iter().map(move |steps| (*dark, *steps)));
-            shown.extend(each.map(|(dark, local_steps)| Shown {
-                name: format!("{}, dark {dark}, {local_steps} steps", encoder.name()),
-                levels: Some((
-                    target.clone(),
-                    EncoderOptions {
-                        dark,
-                        local_steps,
-                        ..encoding.clone().into()
-                    },
-                )),
-            }));
+            for &dark in &self.dark {
+                for &local_steps in &self.local_steps {
+                    shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| Shown {
+                        name: match midpoint_steps {
+                            0 => format!("{}, dark {dark}, steps {local_steps}", encoder.name()),
+                            more => format!("{}, dark {dark}, steps {local_steps} + {more}", encoder.name()),
+                        },
+                        levels: Some((
+                            target.clone(),
+                            EncoderOptions {
+                                dark,
+                                local_steps,
+                                midpoint_steps,
+                                ..encoding.clone().into()
+                            },
+                        )),
+                    }));
+                }
+            }
         }
         Ok(shown)
     }

@@ -52,6 +52,9 @@ pub(crate) struct EncoderFlags {
     /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
     #[arg(long, value_name = "N")]
     local_steps: Option<usize>,
+    /// Steps of correction at the midpoint after them, for stills; 3 bring nearly all
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    midpoint_steps: usize,
 }
 
 /// How a field becomes phases, and what it is called.
@@ -63,8 +66,17 @@ pub(crate) struct Encoder {
 
 impl Encoder {
     pub(crate) fn describe(&self) -> String {
-        let EncoderOptions { dark, local_steps, .. } = &self.options;
-        format!("{}, dark {dark}, local steps {local_steps}", self.name)
+        let EncoderOptions {
+            dark,
+            local_steps,
+            midpoint_steps,
+            ..
+        } = &self.options;
+        let last = match midpoint_steps {
+            0 => String::new(),
+            steps => format!(", midpoint steps {steps}"),
+        };
+        format!("{}, dark {dark}, local steps {local_steps}{last}", self.name)
     }
 }
 
@@ -85,6 +97,7 @@ impl EncoderFlags {
             options: EncoderOptions {
                 dark: self.dark.unwrap_or(usual.dark),
                 local_steps: self.local_steps.unwrap_or(usual.local_steps),
+                midpoint_steps: self.midpoint_steps,
                 ..usual
             },
             name: name.name(),

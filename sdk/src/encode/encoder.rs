@@ -195,6 +195,19 @@ impl Encoder {
         scale
     }
 
+    /// The target's levels of `phases`, (3, H, W) in \[0, 2π).
+    ///
+    /// # Panics
+    /// If `phases` or `levels` has not 3·H·W values.
+    pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
+        assert!(phases.len() == 3 * self.height * self.width && levels.len() == phases.len());
+        let rows = phases
+            .par_chunks_exact(self.width)
+            .zip(levels.par_chunks_exact_mut(self.width));
+        rows.enumerate()
+            .for_each(|(row, (phases, levels))| self.response.levels(phases, row * self.width, levels));
+    }
+
     fn work(&self, scale: f32) -> Work<'_> {
         // In darkness there is nothing to correct.
         let local = self.local.as_ref().filter(|_| scale > 0.0);

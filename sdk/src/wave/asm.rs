@@ -10,6 +10,7 @@
 //! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
 //! phase zero here, and both agree at z = 0.
 
+use super::aperture::passes;
 use super::fft::{ConvolveScratch, Fft2, fast_size};
 use super::zernike::Aberration;
 use crate::error::{Error, Result};
@@ -360,5 +361,22 @@ impl Propagator {
     pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         self.fft
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
+    }
+
+    /// [`Self::propagate`] through an aperture of `radius`, 1 reaching the Nyquist frequency.
+    ///
+    /// # Panics
+    /// As [`Self::propagate`].
+    pub fn propagate_through(&self, plane: &mut [Complex32], radius: f64, scratch: &mut ConvolveScratch) {
+        let (height, width) = self.padded_shape();
+        let filter = |x: usize, column: &mut [Complex32]| {
+            let fx = x.min(width - x) as f64 / width as f64;
+            // Rows pass up to one frequency.
+            let passing = (0..=height / 2).take_while(|y| passes(fx, *y as f64 / height as f64, radius));
+            let passing = passing.count();
+            column[passing..(height + 1 - passing).max(passing)].fill(Complex32::ZERO);
+            self.transfer.apply(x, column);
+        };
+        self.fft.convolve(plane, filter, scratch);
     }
 }

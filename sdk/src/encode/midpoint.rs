@@ -1,0 +1,202 @@
+//! Correction of a phase map at the midpoint, for stills: what is shown is taken there, drawn toward the wanted field, and
+//! taken back. Four transforms a colour and step.
+//!
+//! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture, and
+//! propagation back over the offset) and T the wanted field there over the scale, a step is
+//!
+//!   u = K·L·e,  r = λ·T + (1 − λ)·|T|·u/|u| − u,  z = L·e + γ·Kᴴ·r,  e' = z/|z|.
+//!
+//! λ = 0 asks for the amplitude alone, as Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
+//! focus; λ = 1 asks for the wave, whose phase the eye does not see.
+
+use crate::error::Result;
+use crate::illumination::Illumination;
+use crate::target::Target;
+use crate::wave::asm::Propagator;
+use crate::wave::fft::ConvolveScratch;
+use crate::wave::zernike::Aberration;
+use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+
+/// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal stack.
+const WAVE: f32 = 0.5;
+/// How far a step goes.
+const GAIN: f32 = 1.5;
+/// Most steps. After the third they bring little.
+pub(super) const MAX_STEPS: usize = 100;
+
+/// A plan for one shape and target. Immutable; shared between threads.
+pub struct MidpointSteps {
+    height: usize,
+    width: usize,
+    steps: usize,
+    aperture_radius: f64,
+    /// From the modulator to the midpoint, and to the modulator.
+    back: [Propagator; 3],
+    forth: [Propagator; 3],
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
+}
+
+/// Working memory of [`MidpointSteps`] for one call at a time.
+pub struct MidpointScratch {
+    wave: ConvolveScratch,
+    /// T of one colour.
+    wanted: Vec<Complex32>,
+    /// u, then r.
+    missing: Vec<Complex32>,
+    /// L·e.
+    shown: Vec<Complex32>,
+    /// L.
+    light: Vec<f32>,
+}
+
+impl MidpointSteps {
+    /// Plans `steps` for (3, H, W) = `shape` fields at the modulator of `target`.
+    ///
+    /// # Errors
+    /// An offset or correction that cannot be planned.
+    pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Self> {
+        let offset_m = target.display.offset_m();
+        let reversed = target.correction.as_ref().map(Aberration::reversed);
+        let propagators = |distance_m: f64, correction: Option<&Aberration>| match correction {
+            None => target.free_propagators(shape, distance_m),
+            correction => {
+                let plans = target.propagators(shape, 1, distance_m, correction)?;
+                Ok(plans.expect("a correction is something to do"))
+            }
+        };
+        Ok(MidpointSteps {
+            height: shape.0,
+            width: shape.1,
+            steps,
+            aperture_radius: 1.0,
+            back: propagators(-offset_m, reversed.as_ref())?,
+            forth: propagators(offset_m, target.correction.as_ref())?,
+            illumination: (target.illumination.clone()).map(|light| (light, target.modulator())),
+        })
+    }
+
+    /// Working memory for one call at a time, for the threads of the current pool.
+    pub fn scratch(&self) -> MidpointScratch {
+        let plane = || vec![Complex32::ZERO; self.height * self.width];
+        MidpointScratch {
+            wave: self.back[0].scratch(),
+            wanted: plane(),
+            missing: plane(),
+            shown: plane(),
+            light: vec![1.0; self.height * self.width],
+        }
+    }
+
+    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward `field`, (3, H, W) at the modulator, neither filtered nor scaled,
+    /// of which amplitude `scale` stands for full light. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` or `phases` has not 3·H·W values.
+    pub fn correct(&self, field: &[Complex32], scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
+        let plane = self.height * self.width;
+        assert!(field.len() == 3 * plane && phases.len() == 3 * plane);
+        if scale <= 0.0 {
+            return; // In darkness there is nothing to correct.
+        }
+        let colours = field.chunks_exact(plane).zip(phases.chunks_exact_mut(plane));
+        for (colour, (field, phases)) in colours.enumerate() {
+            self.correct_colour(colour, field, 1.0 / scale, phases, scratch);
+        }
+    }
+
+    fn correct_colour(
+        &self,
+        colour: usize,
+        field: &[Complex32],
+        per_scale: f32,
+        phases: &mut [f32],
+        scratch: &mut MidpointScratch,
+    ) {
+        let MidpointScratch {
+            wave,
+            wanted,
+            missing,
+            shown,
+            light,
+        } = scratch;
+        let (width, radius) = (self.width, self.aperture_radius);
+        if let Some((illumination, modulator)) = &self.illumination {
+            let rows = light.par_chunks_exact_mut(width).enumerate();
+            rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));
+        }
+        wanted.copy_from_slice(field);
+        self.back[colour].propagate(wanted, wave);
+        let rows =
+            (shown.par_chunks_exact_mut(width).zip(phases.par_chunks_exact(width))).zip(light.par_chunks_exact(width));
+        rows.for_each(|((shown, phases), light)| {
+            for ((shown, phase), light) in shown.iter_mut().zip(phases).zip(light) {
+                *shown = Complex32::from_polar(*light, *phase);
+            }
+        });
+        for _ in 0..self.steps {
+            missing.copy_from_slice(shown);
+            self.back[colour].propagate_through(missing, radius, wave);
+            let rows = missing.par_chunks_exact_mut(width).zip(wanted.par_chunks_exact(width));
+            rows.for_each(|(u, wanted)| wide!(missing_of(u, wanted, per_scale)));
+            self.forth[colour].propagate_through(missing, radius, wave);
+            let rows = (shown.par_chunks_exact_mut(width).zip(missing.par_chunks_exact(width)))
+                .zip(light.par_chunks_exact(width));
+            rows.for_each(|((shown, missing), light)| wide!(step_on(shown, missing, light)));
+        }
+        let rows = phases.par_chunks_exact_mut(width).zip(shown.par_chunks_exact(width));
+        rows.for_each(|(phases, shown)| super::double_phase::phase_row(shown, phases));
+    }
+}
+
+/// r in the place of u.
+#[inline(always)]
+fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
+    for (u, wanted) in u.iter_mut().zip(wanted) {
+        let (re, im) = (wanted.re * per_scale, wanted.im * per_scale);
+        let amplitude = (re * re + im * im).sqrt();
+        let length = (u.re * u.re + u.im * u.im).max(f32::MIN_POSITIVE).sqrt();
+        let keep = (1.0 - WAVE) * amplitude / length - 1.0;
+        u.re = WAVE * re + keep * u.re;
+        u.im = WAVE * im + keep * u.im;
+    }
+}
+
+/// L·e' in the place of L·e.
+#[inline(always)]
+fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
+    for ((shown, missing), light) in shown.iter_mut().zip(missing).zip(light) {
+        let (re, im) = (shown.re + GAIN * missing.re, shown.im + GAIN * missing.im);
+        let length = light / (re * re + im * im).max(f32::MIN_POSITIVE).sqrt();
+        shown.re = re * length;
+        shown.im = im * length;
+    }
+}
+
+/// The same in f64, value by value: the oracle. `to_midpoint` is K and `to_modulator` Kᴴ; `wanted` is T; `shown` is L·e of
+/// the start, `light` L. Gives L·e of the last step.
+pub fn reference(
+    to_midpoint: impl Fn(&[Complex64]) -> Vec<Complex64>,
+    to_modulator: impl Fn(&[Complex64]) -> Vec<Complex64>,
+    wanted: &[Complex64],
+    mut shown: Vec<Complex64>,
+    light: &[f64],
+    steps: usize,
+) -> Vec<Complex64> {
+    let share = f64::from(WAVE);
+    for _ in 0..steps {
+        let u = to_midpoint(&shown);
+        let missing = u.iter().zip(wanted);
+        let missing: Vec<Complex64> = missing
+            .map(|(u, t)| t * share + u / u.norm() * t.norm() * (1.0 - share) - u)
+            .collect();
+        let back = to_modulator(&missing);
+        for ((shown, back), light) in shown.iter_mut().zip(back).zip(light) {
+            let z = *shown + back * f64::from(GAIN);
+            *shown = z / z.norm() * light;
+        }
+    }
+    shown
+}
