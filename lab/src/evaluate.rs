@@ -376,21 +376,38 @@ impl Viewer {
     }
 }
 
-/// Judges each of `methods` in each of the ways `shown` on the pairs `scenes` of the data set in `dir`: rows in
-/// that order, the ways of a method together. `seed` chooses the random depths. `done` hears of each
-/// scene.
+/// What is looked at of a data set.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// Indices of its pairs.
+    pub scenes: Vec<usize>,
+    /// Chooses the random depths of the focal stacks.
+    pub seed: u64,
+    /// Pixels at the border of each scene that do not count: into a small frame at an offset light comes from outside,
+    /// which no modulator of its size sends.
+    pub margin: usize,
+}
+
+/// Judges each of `methods` in each of the ways `shown` on the `sample` of the data set in `dir`: rows in that order, the
+/// ways of a method together. `done` hears of each scene.
 ///
 /// # Errors
-/// No scenes, a pair that cannot be read, or what a method refuses.
+/// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.
 pub fn evaluate(
     manifest: &Manifest,
     dir: &Path,
-    scenes: &[usize],
+    sample: &Sample,
     methods: &[Method<'_>],
     shown: &[Shown],
-    seed: u64,
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Row>> {
+    let Sample { scenes, seed, margin } = sample;
+    if 2 * margin >= manifest.size {
+        return Err(crate::Error::Input(format!(
+            "a margin of {margin} px leaves nothing of scenes of {} px",
+            manifest.size
+        )));
+    }
     if scenes.is_empty() {
         return Err(crate::Error::file(
             dir,
@@ -410,7 +427,7 @@ pub fn evaluate(
             for method in methods {
                 let field = (method.field)(&pair.ldi)?;
                 for shown in shown {
-                    figures.push(judge(&viewer.views(&field, &shown.of(method), &z_m)?, &truth)?);
+                    figures.push(judge(&viewer.views(&field, &shown.of(method), &z_m)?, &truth, *margin)?);
                 }
             }
             done();
@@ -439,9 +456,11 @@ pub fn evaluate(
 }
 
 /// The midpoint view comes first, the focal stack after it.
-fn judge(views: &[Array3<f32>], truth: &[Array3<f32>]) -> Result<Figures> {
+fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
+    let (_, height, width) = truth[0].dim();
+    let inner = ndarray::s![.., margin..height - margin, margin..width - margin];
     let each = (views.iter().zip(truth))
-        .map(|(view, truth)| metrics::compare(view.view(), truth.view()))
+        .map(|(view, truth)| metrics::compare(view.slice(inner), truth.slice(inner)))
         .collect::<Result<Vec<_>>>()?;
     let (midpoint, stack) = (&each[0], &each[1..]);
     let mean = |figure: fn(&metrics::Comparison) -> f64| stack.iter().map(figure).sum::<f64>() / stack.len() as f64;

@@ -367,7 +367,7 @@ fn displays_that_cannot_be_used_are_named() {
         (
             "a wavelength in µm",
             "wavelengths_nm = [0.638, 520, 450]",
-            &["wavelengths_nm"],
+            &["display.toml", "0.638 nm"],
         ),
         ("12 bits", "bits = 12", &["display.toml", "bits"]),
         ("a table that is not there", "lut = \"none.txt\"", &["none.txt"]),

@@ -12,7 +12,7 @@ use phasefront::unstable::wave::{
 use phasefront::{Brightness, Display, EncoderOptions, Encoding};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::dataset::{self, Manifest};
-use phasefront_lab::evaluate::{self, Method, Row, Shown, Viewer};
+use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown, Viewer};
 use phasefront_lab::files::{self, Hologram, HologramInfo};
 use phasefront_lab::models::Precision;
 use phasefront_lab::{metrics, models, scene, sm_lbm};
@@ -50,7 +50,12 @@ impl Data {
     }
 
     fn evaluate(&self, methods: &[Method<'_>], shown: &[Shown]) -> Vec<Row> {
-        evaluate::evaluate(&self.manifest, self.path(), &[78, 79], methods, shown, 5, &|| {}).unwrap()
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            margin: 0,
+        };
+        evaluate::evaluate(&self.manifest, self.path(), &sample, methods, shown, &|| {}).unwrap()
     }
 
     fn command(&self, arguments: &[&str]) -> std::process::Output {
@@ -203,6 +208,26 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     }
 }
 
+/// At an offset the modulator's frame is too small for the light at its border; away from there it shows the field.
+#[test]
+fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
+    let data = Data::new();
+    let display = data.manifest.display.clone().with_offset_m(2e-3).unwrap();
+    let shown = [encoded(&display, "at 2 mm", Encoding::ANTI_ALIAS)];
+    let methods = [Method::layers(&data.manifest.display, PLANES)];
+    let psnr = |margin: usize| {
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            margin,
+        };
+        let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
+        rows[0].mean.amplitude_psnr
+    };
+    let (whole, inner) = (psnr(0), psnr(10));
+    assert!(inner > whole + 0.5 && inner > 18.0, "{whole} {inner}");
+}
+
 #[test]
 fn encoded_fields_are_judged_as_their_files_look() {
     let data = Data::new();
@@ -334,4 +359,6 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(&[], 2, "--method");
     refused(&["--method", "rgb", "--split", "validation"], 1, "pair_000076.npz");
     refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
+    refused(&["--method", "rgb", "--margin", "24"], 1, "leaves nothing");
+    refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
 }

@@ -8,7 +8,7 @@ use phasefront::target::Response;
 use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
 use phasefront::{Display, EncoderOptions, Sweep, Target};
 use phasefront_lab::dataset::Manifest;
-use phasefront_lab::evaluate::{self, Method, Row, Shown};
+use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown};
 use phasefront_lab::{Error, Result, models};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -77,6 +77,9 @@ pub(crate) struct Evaluate {
     /// Chooses the random depths of the focal stacks
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
     seed: u64,
+    /// Pixels at each scene's border that do not count; the reach of light at an offset is λ/2p of it: 30 pixels for 6 mm
+    #[arg(long, value_name = "PX", default_value_t = 0)]
+    margin: usize,
     /// Folder for pictures of the worst scenes: input, ours, truth, 4 times the difference
     #[arg(long, value_name = "DIR")]
     pictures: Option<PathBuf>,
@@ -123,9 +126,13 @@ impl Evaluate {
             std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
         }
         let bar = progress_bar(scenes.len() as u64, "scenes");
-        let rows = evaluate::evaluate(&manifest, &self.data, &scenes, &methods, &shown, self.seed, &|| {
-            bar.inc(1)
-        })?;
+        let sample = Sample {
+            scenes,
+            seed: self.seed,
+            margin: self.margin,
+        };
+        let rows = evaluate::evaluate(&manifest, &self.data, &sample, &methods, &shown, &|| bar.inc(1))?;
+        let scenes = sample.scenes;
         bar.finish_and_clear();
         if let Some(dir) = &self.pictures {
             for (way, row) in rows.iter().enumerate() {
@@ -144,7 +151,7 @@ impl Evaluate {
         let value = json!({
             "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
             "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
-            "offset_mm": self.offset_mm, "bits": self.bits,
+            "offset_mm": self.offset_mm, "bits": self.bits, "margin": self.margin,
             "focal_stack": {
                 "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
             },
