@@ -2211,8 +2211,8 @@ public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> U
 
 
 /**
- * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its lasers'
- * light, what corrects its optics. Immutable; one serves many sessions.
+ * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
+ * lasers' light, what corrects its optics. Immutable; one serves many sessions.
  */
 public protocol TargetProtocol: AnyObject, Sendable {
     
@@ -2223,8 +2223,8 @@ public protocol TargetProtocol: AnyObject, Sendable {
     
 }
 /**
- * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its lasers'
- * light, what corrects its optics. Immutable; one serves many sessions.
+ * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
+ * lasers' light, what corrects its optics. Immutable; one serves many sessions.
  */
 open class Target: TargetProtocol, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -2506,7 +2506,8 @@ public struct ColourInfo: Equatable, Hashable {
      */
     public var matrix: YuvMatrix
     /**
-     * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at it.
+     * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
+     * it.
      */
     public var videoRange: Bool
 
@@ -2529,7 +2530,8 @@ public struct ColourInfo: Equatable, Hashable {
          * The matrix of luma and chroma; other formats do not look at it.
          */matrix: YuvMatrix, 
         /**
-         * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at it.
+         * Whether luma runs over 16..=235 and chroma over 16..=240, not both over 0..=255; other formats do not look at
+         * it.
          */videoRange: Bool) {
         self.format = format
         self.width = width
@@ -4124,6 +4126,16 @@ public struct SessionOptions {
      */
     public var brightness: Brightness
     /**
+     * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
+     * the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+     */
+    public var dark: Float?
+    /**
+     * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
+     * the encoding: 1, and 0 with a pre-filter.
+     */
+    public var localSteps: UInt32?
+    /**
      * Which metres are shown at the ends of the volume.
      */
     public var depthRange: DepthRange
@@ -4162,6 +4174,14 @@ public struct SessionOptions {
          * Which amplitude full light stands for.
          */brightness: Brightness, 
         /**
+         * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
+         * the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+         */dark: Float? = nil, 
+        /**
+         * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
+         * the encoding: 1, and 0 with a pre-filter.
+         */localSteps: UInt32? = nil, 
+        /**
          * Which metres are shown at the ends of the volume.
          */depthRange: DepthRange, 
         /**
@@ -4179,6 +4199,8 @@ public struct SessionOptions {
         self.targetRateHz = targetRateHz
         self.encoding = encoding
         self.brightness = brightness
+        self.dark = dark
+        self.localSteps = localSteps
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
         self.threads = threads
@@ -4207,6 +4229,8 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 targetRateHz: FfiConverterOptionDouble.read(from: &buf), 
                 encoding: FfiConverterTypeEncoding.read(from: &buf), 
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
+                dark: FfiConverterOptionFloat.read(from: &buf), 
+                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
                 threads: FfiConverterOptionUInt32.read(from: &buf), 
@@ -4221,6 +4245,8 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterOptionDouble.write(value.targetRateHz, into: &buf)
         FfiConverterTypeEncoding.write(value.encoding, into: &buf)
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
+        FfiConverterOptionFloat.write(value.dark, into: &buf)
+        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
         FfiConverterOptionUInt32.write(value.threads, into: &buf)
@@ -6557,8 +6583,8 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
 }
 }
 /**
- * The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default display's
- * pitch, colours and volume.
+ * The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default
+ * display's pitch, colours and volume.
  *
  * # Errors
  * Another offset, or a library that was built without them.
@@ -6572,9 +6598,9 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
 })
 }
 /**
- * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM, or, without one, by the
- * pair of networks that is built in for its display, by the plane sweep where there is none; steady brightness, near and
- * far by percentiles.
+ * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of correction,
+ * or, without a method, by the network that is built in, by the plane sweep where it was not trained for the display;
+ * steady brightness, near and far by percentiles.
  */
 public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -6610,10 +6636,10 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 8380) {
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 32548) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 17526) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 5795) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
