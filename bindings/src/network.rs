@@ -33,8 +33,8 @@ pub struct DeepPair {
     pub prefilter: Arc<Network>,
 }
 
-/// The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default
-/// display's pitch, colours and volume.
+/// The pair in int8 that comes along for a modulator at `offset_mm` and the default display's pitch, colours and
+/// volume.
 ///
 /// # Errors
 /// Another offset, or a library that was built without them.
@@ -59,8 +59,14 @@ mod built_in {
     use phasefront_models::Precision::Int8;
     use std::sync::Arc;
 
-    pub(super) fn network() -> Option<Arc<phasefront::Network>> {
-        phasefront_models::network("rgbd-8", Int8)
+    pub(super) fn network(name: &str) -> Option<Arc<phasefront::Network>> {
+        phasefront_models::network(name, Int8)
+    }
+
+    /// What networks are called.
+    pub(super) fn names() -> String {
+        let names: Vec<_> = phasefront_models::NETWORKS.iter().map(|model| model.name).collect();
+        names.join(", ")
     }
 
     /// Which pairs there are.
@@ -82,8 +88,12 @@ mod built_in {
 /// Nothing.
 #[cfg(not(feature = "built-in-network"))]
 mod built_in {
-    pub(super) fn network() -> Option<std::sync::Arc<phasefront::Network>> {
+    pub(super) fn network(_: &str) -> Option<std::sync::Arc<phasefront::Network>> {
         None
+    }
+
+    pub(super) fn names() -> &'static str {
+        "none is"
     }
 
     pub(super) fn offsets() -> String {
@@ -123,17 +133,19 @@ impl Network {
         })
     }
 
-    /// The network of 8 layers in int8 that comes along, for the default display's pitch, colours and volume.
+    /// A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default
+    /// display's pitch, colours and volume.
     ///
     /// # Errors
-    /// A library that was built without it.
-    #[uniffi::constructor]
-    pub fn built_in() -> Result<Arc<Self>, PhasefrontError> {
-        guard(|| match built_in::network() {
+    /// A name that none has, or a library that was built without them.
+    #[uniffi::constructor(default(name = "rgbd-8"))]
+    pub fn built_in(name: &str) -> Result<Arc<Self>, PhasefrontError> {
+        guard(|| match built_in::network(name) {
             Some(core) => Ok(Arc::new(Network { core })),
-            None => Err(PhasefrontError::Network(
-                "network: none is built in; load one from a file, or build with the feature built-in-network".into(),
-            )),
+            None => Err(PhasefrontError::Network(format!(
+                "network: no '{name}' is built in ({}); load one from a file, or build with the feature built-in-network",
+                built_in::names()
+            ))),
         })
     }
 

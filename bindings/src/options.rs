@@ -150,12 +150,12 @@ pub struct SessionOptions {
     pub encoding: Encoding,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
-    /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
-    /// the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+    /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+    /// in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub dark: Option<f32>,
-    /// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
-    /// the encoding: 1, and 0 with a pre-filter.
+    /// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
+    /// suits the encoding: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
     /// Which metres are shown at the ends of the volume.
@@ -229,9 +229,9 @@ impl Method {
     }
 }
 
-/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of correction,
-/// or, without a method, by the network that is built in, by the plane sweep where it was not trained for the display;
-/// steady brightness, near and far by percentiles.
+/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
+/// correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
+/// the display; steady brightness, near and far by percentiles.
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {

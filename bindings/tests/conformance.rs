@@ -68,11 +68,11 @@ fn options(case: &Value) -> SessionOptions {
     };
     let method = match case["method"].as_str().unwrap() {
         "network" => Method::Trained {
-            network: Network::built_in().unwrap(),
+            network: Network::built_in("rgbd-8").unwrap(),
         },
         "sweep" => Method::Sweep,
         "by-sharpness" => Method::BySharpness {
-            network: Network::built_in().unwrap(),
+            network: Network::built_in("rgbd-8").unwrap(),
         },
         file => Method::Trained { network: model(file) },
     };

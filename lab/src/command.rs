@@ -8,6 +8,7 @@ mod dataset;
 mod evaluate;
 mod flags;
 mod hologram;
+mod method;
 mod occlusion;
 mod refocus;
 mod scene;

@@ -342,7 +342,8 @@ impl Viewer {
         })
     }
 
-    /// The amplitudes of the midpoint hologram `field`, (3, H, W), at each of `z_m`, metres, where it is shown by `shown`.
+    /// The amplitudes of the midpoint hologram `field`, (3, H, W), at each of `z_m`, metres, where it is shown by
+    /// `shown`.
     ///
     /// # Errors
     /// A z outside of the volume, or levels that cannot be planned.
@@ -388,8 +389,8 @@ pub struct Sample {
     pub margin: usize,
 }
 
-/// Judges each of `methods` in each of the ways `shown` on the `sample` of the data set in `dir`: rows in that order, the
-/// ways of a method together. `done` hears of each scene.
+/// Judges each of `methods` in each of the ways `shown` on the `sample` of the data set in `dir`: rows in that order,
+/// the ways of a method together. `done` hears of each scene.
 ///
 /// # Errors
 /// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.

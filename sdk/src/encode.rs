@@ -4,55 +4,18 @@
 //! Encoders take the field as given: its phase, its offset, its scale. Phases lie in \[0, 2π).
 //! What level shows a phase is [`crate::slm`]'s knowledge; an amplitude's scale is what full light stands for.
 
-pub mod anti_alias;
-pub mod band_limit;
 mod dark;
-pub mod deep;
 pub mod double_phase;
 mod encoder;
+mod encoding;
 pub mod local;
 pub mod midpoint;
 mod start;
 
 use crate::brightness::Brightness;
 use crate::error::{Error, Result};
-use crate::network::Network;
 pub use encoder::{Encoder, EncoderScratch};
-use std::sync::Arc;
-
-/// A way from a field to phases.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub enum Encoding {
-    /// Double phase on the field as it is, Eq. 7.
-    DoublePhase,
-    /// AA-DPM: a small Gaussian blur first. `sigma` in pixels over `width` taps (odd).
-    AntiAlias {
-        /// Standard deviation, pixels.
-        sigma: f32,
-        /// Taps, an odd number.
-        width: usize,
-    },
-    /// BL-DPM: high diagonal frequencies cut first; larger `k` keeps more.
-    BandLimit {
-        /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel.
-        k: f32,
-    },
-    /// DDPM: a pre-filter network first, trained for the modulator's offset.
-    Deep(Arc<Network>),
-}
-
-impl Encoding {
-    /// AA-DPM as published: σ 0.7 over 3 pixels.
-    pub const ANTI_ALIAS: Self = Encoding::AntiAlias { sigma: 0.7, width: 3 };
-    /// BL-DPM as published: k = 1.
-    pub const BAND_LIMIT: Self = Encoding::BandLimit { k: 1.0 };
-
-    /// Whether it was trained on the phase that a network's field has.
-    pub(crate) fn keeps_phase(&self) -> bool {
-        matches!(self, Encoding::Deep(_))
-    }
-}
+pub use encoding::{Encoding, anti_alias, band_limit, deep};
 
 /// How a field becomes levels.
 #[derive(Debug, Clone)]
@@ -61,14 +24,14 @@ pub struct EncoderOptions {
     pub encoding: Encoding,
     /// Which amplitude full light stands for.
     pub brightness: Brightness,
-    /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase, which
-    /// shows noise there as coloured speckle. 0 leaves phases as they are.
+    /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase,
+    /// which shows noise there as coloured speckle. 0 leaves phases as they are.
     pub dark: f32,
     /// Steps of local correction: each draws what is shown behind the display's aperture toward the field that is
     /// wanted. The first brings most; 8 at most.
     pub local_steps: usize,
-    /// Steps of correction at the midpoint after them, for stills: sharper there, at four transforms a colour and step. 3
-    /// bring nearly all; 100 at most.
+    /// Steps of correction at the midpoint after them, for stills: sharper there, at four transforms a colour and step.
+    /// 3 bring nearly all; 100 at most.
     pub midpoint_steps: usize,
 }
 
@@ -121,8 +84,8 @@ impl Default for EncoderOptions {
 }
 
 impl From<Encoding> for EncoderOptions {
-    /// This encoding, steady brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two: with
-    /// it both are 0.
+    /// This encoding, steady brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two:
+    /// with it both are 0.
     fn from(encoding: Encoding) -> Self {
         let (dark, local_steps) = match encoding {
             Encoding::Deep(_) => (0.0, 0),

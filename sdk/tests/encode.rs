@@ -17,8 +17,8 @@ use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use reference::test_plane;
 use rustfft::num_complex::{Complex32, Complex64};
 
-/// What double phase begins with, value by value: the field drawn to the real axis where it is dark, blurred, divided by
-/// the light, over `scale`.
+/// What double phase begins with, value by value: the field drawn to the real axis where it is dark, blurred, divided
+/// by the light, over `scale`.
 fn start(
     field: &[Complex32],
     (h, w): (usize, usize),
@@ -129,8 +129,8 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
     }
 }
 
-/// A picture with noise where it is dark, by what is seen of it behind the aperture: root mean square of the amplitudes'
-/// difference.
+/// A picture with noise where it is dark, by what is seen of it behind the aperture: root mean square of the
+/// amplitudes' difference.
 fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illumination>) -> f64 {
     let shape @ (h, w) = (96, 120);
     let target = Target {

@@ -245,6 +245,9 @@ def test_networks_that_are_none_are_named(tmp_path):
         Network.from_file(str(tmp_path / "text.onnx"))
     with pytest.raises(PhasefrontError.Network):
         Network.from_bytes(b"")
+    with pytest.raises(PhasefrontError.Network, match="rgbd-8, rgbd-15"):
+        Network.built_in("rgbd-9")
+    assert Network.built_in("rgbd-15").info().layers == 15
     info = Network.built_in().info()
     assert (info.layers, info.pitch_um) == (8, 8.0)
 

@@ -77,7 +77,8 @@ pub(crate) struct Evaluate {
     /// Chooses the random depths of the focal stacks
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
     seed: u64,
-    /// Pixels at each scene's border that do not count; the reach of light at an offset is λ/2p of it: 30 pixels for 6 mm
+    /// Pixels at each scene's border that do not count; the reach of light at an offset is λ/2p of it: 30 pixels for 6
+    /// mm
     #[arg(long, value_name = "PX", default_value_t = 0)]
     margin: usize,
     /// Folder for pictures of the worst scenes: input, ours, truth, 4 times the difference

@@ -1,5 +1,6 @@
 //! Flags that several commands share.
 
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use phasefront::unstable::depth::DepthUnit;
@@ -10,7 +11,7 @@ use phasefront_lab::models::Precision;
 use phasefront_lab::rgbd::{self, DepthOptions};
 use phasefront_lab::{Error, Result, gpu, models};
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// The display that a hologram is for.
 #[derive(Args)]
@@ -45,7 +46,8 @@ pub(crate) struct EncoderFlags {
     /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: the one of --network ddpm-8]
     #[arg(long, value_name = "FILE")]
     prefilter: Option<String>,
-    /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0 with
+    /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0
+    /// with
     /// --encoder deep]
     #[arg(long, value_name = "D")]
     dark: Option<f32>,
@@ -87,7 +89,7 @@ impl EncoderFlags {
             Some(file) => Some(models::network(file, Precision::Float32)?),
             None => None,
         };
-        let name = self.encoder.unwrap_or(EncoderName::AntiAlias);
+        let name = self.encoder.unwrap_or(EncoderName("anti-alias"));
         Ok(self.encoder(name.encoding(prefilter)?, name))
     }
 
@@ -106,7 +108,7 @@ impl EncoderFlags {
 
     /// Whether the pre-filter is asked for by name.
     pub(crate) fn is_deep(&self) -> bool {
-        matches!(self.encoder, Some(EncoderName::Deep))
+        matches!(self.encoder, Some(EncoderName(DEEP)))
     }
 
     /// The network called `network`, and the encoder that belongs to it or is asked for: the pair that comes along for
@@ -127,7 +129,7 @@ impl EncoderFlags {
                     offsets.collect::<Vec<_>>().join(", ")
                 )));
             };
-            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::Deep);
+            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName(DEEP));
             return Ok((pair.hologram, encoder));
         }
         if by_name {
@@ -140,44 +142,53 @@ impl EncoderFlags {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(crate) enum EncoderName {
-    /// Double phase
-    Double,
-    /// Double phase after a small blur (AA-DPM)
-    AntiAlias,
-    /// Double phase after a cut of high frequencies (BL-DPM)
-    BandLimit,
-    /// Double phase after a pre-filter network (DDPM)
-    Deep,
+/// What the encoding with a pre-filter is called.
+const DEEP: &str = "deep";
+
+/// The name of an encoder: one of the core's, or [`DEEP`].
+#[derive(Clone, Copy)]
+pub(crate) struct EncoderName(&'static str);
+
+impl ValueEnum for EncoderName {
+    fn value_variants<'a>() -> &'a [Self] {
+        static NAMES: LazyLock<Vec<EncoderName>> = LazyLock::new(|| {
+            let names = Encoding::BY_NAME.iter().map(|(name, ..)| *name);
+            names.chain([DEEP]).map(EncoderName).collect()
+        });
+        &NAMES
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let what = match self.known() {
+            Some((_, what, _)) => what,
+            None => "Double phase after a pre-filter network (DDPM)",
+        };
+        Some(PossibleValue::new(self.0).help(what))
+    }
 }
 
 impl EncoderName {
+    fn known(self) -> Option<&'static (&'static str, &'static str, Encoding)> {
+        Encoding::BY_NAME.iter().find(|(name, ..)| *name == self.0)
+    }
+
     pub(crate) fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
-        Ok(match (self, prefilter) {
-            (EncoderName::Double, None) => Encoding::DoublePhase,
-            (EncoderName::AntiAlias, None) => Encoding::ANTI_ALIAS,
-            (EncoderName::BandLimit, None) => Encoding::BAND_LIMIT,
-            (EncoderName::Deep, Some(network)) => Encoding::Deep(network),
-            (EncoderName::Deep, None) => {
+        Ok(match (self.known(), prefilter) {
+            (Some((.., encoding)), None) => encoding.clone(),
+            (None, Some(network)) => Encoding::Deep(network),
+            (None, None) => {
                 return Err(Error::Input("--encoder deep needs --prefilter".into()));
             }
-            (_, Some(_)) => {
+            (Some((name, ..)), Some(_)) => {
                 return Err(Error::Input(format!(
-                    "--prefilter goes with --encoder deep, not with {}",
-                    self.name()
+                    "--prefilter goes with --encoder deep, not with {name}"
                 )));
             }
         })
     }
 
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            EncoderName::Double => "double",
-            EncoderName::AntiAlias => "anti-alias",
-            EncoderName::BandLimit => "band-limit",
-            EncoderName::Deep => "deep",
-        }
+        self.0
     }
 }
 

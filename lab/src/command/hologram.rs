@@ -1,6 +1,8 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
 use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, FrameFlags, progress_bar};
+use super::method::{CoreMethod, Parts};
+use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
 use num_complex::Complex32;
@@ -19,7 +21,7 @@ use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
 use phasefront_models::usual_network;
 use serde_json::json;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
 /// Make a phase-only hologram of an RGB-D image or a layered depth image
@@ -30,7 +32,8 @@ pub(crate) struct Hologram {
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
     #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
     ldi: Option<PathBuf>,
-    /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi and no
+    /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
+    /// and no
     /// --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
@@ -67,20 +70,29 @@ pub(crate) struct Hologram {
     output: PathBuf,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Clone, Copy, PartialEq)]
 enum Method {
-    /// A trained network on the RGB-D image
-    Network,
-    /// The plane sweep on the RGB-D image: waves by short filters, any display
-    Sweep,
-    /// The plane sweep corrected by a network that was trained on it
-    Seeded,
-    /// The plane sweep where depth is sharp, a network where it is ragged
-    Auto,
-    /// Silhouette-mask layers: exact waves, slow
+    Core(CoreMethod),
     Layers,
-    /// A sub-hologram for each point (Maimone et al.)
     Points,
+}
+
+impl ValueEnum for Method {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Method>> = LazyLock::new(|| {
+            let core = CoreMethod::value_variants().iter().map(|method| Method::Core(*method));
+            core.chain([Method::Layers, Method::Points]).collect()
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Method::Core(method) => method.to_possible_value(),
+            Method::Layers => Some(PossibleValue::new("layers").help("Silhouette-mask layers: exact waves, slow")),
+            Method::Points => Some(PossibleValue::new("points").help("A sub-hologram for each point (Maimone et al.)")),
+        }
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -166,8 +178,8 @@ impl Hologram {
     fn make(&self, display: &DisplayFile) -> Result<Made> {
         let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
             (Some(_), None) => Method::Layers,
-            (None, None) if !self.encoder.is_deep() => Method::Auto,
-            _ => Method::Network,
+            (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
+            _ => Method::Core(CoreMethod::Network),
         });
         let device = self.backend.device()?;
         if device.is_some()
@@ -178,43 +190,26 @@ impl Hologram {
                     .into(),
             ));
         }
-        let method = match (method, &self.ldi) {
-            (Method::Auto, None) => {
-                let trained = self.network.is_some() || usual_network(&display.target.display).is_some();
-                match trained && !sharpness::measure(&self.frame.read()?).is_sharp() {
-                    true => Method::Network,
-                    false => Method::Sweep,
-                }
-            }
-            (method, _) => method,
-        };
         match (method, &self.ldi) {
-            (Method::Network, None) => {
-                let precision = self.precision.precision();
-                let name = self.network.as_deref();
-                let (network, encoder) =
-                    (self.encoder).with_network(name, precision, &display.target.display)?;
-                let method = phasefront::Method::trained(network);
-                self.by_core("network", method, display, encoder, device.as_ref())
+            (Method::Core(method), None) => {
+                let method = match method {
+                    CoreMethod::Auto => self.by_sharpness(&display.target.display)?,
+                    method => method,
+                };
+                let (core, encoder) = method.of(&Parts {
+                    network: self.network.as_deref(),
+                    precision: self.precision.precision(),
+                    display: &display.target.display,
+                    sweep: sweep_for(&display.target.display, self.planes, self.taps),
+                    encoder: &self.encoder,
+                })?;
+                self.by_core(method.name(), core, display, encoder, device.as_ref())
             }
-            (Method::Seeded, None) => {
-                let name = self.network.as_deref().unwrap_or(models::SEEDED);
-                let network = models::network(name, self.precision.precision())?;
-                let method = phasefront::Method::Seeded(network);
-                let encoder = self.encoder.read()?;
-                self.by_core("seeded", method, display, encoder, device.as_ref())
-            }
-            (Method::Sweep, None) => {
-                let sweep = sweep_for(&display.target.display, self.planes, self.taps);
-                let method = phasefront::Method::Sweep(sweep);
-                let encoder = self.encoder.read()?;
-                self.by_core("sweep", method, display, encoder, device.as_ref())
-            }
-            (Method::Auto, _) | (Method::Sweep | Method::Seeded, Some(_)) => Err(Error::Input(
+            (Method::Core(method), Some(_)) if method != CoreMethod::Network => Err(Error::Input(
                 "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
                     .into(),
             )),
-            (Method::Layers | Method::Points | Method::Network, source) => {
+            (method, source) => {
                 let ldi = match source {
                     None => single_layer(&self.frame.read()?)?,
                     Some(dir) => Ldi::read(dir)?,
@@ -222,6 +217,15 @@ impl Hologram {
                 self.by_layers(method, &ldi, display, self.encoder.read()?)
             }
         }
+    }
+
+    /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
+    fn by_sharpness(&self, display: &phasefront::Display) -> Result<CoreMethod> {
+        let trained = self.network.is_some() || usual_network(display).is_some();
+        Ok(match trained && !sharpness::measure(&self.frame.read()?).is_sharp() {
+            true => CoreMethod::Network,
+            false => CoreMethod::Sweep,
+        })
     }
 
     fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
@@ -355,7 +359,7 @@ impl Hologram {
         };
         let mut engine = None;
         let (stage, mut field) = match method {
-            Method::Network => {
+            Method::Core(_) => {
                 let plan = self.network_for_layers(display)?.plan(height, width)?;
                 let mut field = Array3::zeros((3, height, width));
                 let values = field.as_slice_mut().expect("standard layout");

@@ -2,15 +2,16 @@
 
 use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
+use super::method::{CoreMethod, Parts};
 use clap::{Args, ValueEnum};
 use ndarray::ArrayView3;
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
 use phasefront::unstable::depth::DepthUnit;
-use phasefront::{Brightness, Hologram, Method, Session, SessionOptions, Sweep, Target};
+use phasefront::{Brightness, Hologram, Session, SessionOptions, Sweep, Target};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::video::{self, RawVideo, VideoFrame};
-use phasefront_lab::{Error, Result, gpu, models};
+use phasefront_lab::{Error, Result, gpu};
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -31,8 +32,8 @@ pub(crate) struct Video {
     #[command(flatten)]
     depth: DepthFlags,
     /// How the holograms are made
-    #[arg(long, value_enum, default_value_t = MethodName::Network)]
-    method: MethodName,
+    #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
+    method: CoreMethod,
     /// A network that comes along, or an ONNX file [default: 8]
     #[arg(long, value_name = "ddpm-8|8|15|FILE")]
     network: Option<String>,
@@ -69,18 +70,6 @@ pub(crate) struct Video {
     /// Folder of what comes out: phase_000000.png …, preview_000000.png …, statistics.json
     #[arg(short, value_name = "DIR")]
     output: Option<PathBuf>,
-}
-
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
-enum MethodName {
-    /// A trained network
-    Network,
-    /// The plane sweep: any display
-    Sweep,
-    /// The plane sweep corrected by a network
-    Seeded,
-    /// For each frame the plane sweep where depth is sharp, the network where it is ragged
-    Auto,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -289,23 +278,13 @@ impl Video {
             ..target
         };
         let display = target.display.clone();
-        let (name, precision) = (self.network.as_deref(), self.precision.precision());
-        let sweep = Sweep::for_display(&display);
-        let (method, encoder) = match self.method {
-            MethodName::Network => {
-                let (network, encoder) = self.encoder.with_network(name, precision, &display)?;
-                (Method::trained(network), encoder)
-            }
-            MethodName::Seeded => {
-                let network = models::network(name.unwrap_or(models::SEEDED), precision)?;
-                (Method::Seeded(network), self.encoder.read()?)
-            }
-            MethodName::Sweep => (Method::Sweep(sweep), self.encoder.read()?),
-            MethodName::Auto => {
-                let network = models::network(name.unwrap_or("8"), precision)?;
-                (Method::BySharpness(sweep, network), self.encoder.read()?)
-            }
-        };
+        let (method, encoder) = self.method.of(&Parts {
+            network: self.network.as_deref(),
+            precision: self.precision.precision(),
+            display: &display,
+            sweep: Sweep::for_display(&display),
+            encoder: &self.encoder,
+        })?;
         let mut options = SessionOptions::new(target, method);
         options.encoder = encoder.options;
         options.encoder.brightness = match self.brightness {

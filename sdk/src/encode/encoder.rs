@@ -1,17 +1,15 @@
-//! The plan from fields to phases or levels: what needs the whole field first, then row by row in one sweep over memory.
+//! The plan from fields to phases or levels: what needs the whole field first, then row by row in one sweep over
+//! memory.
 
-use super::anti_alias::AntiAlias;
-use super::band_limit::BandLimit;
 use super::dark::Dark;
-use super::deep::{Deep, DeepScratch};
+use super::encoding::{Prefilter, PrefilterScratch};
 use super::local::{LocalFilter, LocalScratch, Wanted};
 use super::start::{Start, StartScratch};
-use super::{EncoderOptions, Encoding, double_phase};
+use super::{EncoderOptions, double_phase};
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::target::Target;
-use crate::wave::fft::ConvolveScratch;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
@@ -32,13 +30,6 @@ struct Local {
     steps: usize,
 }
 
-enum Prefilter {
-    None,
-    AntiAlias(AntiAlias),
-    BandLimit(BandLimit),
-    Deep(Deep),
-}
-
 /// Working memory of an [`Encoder`] for one call at a time.
 pub struct EncoderScratch {
     prefilter: Option<PrefilterScratch>,
@@ -54,11 +45,6 @@ struct PartScratch {
     start: StartScratch,
     local: Option<LocalScratch>,
     row: Vec<Complex32>,
-}
-
-enum PrefilterScratch {
-    Spectrum(ConvolveScratch),
-    Deep(DeepScratch),
 }
 
 /// What is done to a field row by row.
@@ -78,8 +64,8 @@ enum Row<'a> {
 }
 
 impl Encoder {
-    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is divided
-    /// by the light that falls there.
+    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
+    /// divided by the light that falls there.
     ///
     /// # Errors
     /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
@@ -92,12 +78,7 @@ impl Encoder {
         }
         target.check()?;
         options.check()?;
-        let prefilter = match &options.encoding {
-            Encoding::DoublePhase => Prefilter::None,
-            Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
-            Encoding::BandLimit { k } => Prefilter::BandLimit(BandLimit::new(height, width, *k)?),
-            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network)?),
-        };
+        let prefilter = Prefilter::new(shape, &options.encoding)?;
         let illumination = target.illumination.clone();
         Ok(Encoder {
             height,
@@ -115,21 +96,13 @@ impl Encoder {
 
     /// Working memory for one call at a time, for the threads of the current pool.
     pub fn scratch(&self) -> EncoderScratch {
-        let blur = match &self.prefilter {
-            Prefilter::AntiAlias(blur) => Some(blur),
-            _ => None,
-        };
-        let prefilter = match &self.prefilter {
-            Prefilter::BandLimit(plan) => Some(PrefilterScratch::Spectrum(plan.scratch())),
-            Prefilter::Deep(plan) => Some(PrefilterScratch::Deep(plan.scratch())),
-            _ => None,
-        };
+        let prefilter = self.prefilter.scratch();
         let wanted = match (&prefilter, &self.local) {
             (Some(_), Some(_)) => vec![Complex32::ZERO; 3 * self.height * self.width],
             _ => Vec::new(),
         };
         let part = || PartScratch {
-            start: StartScratch::new(blur, self.width),
+            start: StartScratch::new(self.prefilter.blur(), self.width),
             local: self
                 .local
                 .as_ref()
@@ -144,9 +117,9 @@ impl Encoder {
         }
     }
 
-    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it
-    /// used, the amplitude that full light stands for: `scale`, or the largest amplitude of the filtered field. `field` is
-    /// worked on: what it holds afterwards means nothing. Allocates nothing.
+    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it used, the amplitude
+    /// that full light stands for: `scale`, or the largest amplitude of the filtered field. `field` is worked on: what
+    /// it holds afterwards means nothing. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `phase` has not 3·H·W values.
@@ -224,16 +197,8 @@ impl Encoder {
         if !scratch.wanted.is_empty() {
             scratch.wanted.copy_from_slice(field);
         }
-        match (&self.prefilter, &mut scratch.prefilter) {
-            (Prefilter::BandLimit(plan), Some(PrefilterScratch::Spectrum(scratch))) => {
-                for plane in field.chunks_exact_mut(plane) {
-                    plan.filter(plane, scratch);
-                }
-            }
-            (Prefilter::Deep(plan), Some(PrefilterScratch::Deep(scratch))) => {
-                plan.filter(field, scratch);
-            }
-            _ => {}
+        if let Some(scratch) = &mut scratch.prefilter {
+            self.prefilter.filter(field, scratch);
         }
         scale.unwrap_or_else(|| {
             let mut most = std::mem::take(&mut scratch.most);
@@ -252,8 +217,8 @@ impl Encoder {
         })
     }
 
-    /// Hands each row of `field`, worked on, to `then`: its index in the stack, what it is, and its part of `out`, which is
-    /// cut into 3·H parts of one size.
+    /// Hands each row of `field`, worked on, to `then`: its index in the stack, what it is, and its part of `out`,
+    /// which is cut into 3·H parts of one size.
     fn rows<T: Send>(
         &self,
         field: &[Complex32],
@@ -275,10 +240,7 @@ impl Encoder {
                 height,
                 colour,
                 dark: work.dark,
-                blur: match &self.prefilter {
-                    Prefilter::AntiAlias(blur) => Some(blur),
-                    _ => None,
-                },
+                blur: self.prefilter.blur(),
                 light: (self.illumination.as_ref()).map(|(light, modulator)| (light, *modulator)),
             };
             let wanted = plane(wanted);

@@ -1,5 +1,5 @@
-//! Local correction of a phase map: what double phase shows behind the aperture is drawn toward the field that is wanted,
-//! by the aperture's filter alone. No propagation, no transform, any offset.
+//! Local correction of a phase map: what double phase shows behind the aperture is drawn toward the field that is
+//! wanted, by the aperture's filter alone. No propagation, no transform, any offset.
 //!
 //! With e the phasors that the modulator shows, |e| = 1, L the light that falls on it, and g the wanted field over the
 //! scale, a step is
@@ -8,11 +8,11 @@
 //!
 //! the projection of Gerchberg and Saxton (Optik 35, 237, 1972) with a short filter B in the aperture's place: of the
 //! spectrum's square the aperture takes only the corners, where the checkerboard's copy of the picture lies. B is the
-//! aperture's circle in 7×7 taps ([`LocalFilter`]). At the frame's edges g − L·e is mirrored about the last pixel, which is not repeated: so the
-//! checkerboard goes on.
+//! aperture's circle in 7×7 taps ([`LocalFilter`]). At the frame's edges g − L·e is mirrored about the last pixel,
+//! which is not repeated: so the checkerboard goes on.
 //!
-//! Rows flow through all steps at once: a step's row needs three rows of the step before on either side, so a part of the
-//! frame keeps seven rows a step and begins that much earlier.
+//! Rows flow through all steps at once: a step's row needs three rows of the step before on either side, so a part of
+//! the frame keeps seven rows a step and begins that much earlier.
 
 use super::start::{Start, StartScratch};
 use num_complex::{Complex32, Complex64};
@@ -28,8 +28,8 @@ const KEPT: usize = 2 * REACH + 1;
 /// Most steps. After the second they bring nothing.
 pub(super) const MAX_STEPS: usize = 8;
 
-/// B in 7×7 taps: the aperture's circle by least squares, with 1 at frequency 0 and 0 at (½, ½). The zero counts most: there
-/// stands the light of the checkerboard, 10⁵ times the spectrum's mean.
+/// B in 7×7 taps: the aperture's circle by least squares, with 1 at frequency 0 and 0 at (½, ½). The zero counts most:
+/// there stands the light of the checkerboard, 10⁵ times the spectrum's mean.
 #[derive(Debug, Clone, Copy)]
 pub struct LocalFilter {
     /// At (dy, dx), alike in all quadrants and about the diagonals.
@@ -45,8 +45,8 @@ impl LocalFilter {
 
     /// Of an aperture of `radius`, 1 reaching the Nyquist frequency.
     ///
-    /// The circle's own taps are k(ρ) = R·J₁(πRρ)/(2ρ); what they lack at the two frequencies is added as a constant and
-    /// as a checkerboard, which is least in their squares.
+    /// The circle's own taps are k(ρ) = R·J₁(πRρ)/(2ρ); what they lack at the two frequencies is added as a constant
+    /// and as a checkerboard, which is least in their squares.
     pub fn of_aperture(radius: f64) -> Self {
         let circle = |y: usize, x: usize| match (x * x + y * y) as f64 {
             0.0 => PI * radius * radius / 4.0,
@@ -104,8 +104,8 @@ impl LocalScratch {
 }
 
 impl LocalFilter {
-    /// Corrects rows `rows` of a plane that begins as `start`, and hands each to `then`: its index and the field whose phase is
-    /// shown.
+    /// Corrects rows `rows` of a plane that begins as `start`, and hands each to `then`: its index and the field whose
+    /// phase is shown.
     pub(super) fn correct(
         &self,
         rows: Range<usize>,
@@ -167,7 +167,8 @@ impl LocalFilter {
         }
     }
 
-    /// z = g − d + B∗d of a row, d = g − L·e being that of the row and of those around it: [above, below], the nearest first.
+    /// z = g − d + B∗d of a row, d = g − L·e being that of the row and of those around it: [above, below], the nearest
+    /// first.
     #[inline(always)]
     fn draw(
         &self,
@@ -263,7 +264,8 @@ fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f3
 }
 
 /// The same by sums over whole planes in f64: the oracle. `start`, (H, W), is what double phase begins with, divided by
-/// the light; `goal` is what shall be shown, both over the scale; `light` falls on each pixel. Gives z of the last step.
+/// the light; `goal` is what shall be shown, both over the scale; `light` falls on each pixel. Gives z of the last
+/// step.
 pub fn reference(
     filter: &LocalFilter,
     (height, width): (usize, usize),

@@ -1,8 +1,8 @@
-//! Correction of a phase map at the midpoint, for stills: what is shown is taken there, drawn toward the wanted field, and
-//! taken back. Four transforms a colour and step.
+//! Correction of a phase map at the midpoint, for stills: what is shown is taken there, drawn toward the wanted field,
+//! and taken back. Four transforms a colour and step.
 //!
-//! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture, and
-//! propagation back over the offset) and T the wanted field there over the scale, a step is
+//! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture,
+//! and propagation back over the offset) and T the wanted field there over the scale, a step is
 //!
 //!   u = K·L·e,  r = λ·T + (1 − λ)·|T|·u/|u| − u,  z = L·e + γ·Kᴴ·r,  e' = z/|z|.
 //!
@@ -19,7 +19,8 @@ use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal stack.
+/// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal
+/// stack.
 const WAVE: f32 = 0.5;
 /// How far a step goes.
 const GAIN: f32 = 1.5;
@@ -90,8 +91,8 @@ impl MidpointSteps {
         }
     }
 
-    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward `field`, (3, H, W) at the modulator, neither filtered nor scaled,
-    /// of which amplitude `scale` stands for full light. Allocates nothing.
+    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward `field`, (3, H, W) at the modulator, neither filtered nor
+    /// scaled, of which amplitude `scale` stands for full light. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `phases` has not 3·H·W values.
@@ -175,8 +176,8 @@ fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
     }
 }
 
-/// The same in f64, value by value: the oracle. `to_midpoint` is K and `to_modulator` Kᴴ; `wanted` is T; `shown` is L·e of
-/// the start, `light` L. Gives L·e of the last step.
+/// The same in f64, value by value: the oracle. `to_midpoint` is K and `to_modulator` Kᴴ; `wanted` is T; `shown` is L·e
+/// of the start, `light` L. Gives L·e of the last step.
 pub fn reference(
     to_midpoint: impl Fn(&[Complex64]) -> Vec<Complex64>,
     to_modulator: impl Fn(&[Complex64]) -> Vec<Complex64>,

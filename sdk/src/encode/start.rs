@@ -1,4 +1,5 @@
-//! What double phase begins with, row by row: the field with its dark drawn to the real axis, blurred, divided by the light.
+//! What double phase begins with, row by row: the field with its dark drawn to the real axis, blurred, divided by the
+//! light.
 
 use super::anti_alias::AntiAlias;
 use super::dark::Dark;

@@ -1,6 +1,6 @@
 // From the field at the modulator to levels: dark, blur, light, double phase, response. `peak` finds the largest
-// amplitude that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants in
-// capitals.
+// amplitude that `encode` then scales by. The header that double_phase.rs writes before this text gives the constants
+// in capitals.
 
 struct Frame { width: i32, height: i32, plane: u32, unused: u32 }
 // The centre tap of the blur and those to one side; the fixed scale.

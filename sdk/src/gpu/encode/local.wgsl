@@ -1,5 +1,5 @@
-// Local correction, after double_phase.wgsl; see encode/local.rs. `begin` leaves d = g − L·e of double phase's phasors e,
-// `step` that of the next ones, and `finish` takes the last step and leaves levels. The header that local.rs writes
+// Local correction, after double_phase.wgsl; see encode/local.rs. `begin` leaves d = g − L·e of double phase's phasors
+// e, `step` that of the next ones, and `finish` takes the last step and leaves levels. The header that local.rs writes
 // gives GOAL_TURN and KEEP_TURN.
 
 // g times the scale.

@@ -51,7 +51,7 @@ impl AntiAlias {
     }
 
     /// Taps to one side of the centre.
-    pub(super) fn half(&self) -> usize {
+    pub(in crate::encode) fn half(&self) -> usize {
         self.taps.len() - 1
     }
 
@@ -111,7 +111,7 @@ impl AntiAlias {
 
     /// Row `y` of `height` blurred, of a ring of rows that are blurred along themselves.
     #[inline(always)]
-    pub(super) fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
+    pub(in crate::encode) fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
         let width = blurred.len();
         let count = ring.len() / width;
         let row = |y: usize| values(&ring[y % count * width..][..width]);
@@ -151,7 +151,7 @@ impl AntiAlias {
 
     /// The blur of `row` along itself into `out`.
     #[inline(always)]
-    pub(super) fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
+    pub(in crate::encode) fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
         let (last, half) = (row.len() - 1, self.taps.len() - 1);
         let inner = half..row.len().saturating_sub(half).max(half);
         for x in (0..half.min(row.len())).chain(inner.end..row.len()) {

@@ -1,0 +1,67 @@
+//! The methods of the core, by the names that the commands have for them.
+
+use super::flags::{Encoder, EncoderFlags};
+use clap::ValueEnum;
+use phasefront::{Display, Method, Sweep};
+use phasefront_lab::Result;
+use phasefront_lab::models::{self, Precision};
+
+/// A method on RGB-D images.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub(super) enum CoreMethod {
+    /// A trained network on the RGB-D image
+    Network,
+    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    Sweep,
+    /// The plane sweep corrected by a network that was trained on it
+    Seeded,
+    /// The plane sweep where depth is sharp, a network where it is ragged
+    Auto,
+}
+
+/// What a method is made of, besides its name.
+pub(super) struct Parts<'a> {
+    /// --network.
+    pub(super) network: Option<&'a str>,
+    pub(super) precision: Precision,
+    pub(super) display: &'a Display,
+    pub(super) sweep: Sweep,
+    pub(super) encoder: &'a EncoderFlags,
+}
+
+impl CoreMethod {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            CoreMethod::Network => "network",
+            CoreMethod::Sweep => "sweep",
+            CoreMethod::Seeded => "seeded",
+            CoreMethod::Auto => "auto",
+        }
+    }
+
+    /// The method, and how its fields become phases.
+    pub(super) fn of(self, parts: &Parts<'_>) -> Result<(Method, Encoder)> {
+        let Parts {
+            network,
+            precision,
+            display,
+            sweep,
+            encoder,
+        } = *parts;
+        Ok(match self {
+            CoreMethod::Network => {
+                let (network, encoder) = encoder.with_network(network, precision, display)?;
+                (Method::trained(network), encoder)
+            }
+            CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
+            CoreMethod::Seeded => {
+                let network = models::network(network.unwrap_or(models::SEEDED), precision)?;
+                (Method::Seeded(network), encoder.read()?)
+            }
+            CoreMethod::Auto => {
+                let network = models::network(network.unwrap_or("8"), precision)?;
+                (Method::BySharpness(sweep, network), encoder.read()?)
+            }
+        })
+    }
+}
