@@ -416,8 +416,7 @@ void uniffi_phasefront_ffi_fn_free_network(uint64_t handle, RustCallStatus *_Non
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_NETWORK_BUILT_IN
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_NETWORK_BUILT_IN
-uint64_t uniffi_phasefront_ffi_fn_constructor_network_built_in(RustCallStatus *_Nonnull out_status
-    
+uint64_t uniffi_phasefront_ffi_fn_constructor_network_built_in(RustBuffer name, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CONSTRUCTOR_NETWORK_FROM_BYTES

@@ -919,15 +919,17 @@ open class Network: NetworkProtocol, @unchecked Sendable {
 
     
     /**
-     * The network of 8 layers in int8 that comes along, for the default display's pitch, colours and volume.
+     * A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default
+     * display's pitch, colours and volume.
      *
      * # Errors
-     * A library that was built without it.
+     * A name that none has, or a library that was built without them.
      */
-public static func builtIn()throws  -> Network  {
+public static func builtIn(name: String = "rgbd-8")throws  -> Network  {
     return try  FfiConverterTypeNetwork_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_constructor_network_built_in(uniffiCallStatus
+    uniffi_phasefront_ffi_fn_constructor_network_built_in(
+        FfiConverterString.lower(name),uniffiCallStatus
     )
 })
 }
@@ -4126,13 +4128,13 @@ public struct SessionOptions {
      */
     public var brightness: Brightness
     /**
-     * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
-     * the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+     * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+     * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
      */
     public var dark: Float?
     /**
-     * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
-     * the encoding: 1, and 0 with a pre-filter.
+     * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
+     * suits the encoding: 1, and 0 with a pre-filter.
      */
     public var localSteps: UInt32?
     /**
@@ -4174,12 +4176,12 @@ public struct SessionOptions {
          * Which amplitude full light stands for.
          */brightness: Brightness, 
         /**
-         * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
-         * the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+         * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
+         * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
          */dark: Float? = nil, 
         /**
-         * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits
-         * the encoding: 1, and 0 with a pre-filter.
+         * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
+         * suits the encoding: 1, and 0 with a pre-filter.
          */localSteps: UInt32? = nil, 
         /**
          * Which metres are shown at the ends of the volume.
@@ -6583,8 +6585,8 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
 }
 }
 /**
- * The pair of 8 layers in int8 that comes along for a modulator at `offset_mm`, 0, 6 or 12, and for the default
- * display's pitch, colours and volume.
+ * The pair in int8 that comes along for a modulator at `offset_mm` and the default display's pitch, colours and
+ * volume.
  *
  * # Errors
  * Another offset, or a library that was built without them.
@@ -6598,9 +6600,9 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
 })
 }
 /**
- * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of correction,
- * or, without a method, by the network that is built in, by the plane sweep where it was not trained for the display;
- * steady brightness, near and far by percentiles.
+ * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
+ * correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
+ * the display; steady brightness, near and far by percentiles.
  */
 public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -6636,10 +6638,10 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 32548) {
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 58806) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 5795) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 35800) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
@@ -6732,7 +6734,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 58428) {
+    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 35155) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_network_from_bytes() != 39143) {
