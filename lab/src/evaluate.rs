@@ -27,6 +27,7 @@ use phasefront::unstable::sweep::{
     hidden::{Hidden, NOTHING},
     hidden_reach,
 };
+use phasefront::unstable::wave::aperture::Aperture;
 use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -265,6 +266,10 @@ pub struct Figures {
     pub focal_psnr: f64,
     /// Mean over the focal stack.
     pub focal_ssim: f64,
+    /// Mean amplitude at the midpoint over the truth's.
+    pub brightness: f64,
+    /// Share of the modulator's light that passes the aperture; 1 for what is shown as the complex field it is.
+    pub light: f64,
 }
 
 /// One way on all scenes.
@@ -347,9 +352,10 @@ impl Viewer {
     ///
     /// # Errors
     /// A z outside of the volume, or levels that cannot be planned.
-    pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+    pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Seen> {
         let size = self.size;
         let mut values = field.iter().copied().collect::<Vec<_>>();
+        let mut light = 1.0;
         let of_levels;
         let refocus = match &shown.levels {
             None => &self.complex,
@@ -363,6 +369,7 @@ impl Viewer {
                 let mut levels = vec![0; values.len()];
                 let modulation = modulator.modulate(&mut values, &mut levels, &mut scratch);
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
+                light = self.light(&values)?;
                 of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(APERTURE_RADIUS))?;
                 &of_levels
             }
@@ -370,11 +377,33 @@ impl Viewer {
         if let Some(optics) = &self.optics {
             optics.pass(&mut values);
         }
-        let views = refocus.focal_stack(&values, z_m)?;
-        Ok((views.into_iter())
-            .map(|view| Array3::from_shape_vec((3, size, size), view).expect("the field's shape"))
-            .collect())
+        let views = refocus.focal_stack(&values, z_m)?.into_iter();
+        let view = |view| Array3::from_shape_vec((3, size, size), view).expect("the field's shape");
+        Ok(Seen {
+            views: views.map(view).collect(),
+            light,
+        })
     }
+
+    /// The share of the light of `shown`, (3, H, W) at the modulator, that passes the aperture.
+    fn light(&self, shown: &[Complex32]) -> Result<f64> {
+        let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
+        let aperture = Aperture::new(self.size, self.size, APERTURE_RADIUS)?;
+        let mut scratch = aperture.scratch();
+        let mut passed = shown.to_vec();
+        for plane in passed.chunks_exact_mut(self.size * self.size) {
+            aperture.filter(plane, &mut scratch);
+        }
+        Ok(energy(&passed) / energy(shown))
+    }
+}
+
+/// What is seen of a hologram.
+pub struct Seen {
+    /// Amplitudes, (3, H, W), one for each z.
+    pub views: Vec<Array3<f32>>,
+    /// The share of the modulator's light that passes the aperture; 1 for a complex field.
+    pub light: f64,
 }
 
 /// What is looked at of a data set.
@@ -423,7 +452,7 @@ pub fn evaluate(
             let depths = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
             let mut z_m = vec![0.0];
             z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
-            let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?;
+            let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
             let mut figures = Vec::with_capacity(methods.len() * shown.len());
             for method in methods {
                 let field = (method.field)(&pair.ldi)?;
@@ -449,6 +478,8 @@ pub fn evaluate(
                     amplitude_ssim: mean(|f| f.amplitude_ssim),
                     focal_psnr: mean(|f| f.focal_psnr),
                     focal_ssim: mean(|f| f.focal_ssim),
+                    brightness: mean(|f| f.brightness),
+                    light: mean(|f| f.light),
                 },
                 scenes: scenes.iter().copied().zip(each()).collect(),
             }
@@ -457,7 +488,8 @@ pub fn evaluate(
 }
 
 /// The midpoint view comes first, the focal stack after it.
-fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
+fn judge(seen: &Seen, truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
+    let views = &seen.views;
     let (_, height, width) = truth[0].dim();
     let inner = ndarray::s![.., margin..height - margin, margin..width - margin];
     let each = (views.iter().zip(truth))
@@ -470,6 +502,8 @@ fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<
         amplitude_ssim: midpoint.ssim_overall,
         focal_psnr: mean(|c| c.psnr_overall),
         focal_ssim: mean(|c| c.ssim_overall),
+        brightness: f64::from(views[0].slice(inner).sum() / truth[0].slice(inner).sum()),
+        light: seen.light,
     })
 }
 
@@ -490,8 +524,9 @@ pub fn write_picture(
     let pair = dataset::read_pair(manifest, dir, index)?;
     let ours = viewer
         .views(&(method.field)(&pair.ldi)?, &shown.of(method), &[0.0])?
+        .views
         .remove(0);
-    let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.remove(0);
+    let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.views.remove(0);
     let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
     let gap = Array3::from_elem((3, manifest.size, 4), 1.0);
     let input = visible_rgb(&pair.ldi);

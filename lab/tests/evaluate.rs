@@ -195,7 +195,7 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
     let see = |data: &Data| {
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
         let viewer = Viewer::new(&data.manifest).unwrap();
-        viewer.views(&pair.hologram, &Shown::complex(), &z_m).unwrap()
+        viewer.views(&pair.hologram, &Shown::complex(), &z_m).unwrap().views
     };
     let inner = ndarray::s![.., 12..SIZE - 12, 12..SIZE - 12];
     for (there, here) in see(&corrected).iter().zip(&see(&plain)) {
@@ -260,6 +260,8 @@ fn encoded_fields_are_judged_as_their_files_look() {
         let truth = pair.hologram.mapv(|v| v.norm());
         let direct = metrics::compare(view.view(), truth.view()).unwrap();
         let ours = row.scenes[0].1;
+        assert!(ours.brightness > 0.8 && ours.brightness < 1.2, "{ours:?}");
+        assert!(ours.light > 0.01 && ours.light < 0.9, "{ours:?}");
         // One is padded for the volume, the other not at all, and the aperture's edge falls between other frequencies.
         assert!(
             (ours.amplitude_psnr - direct.psnr_overall).abs() < 1.0,

@@ -13,7 +13,8 @@ use phasefront_lab::{Error, Result, models};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// Judge methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks
+/// Judge methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks; brightness
+/// against the truth's, and the share of the modulator's light that passes the aperture
 ///
 /// A focal stack is a scene's 15 most frequent depths and 5 random ones.
 #[derive(Args)]
@@ -266,7 +267,7 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
         .unwrap_or(0)
         .max(10);
     let mut text = format!(
-        "{:width$}  {:ways$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "{:width$}  {:ways$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
         "method", "shown"
     );
     for row in rows {
@@ -277,13 +278,15 @@ fn table(rows: &[Row], scenes: usize, split: &str) -> String {
             .map(|(_, f)| f.amplitude_psnr)
             .fold(f64::INFINITY, f64::min);
         text += &format!(
-            "\n{:width$}  {:ways$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {least:13.2} ({worst})",
+            "\n{:width$}  {:ways$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
             row.method,
             row.shown,
             row.mean.amplitude_psnr,
             row.mean.amplitude_ssim,
             row.mean.focal_psnr,
             row.mean.focal_ssim,
+            row.mean.brightness,
+            row.mean.light,
         );
     }
     text

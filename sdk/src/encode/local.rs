@@ -6,9 +6,9 @@
 //!
 //!   z = L·e + B∗(g − L·e),  e' = z/|z|,
 //!
-//! the projection of Gerchberg and Saxton (Optik 35, 237, 1972) with a short filter B in the aperture's place: of the
-//! spectrum's square the aperture takes only the corners, where the checkerboard's copy of the picture lies. B is the
-//! aperture's circle in 7×7 taps ([`LocalFilter`]). At the frame's edges g − L·e is mirrored about the last pixel,
+//! the projection of Gerchberg and Saxton (Optik 35, 237, 1972) with a short filter B in the aperture's place, which
+//! cuts off no more than the corners of the spectrum's square, where the checkerboard's copy of the picture lies: its
+//! circle in 7×7 taps ([`LocalFilter`]). At the frame's edges g − L·e is mirrored about the last pixel,
 //! which is not repeated: so the checkerboard goes on.
 //!
 //! Rows flow through all steps at once: a step's row needs three rows of the step before on either side, so a part of
