@@ -1,5 +1,5 @@
-//! The encodings: what each is, its name, and the plan of its filter. Dark, light, correction and levels are the same for
-//! all, and [`super::Encoder`]'s.
+//! The encodings: what each is, its name, and the plan of its filter. Dark, light, correction and levels are the same
+//! for all, and [`super::Encoder`]'s.
 
 pub mod anti_alias;
 pub mod band_limit;
