@@ -7,6 +7,7 @@
 //! frame counts.
 
 use crate::calibrate::table::{self, AberrationFile};
+use crate::ceiling::Ceiling;
 use crate::dataset::{self, Manifest};
 use crate::error::Result;
 use crate::files;
@@ -32,6 +33,7 @@ use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, T
 use rayon::prelude::*;
 use serde::Serialize;
 use std::cmp::Reverse;
+use std::f32::consts::TAU;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -236,6 +238,8 @@ pub struct Shown {
     pub name: String,
     /// By what levels; `None`: it is shown as the complex field it is.
     pub levels: Option<(Target, EncoderOptions)>,
+    /// Steps of descent from there to the [`Ceiling`]; 0 shows the levels as they are.
+    pub ceiling: usize,
 }
 
 impl Shown {
@@ -244,6 +248,7 @@ impl Shown {
         Shown {
             name: "complex".into(),
             levels: None,
+            ceiling: 0,
         }
     }
 
@@ -251,6 +256,7 @@ impl Shown {
         Shown {
             name: self.name.clone(),
             levels: (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options))),
+            ceiling: self.ceiling,
         }
     }
 }
@@ -368,6 +374,9 @@ impl Viewer {
                 modulator.propagate(&mut values, &mut scratch);
                 let mut levels = vec![0; values.len()];
                 let modulation = modulator.modulate(&mut values, &mut levels, &mut scratch);
+                if shown.ceiling > 0 {
+                    self.lift(field, target, modulation.scale, shown.ceiling, &mut levels)?;
+                }
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
                 light = self.light(&values)?;
                 of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(APERTURE_RADIUS))?;
@@ -383,6 +392,27 @@ impl Viewer {
             views: views.map(view).collect(),
             light,
         })
+    }
+
+    /// Takes `levels` by `steps` of descent toward the amplitudes of the midpoint hologram `field`.
+    fn lift(
+        &self,
+        field: &Array3<Complex32>,
+        target: &Target,
+        scale: f32,
+        steps: usize,
+        levels: &mut [u8],
+    ) -> Result<()> {
+        let ceiling = Ceiling::new(self.size, &target.display)?;
+        let wave: Vec<Complex32> = field.iter().map(|u| u / scale).collect();
+        let wanted = self.complex.focal_stack(&wave, &ceiling.z_m())?;
+        let phases = levels.iter().enumerate();
+        let mut phases: Vec<f32> = phases.map(|(at, level)| target.response.phase(*level, at)).collect();
+        ceiling.optimise(&mut phases, &wanted, steps);
+        for (at, (level, phase)) in levels.iter_mut().zip(&phases).enumerate() {
+            *level = target.response.level(phase.rem_euclid(TAU), at);
+        }
+        Ok(())
     }
 
     /// The share of the light of `shown`, (3, H, W) at the modulator, that passes the aperture.

@@ -2,6 +2,7 @@
 
 pub mod bench;
 pub mod calibrate;
+pub mod ceiling;
 pub mod corrected;
 pub mod dataset;
 pub mod depth_study;

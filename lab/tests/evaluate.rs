@@ -77,6 +77,7 @@ fn encoded(display: &Display, name: &str, encoding: Encoding) -> Shown {
     Shown {
         name: name.into(),
         levels: Some((display.into(), options)),
+        ceiling: 0,
     }
 }
 
@@ -206,6 +207,25 @@ fn holograms_that_correct_an_aberration_are_judged_through_it() {
             figures.psnr_overall
         );
     }
+}
+
+#[test]
+fn the_ceiling_is_above_every_encoder() {
+    let data = Data::new();
+    let display = data.manifest.display.clone();
+    let plain = encoded(&display, "anti-alias", Encoding::ANTI_ALIAS);
+    let lifted = Shown {
+        name: "ceiling".into(),
+        ceiling: 60,
+        ..plain.clone()
+    };
+    let rows = data.evaluate(&[Method::layers(&data.manifest.display, PLANES)], &[plain, lifted]);
+    let [plain, lifted] = [0, 1].map(|row: usize| rows[row].mean);
+    assert!(
+        lifted.amplitude_psnr > plain.amplitude_psnr + 1.0,
+        "{plain:?} {lifted:?}"
+    );
+    assert!(lifted.focal_psnr > plain.focal_psnr, "{plain:?} {lifted:?}");
 }
 
 /// At an offset the modulator's frame is too small for the light at its border; away from there it shows the field.

@@ -51,6 +51,10 @@ pub(crate) struct Evaluate {
     /// Each encoder with each of these numbers of steps at the midpoint
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0])]
     midpoint_steps: Vec<usize>,
+    /// Also where a descent of so many steps from the last of these ends: the ceiling of every encoder, some seconds a
+    /// scene
+    #[arg(long, value_name = "N", requires = "encoder")]
+    ceiling: Option<usize>,
     /// z of encoded holograms against the middle of the volume, mm, positive toward the viewer
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
     offset_mm: f64,
@@ -192,9 +196,17 @@ impl Evaluate {
                                 ..encoding.clone().into()
                             },
                         )),
+                        ceiling: 0,
                     }));
                 }
             }
+        }
+        if let (Some(steps), Some(last)) = (self.ceiling, shown.last()) {
+            shown.push(Shown {
+                name: format!("ceiling, {steps} steps"),
+                ceiling: steps,
+                ..last.clone()
+            });
         }
         Ok(shown)
     }
