@@ -691,6 +691,27 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
 }
 
 #[test]
+fn a_hologram_is_judged_by_its_own_wave() {
+    let folder = Folder::new().with_frame();
+    let judged = |more: &[&str]| {
+        let call = [
+            &with(&["-o", "h.png", "--judge", "--json", "--method", "sweep"])[..],
+            more,
+        ]
+        .concat();
+        let made: serde_json::Value = serde_json::from_str(&folder.succeeds(&call)).unwrap();
+        let shown = &made["shown"];
+        assert!(shown["ssim"].as_f64().unwrap() > 0.0 && shown["stack_psnr_db"].as_f64().unwrap() > 5.0);
+        assert!((0.5..2.0).contains(&shown["brightness"].as_f64().unwrap()), "{made}");
+        shown["psnr_db"].as_f64().unwrap()
+    };
+    let plain = judged(&["--dark", "0", "--local-steps", "0"]);
+    let corrected = judged(&[]);
+    assert!(corrected > plain, "{plain} {corrected}");
+    folder.refuses(&with(&["-o", "h.png", "--judge", "--backend", "gpu"]), 1, &["--judge"]);
+}
+
+#[test]
 fn a_display_that_no_network_was_trained_for_gets_the_sweep() {
     let folder = Folder::new().with_frame();
     fs::write(folder.path("fine.toml"), "pitch_um = 3.74").unwrap();

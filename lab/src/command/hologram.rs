@@ -17,8 +17,9 @@ use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, gpu, models, sm_lbm};
+use phasefront_lab::{Error, Result, gpu, metrics, models, sm_lbm};
 use phasefront_models::usual_network;
+use serde::Serialize;
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
@@ -65,6 +66,9 @@ pub(crate) struct Hologram {
     /// Write the complex field at the modulator there too, with a .json beside it
     #[arg(long, value_name = "FILE.npy")]
     complex: Option<PathBuf>,
+    /// Say how near to its own wave is what the hologram shows: at the midpoint, and over a stack of depths
+    #[arg(long)]
+    judge: bool,
     /// The hologram: a PNG of modulator levels
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
@@ -171,8 +175,13 @@ impl Hologram {
         let display = self.display.read()?;
         let made = self.make(&display)?;
         self.write(&display, &made)?;
-        self.report(json, &made);
+        let judged = self.judge.then(|| judge(&display, &made)).transpose()?;
+        self.report(json, &made, judged.as_ref());
         Ok(())
+    }
+
+    fn keeps_field(&self) -> bool {
+        self.complex.is_some() || self.judge
     }
 
     fn make(&self, display: &DisplayFile) -> Result<Made> {
@@ -183,10 +192,10 @@ impl Hologram {
         });
         let device = self.backend.device()?;
         if device.is_some()
-            && (matches!(method, Method::Layers | Method::Points) || self.complex.is_some() || self.ldi.is_some())
+            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field() || self.ldi.is_some())
         {
             return Err(Error::Input(
-                "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex; the rest is the CPU's"
+                "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
                     .into(),
             ));
         }
@@ -229,24 +238,11 @@ impl Hologram {
     }
 
     fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
-        let info = HologramInfo {
-            calibrated: display.calibrated(true),
-            display: display.target.display.clone(),
-            encoder: Some(made.encoder.name.into()),
-            scale: Some(made.scale),
-            lut: display.lut.map(Vec::from),
-        };
-        if let (Some(path), Some(field)) = (&self.complex, &made.field) {
-            let info = HologramInfo {
-                encoder: None,
-                scale: None,
-                lut: None,
-                calibrated: display.calibrated(false),
-                ..info.clone()
-            };
-            files::write_complex(path, field.view(), &info)?;
+        let (levels, field) = infos(display, made);
+        if let (Some(path), Some(values)) = (&self.complex, &made.field) {
+            files::write_complex(path, values.view(), &field)?;
         }
-        files::write_phase_only(&self.output, made.levels.view(), &info)
+        files::write_phase_only(&self.output, made.levels.view(), &levels)
     }
 
     /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
@@ -282,7 +278,7 @@ impl Hologram {
         let (values, bytes) = slices(&mut field, &mut levels);
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field that it is given, so a copy is kept where it is asked for.
-        let kept = self.complex.as_ref().map(|_| values.to_vec());
+        let kept = self.keeps_field().then(|| values.to_vec());
         let modulation = pipeline.modulate(values, bytes, &mut scratch);
         let engine = pipeline.method().engine();
         Ok(Made {
@@ -395,7 +391,7 @@ impl Hologram {
         let (values, bytes) = slices(&mut field, &mut levels);
         modulator.propagate(values, &mut scratch);
         let propagate = waved.elapsed();
-        let kept = self.complex.as_ref().map(|_| values.to_vec());
+        let kept = self.keeps_field().then(|| values.to_vec());
         let modulation = modulator.modulate(values, bytes, &mut scratch);
         Ok(Made {
             method: stage,
@@ -435,7 +431,7 @@ impl Hologram {
         }
     }
 
-    fn report(&self, json: bool, made: &Made) {
+    fn report(&self, json: bool, made: &Made, judged: Option<&Judged>) {
         let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
         let stages: serde_json::Map<_, _> = (made.stages.iter())
             .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
@@ -451,17 +447,81 @@ impl Hologram {
                 "output": self.output, "complex": self.complex, "width": width, "height": height,
                 "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
-                "stage_ms": stages, "total_ms": ms(&total),
+                "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
             }),
             format!(
-                "{}: {width}×{height} by {}; {}: {}",
+                "{}: {width}×{height} by {}; {}: {}{}",
                 self.output.display(),
                 made.method,
                 made.encoder.describe(),
-                list.join(", ")
+                list.join(", "),
+                judged.map_or(String::new(), Judged::describe)
             ),
         );
     }
+}
+
+/// What files of the levels and of the field say.
+fn infos(display: &DisplayFile, made: &Made) -> (HologramInfo, HologramInfo) {
+    let levels = HologramInfo {
+        calibrated: display.calibrated(true),
+        display: display.target.display.clone(),
+        encoder: Some(made.encoder.name.into()),
+        scale: Some(made.scale),
+        lut: display.lut.map(Vec::from),
+    };
+    let field = HologramInfo {
+        encoder: None,
+        scale: None,
+        lut: None,
+        calibrated: display.calibrated(false),
+        ..levels.clone()
+    };
+    (levels, field)
+}
+
+/// How near what a hologram shows is to its own wave.
+#[derive(Serialize)]
+struct Judged {
+    psnr_db: f64,
+    ssim: f64,
+    stack_psnr_db: f64,
+    stack_ssim: f64,
+    /// Mean amplitude over the wave's.
+    brightness: f64,
+}
+
+impl Judged {
+    fn describe(&self) -> String {
+        format!(
+            "; shown of its own wave: {:.2} dB, SSIM {:.3}, over the stack {:.2} dB, {:.3}",
+            self.psnr_db, self.ssim, self.stack_psnr_db, self.stack_ssim
+        )
+    }
+}
+
+/// Depths of the stack that a hologram is judged by, beside the midpoint.
+const STACK: usize = 4;
+
+fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
+    let (levels, field) = infos(display, made);
+    let wave = made.field.clone().expect("kept for this");
+    let depths = (0..STACK).map(|i| (i as f64 + 0.5) / STACK as f64);
+    let depths = depths.map(|depth| display.target.display.z_of_depth(depth));
+    let z_m: Vec<f64> = std::iter::once(0.0).chain(depths).collect();
+    let wave = files::Hologram::Complex(wave, field).views_on(display, &z_m)?;
+    let shown = files::Hologram::PhaseOnly(made.levels.clone(), levels).views_on(display, &z_m)?;
+    let each = (shown.iter().zip(&wave))
+        .map(|(shown, wave)| metrics::compare(shown.view(), wave.view()))
+        .collect::<Result<Vec<_>>>()?;
+    let mean = |figure: fn(&metrics::Comparison) -> f64| each[1..].iter().map(figure).sum::<f64>() / STACK as f64;
+    Ok(Judged {
+        psnr_db: each[0].psnr_overall,
+        ssim: each[0].ssim_overall,
+        stack_psnr_db: mean(|c| c.psnr_overall),
+        stack_ssim: mean(|c| c.ssim_overall),
+        brightness: f64::from(shown[0].sum() / wave[0].sum()),
+    })
 }
 
 fn described(engine: &Engine) -> String {
