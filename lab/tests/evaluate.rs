@@ -379,7 +379,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
         assert!(errors.contains(word), "{errors}");
     };
     refused(&[], 2, "--method");
-    refused(&["--method", "rgb", "--split", "validation"], 1, "pair_000076.npz");
+    refused(&["--method", "rgb", "--split", "validation"], 1, "pair_00007");
     refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
     refused(&["--method", "rgb", "--margin", "24"], 1, "leaves nothing");
     refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
