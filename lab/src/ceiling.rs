@@ -133,12 +133,12 @@ mod tests {
             let amplitude = |i: usize| 0.3 + 0.2 * ((i % 32) as f32 * 0.4).sin();
             let wanted = vec![(0..start.len()).map(amplitude).collect::<Vec<_>>(); PLANES + 1];
             let mut losses = vec![loss(&ceiling, &start, &wanted[0])];
-            for steps in [10, 60] {
+            for steps in [20, 120] {
                 let mut phases = start.clone();
                 ceiling.optimise(&mut phases, &wanted, steps);
                 losses.push(loss(&ceiling, &phases, &wanted[0]));
             }
-            assert!(losses[1] < 0.7 * losses[0] && losses[2] < 0.7 * losses[1], "{losses:?}");
+            assert!(losses[1] < losses[0] && losses[2] < 0.4 * losses[0], "{losses:?}");
         }
     }
 }
