@@ -1,10 +1,10 @@
-//! The ceiling: the phase map that a gradient descent on one hologram ends at. What any encoder can be measured against;
-//! far too slow for anything else.
+//! The ceiling: the phase map that a gradient descent on one hologram ends at. What any encoder can be measured
+//! against; far too slow for anything else.
 //!
-//! It asks for the amplitudes of a wave at the midpoint, always, and at a few other planes of the volume, drawn anew for
-//! each step. With u what is shown at a plane and T the wanted amplitude, the loss is Σ(|u| − T)², its gradient by the
-//! modulator's phases −2·Im(conj(Kᴴ(u − T·u/|u|))·e), e being the phasors shown and K the way to the plane. Steps are
-//! Adam's (Kingma and Ba, 2015).
+//! It asks for the amplitudes of a wave at the midpoint, always, and at a few other planes of the volume, drawn anew
+//! for each step. With u what is shown at a plane and T the wanted amplitude, the loss is Σ(|u| − T)², its gradient by
+//! the modulator's phases −2·Im(conj(Kᴴ(u − T·u/|u|))·e), e being the phasors shown and K the way to the plane. Steps
+//! are Adam's (Kingma and Ba, 2015).
 
 use crate::error::Result;
 use crate::reconstruct::APERTURE_RADIUS;
@@ -57,8 +57,8 @@ impl Ceiling {
         self.planes.iter().map(|(z_m, ..)| *z_m).collect()
     }
 
-    /// Takes `phases`, (3, H, W), toward the amplitudes `wanted`, (3, H, W) at each of [`Self::z_m`], over the amplitude
-    /// that full light stands for.
+    /// Takes `phases`, (3, H, W), toward the amplitudes `wanted`, (3, H, W) at each of [`Self::z_m`], over the
+    /// amplitude that full light stands for.
     pub fn optimise(&self, phases: &mut [f32], wanted: &[Vec<f32>], steps: usize) {
         let plane = self.size * self.size;
         let colours = phases.par_chunks_exact_mut(plane).enumerate();
