@@ -71,6 +71,11 @@ impl Ceiling {
     fn optimise_colour(&self, colour: usize, phases: &mut [f32], wanted: &[&[f32]], steps: usize) {
         let mut dice = Dice::new(colour as u64);
         let (mut first, mut second) = (vec![0.0f32; phases.len()], vec![0.0f32; phases.len()]);
+        let mut scratches: Vec<_> = self
+            .planes
+            .iter()
+            .map(|(_, there, _)| there[colour].scratch())
+            .collect();
         for step in 0..steps {
             let shown: Vec<Complex32> = phases.iter().map(|p| Complex32::from_polar(1.0, *p)).collect();
             let mut gradient = vec![0.0f32; phases.len()];
@@ -78,13 +83,13 @@ impl Ceiling {
             for at in std::iter::once(0).chain(drawn) {
                 let (_, there, back) = &self.planes[at];
                 let mut missing = shown.clone();
-                let mut scratch = there[colour].scratch();
-                there[colour].propagate_through(&mut missing, APERTURE_RADIUS, &mut scratch);
+                // There and back is equally far, so both are padded alike.
+                let scratch = &mut scratches[at];
+                there[colour].propagate_through(&mut missing, APERTURE_RADIUS, scratch);
                 for (u, wanted) in missing.iter_mut().zip(wanted[at]) {
                     *u -= *u * (wanted / u.norm().max(1e-12));
                 }
-                let mut scratch = back[colour].scratch();
-                back[colour].propagate_through(&mut missing, APERTURE_RADIUS, &mut scratch);
+                back[colour].propagate_through(&mut missing, APERTURE_RADIUS, scratch);
                 // The midpoint counts as much as the planes that are drawn.
                 let weight = if at == 0 { 1.0 } else { 1.0 / DRAWN as f32 };
                 for ((gradient, missing), e) in gradient.iter_mut().zip(&missing).zip(&shown) {
@@ -108,7 +113,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Half the squared difference at the midpoint, by which the gradient can be checked.
+    /// The squared difference at the midpoint, by which the gradient can be checked.
     fn loss(ceiling: &Ceiling, phases: &[f32], wanted: &[f32]) -> f64 {
         let plane = ceiling.size * ceiling.size;
         let (_, there, _) = &ceiling.planes[0];

@@ -487,7 +487,11 @@ pub fn evaluate(
             for method in methods {
                 let field = (method.field)(&pair.ldi)?;
                 for shown in shown {
-                    figures.push(judge(&viewer.views(&field, &shown.of(method), &z_m)?, &truth, *margin)?);
+                    let seen = viewer.views(&field, &shown.of(method), &z_m)?;
+                    figures.push(Figures {
+                        light: seen.light,
+                        ..judge(&seen.views, &truth, *margin)?
+                    });
                 }
             }
             done();
@@ -517,9 +521,12 @@ pub fn evaluate(
         .collect())
 }
 
-/// The midpoint view comes first, the focal stack after it.
-fn judge(seen: &Seen, truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
-    let views = &seen.views;
+/// How close `views` come to `truth`, all light counted as shown: (3, H, W) each, the midpoint first, the focal stack
+/// after it, `margin` pixels at the border left out.
+///
+/// # Errors
+/// Views of different shapes.
+pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
     let (_, height, width) = truth[0].dim();
     let inner = ndarray::s![.., margin..height - margin, margin..width - margin];
     let each = (views.iter().zip(truth))
@@ -533,7 +540,7 @@ fn judge(seen: &Seen, truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
         focal_psnr: mean(|c| c.psnr_overall),
         focal_ssim: mean(|c| c.ssim_overall),
         brightness: f64::from(views[0].slice(inner).sum() / truth[0].slice(inner).sum()),
-        light: seen.light,
+        light: 1.0,
     })
 }
 

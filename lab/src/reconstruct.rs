@@ -10,8 +10,8 @@ use phasefront::target::Aberration;
 use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::wave::asm::Propagator;
 
-/// The radius of the Fourier aperture that phase-only holograms pass: the whole first order, as the paper has it.
-pub const APERTURE_RADIUS: f64 = 1.0;
+/// The radius of the Fourier aperture that phase-only holograms pass.
+pub const APERTURE_RADIUS: f64 = phasefront::unstable::wave::aperture::RADIUS;
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
 pub struct AberratedOptics([Propagator; 3]);

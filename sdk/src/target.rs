@@ -86,15 +86,6 @@ impl Target {
         (self.display.height(), self.display.width())
     }
 
-    /// The way of each colour of (3, H, W) = `shape` fields over `distance_m`, which may be 0.
-    ///
-    /// # Errors
-    /// A distance that moves light farther than can be padded.
-    pub(crate) fn free_propagators(&self, (height, width): (usize, usize), distance_m: f64) -> Result<[Propagator; 3]> {
-        let (pitch_m, colours) = (self.display.pitch_m(), self.display.wavelengths_m());
-        Propagator::for_colours(height, width, pitch_m, colours, distance_m, Padding::Reach)
-    }
-
     /// The way of each colour of (3, H, W) = `shape` fields over `distance_m`, `correction` being part of it: in pixels
     /// of `binning`² of the modulator's. None where there is nothing to do.
     ///

@@ -17,7 +17,7 @@ use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, gpu, metrics, models, sm_lbm};
+use phasefront_lab::{Error, Result, evaluate, gpu, models, sm_lbm};
 use phasefront_models::usual_network;
 use serde::Serialize;
 use serde_json::json;
@@ -511,16 +511,13 @@ fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
     let z_m: Vec<f64> = std::iter::once(0.0).chain(depths).collect();
     let wave = files::Hologram::Complex(wave, field).views_on(display, &z_m)?;
     let shown = files::Hologram::PhaseOnly(made.levels.clone(), levels).views_on(display, &z_m)?;
-    let each = (shown.iter().zip(&wave))
-        .map(|(shown, wave)| metrics::compare(shown.view(), wave.view()))
-        .collect::<Result<Vec<_>>>()?;
-    let mean = |figure: fn(&metrics::Comparison) -> f64| each[1..].iter().map(figure).sum::<f64>() / STACK as f64;
+    let figures = evaluate::judge(&shown, &wave, 0)?;
     Ok(Judged {
-        psnr_db: each[0].psnr_overall,
-        ssim: each[0].ssim_overall,
-        stack_psnr_db: mean(|c| c.psnr_overall),
-        stack_ssim: mean(|c| c.ssim_overall),
-        brightness: f64::from(shown[0].sum() / wave[0].sum()),
+        psnr_db: figures.amplitude_psnr,
+        ssim: figures.amplitude_ssim,
+        stack_psnr_db: figures.focal_psnr,
+        stack_ssim: figures.focal_ssim,
+        brightness: figures.brightness,
     })
 }
 

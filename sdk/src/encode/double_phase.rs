@@ -72,17 +72,9 @@ pub fn encode_row_levels(
     first: usize,
     levels: &mut [u8],
 ) {
-    /// Even, so that each run starts on the colour of the checkerboard that its row starts on.
-    const RUN: usize = 256;
-    wide!({
-        let mut phases = [0.0; RUN];
-        let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
-        for (run, (values, levels)) in runs.enumerate() {
-            let phases = &mut phases[..values.len()];
-            encode_run(values, y, scale, phases);
-            response.levels(phases, first + run * RUN, levels);
-        }
-    });
+    wide!(levels_by(values, response, first, levels, |values, phases| encode_run(
+        values, y, scale, phases
+    )));
 }
 
 /// The phases of a row's own values, in \[0, 2π), to 1e-6 rad; 0 for the origin.
@@ -92,24 +84,33 @@ pub fn phase_row(values: &[Complex32], phases: &mut [f32]) {
 
 /// [`phase_row`] and [`Response::level`] in one sweep. The row begins at value `first` of the stack (3, H, W).
 pub fn phase_row_levels(values: &[Complex32], response: &Response, first: usize, levels: &mut [u8]) {
+    wide!(levels_by(values, response, first, levels, phase_run));
+}
+
+/// The levels of the phases that `phases_of` makes of runs of a row.
+#[inline(always)]
+fn levels_by(
+    values: &[Complex32],
+    response: &Response,
+    first: usize,
+    levels: &mut [u8],
+    phases_of: impl Fn(&[Complex32], &mut [f32]),
+) {
+    /// Even, so that each run starts on the colour of the checkerboard that its row starts on.
     const RUN: usize = 256;
-    wide!({
-        let mut phases = [0.0; RUN];
-        let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
-        for (run, (values, levels)) in runs.enumerate() {
-            let phases = &mut phases[..values.len()];
-            phase_run(values, phases);
-            response.levels(phases, first + run * RUN, levels);
-        }
-    });
+    let mut phases = [0.0; RUN];
+    let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
+    for (run, (values, levels)) in runs.enumerate() {
+        let phases = &mut phases[..values.len()];
+        phases_of(values, phases);
+        response.levels(phases, first + run * RUN, levels);
+    }
 }
 
 #[inline(always)]
 fn phase_run(values: &[Complex32], phases: &mut [f32]) {
     for (value, phase) in values.iter().zip(phases) {
-        let angle = atan2(value.im, value.re);
-        let turned = if angle < 0.0 { angle + TAU } else { angle };
-        *phase = if turned < TAU { turned } else { 0.0 };
+        *phase = one_turn(atan2(value.im, value.re));
     }
 }
 
@@ -117,9 +118,13 @@ fn phase_run(values: &[Complex32], phases: &mut [f32]) {
 #[inline(always)]
 fn encode_one(value: Complex32, inverse: f32, sign: f32) -> f32 {
     let amplitude = (value.norm_sqr().sqrt() * inverse).min(1.0);
-    let sum = atan2(value.im, value.re) + sign * acos(amplitude);
-    // The sum lies in [−3π/2, 3π/2].
-    let turned = if sum < 0.0 { sum + TAU } else { sum };
+    one_turn(atan2(value.im, value.re) + sign * acos(amplitude))
+}
+
+/// A phase from [−3π/2, 3π/2] in \[0, 2π).
+#[inline(always)]
+fn one_turn(phase: f32) -> f32 {
+    let turned = if phase < 0.0 { phase + TAU } else { phase };
     if turned < TAU { turned } else { 0.0 }
 }
 

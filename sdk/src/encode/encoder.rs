@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::target::Target;
+use crate::wave::aperture;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
@@ -86,7 +87,7 @@ impl Encoder {
             prefilter,
             dark: options.dark,
             local: (options.local_steps > 0).then(|| Local {
-                filter: LocalFilter::of_aperture(1.0),
+                filter: LocalFilter::of_aperture(aperture::RADIUS),
                 steps: options.local_steps,
             }),
             illumination: illumination.map(|light| (light, target.modulator())),

@@ -322,7 +322,7 @@ mod tests {
         }
     }
 
-    /// By a transform of 64×64 the taps of the circle itself, apart from what makes the two frequencies right.
+    /// Its taps are those of the circle, apart from what makes the two frequencies right.
     #[test]
     fn the_filter_is_the_circle_in_few_taps() {
         let taps = LocalFilter::of_aperture(1.0).taps;

@@ -12,7 +12,8 @@
 use crate::error::Result;
 use crate::illumination::Illumination;
 use crate::target::Target;
-use crate::wave::asm::Propagator;
+use crate::wave::aperture;
+use crate::wave::asm::{Padding, Propagator};
 use crate::wave::fft::ConvolveScratch;
 use crate::wave::zernike::Aberration;
 use num_complex::{Complex32, Complex64};
@@ -32,7 +33,6 @@ pub struct MidpointSteps {
     height: usize,
     width: usize,
     steps: usize,
-    aperture_radius: f64,
     /// From the modulator to the midpoint, and to the modulator.
     back: [Propagator; 3],
     forth: [Propagator; 3],
@@ -61,20 +61,22 @@ impl MidpointSteps {
     pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Self> {
         let offset_m = target.display.offset_m();
         let reversed = target.correction.as_ref().map(Aberration::reversed);
-        let propagators = |distance_m: f64, correction: Option<&Aberration>| match correction {
-            None => target.free_propagators(shape, distance_m),
-            correction => {
-                let plans = target.propagators(shape, 1, distance_m, correction)?;
-                Ok(plans.expect("a correction is something to do"))
+        // Where there is nothing to do the aperture still is.
+        let ways = |distance_m: f64, correction: Option<&Aberration>| match target
+            .propagators(shape, 1, distance_m, correction)?
+        {
+            Some(ways) => Ok(ways),
+            None => {
+                let (pitch_m, colours) = (target.display.pitch_m(), target.display.wavelengths_m());
+                Propagator::for_colours(shape.0, shape.1, pitch_m, colours, distance_m, Padding::Reach)
             }
         };
         Ok(MidpointSteps {
             height: shape.0,
             width: shape.1,
             steps,
-            aperture_radius: 1.0,
-            back: propagators(-offset_m, reversed.as_ref())?,
-            forth: propagators(offset_m, target.correction.as_ref())?,
+            back: ways(-offset_m, reversed.as_ref())?,
+            forth: ways(offset_m, target.correction.as_ref())?,
             illumination: (target.illumination.clone()).map(|light| (light, target.modulator())),
         })
     }
@@ -123,7 +125,7 @@ impl MidpointSteps {
             shown,
             light,
         } = scratch;
-        let (width, radius) = (self.width, self.aperture_radius);
+        let (width, radius) = (self.width, aperture::RADIUS);
         if let Some((illumination, modulator)) = &self.illumination {
             let rows = light.par_chunks_exact_mut(width).enumerate();
             rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));

@@ -5,6 +5,10 @@ use super::fft::{ConvolveScratch, Fft2};
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 
+/// The radius of the aperture that holograms are made for and looked at through: the whole first order, as in the
+/// paper.
+pub const RADIUS: f64 = 1.0;
+
 /// Whether the aperture passes the frequency (`fx`, `fy`), in cycles a pixel: fx² + fy² ≤ (radius/2)².
 ///
 /// `radius` 1 reaches the Nyquist frequency ½, which is the paper's r of half the image

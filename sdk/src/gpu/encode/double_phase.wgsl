@@ -61,8 +61,11 @@ fn full_light() -> f32 {
     return sqrt(bitcast<f32>(found[0]));
 }
 
+// 1 over an amplitude; 0 in darkness.
+fn over(amplitude: f32) -> f32 { return select(0.0, 1.0 / amplitude, amplitude > 0.0); }
+
 // 1 over the amplitude below which values are drawn to the real axis; 0 where none is.
-fn per_dark(scale: f32) -> f32 { return select(0.0, 1.0 / (DARK * scale), DARK * scale > 0.0); }
+fn per_dark(scale: f32) -> f32 { return over(DARK * scale); }
 
 // The field at a pixel, drawn to the real axis where it is dark; see encode/dark.rs.
 fn source(colour: u32, x: i32, y: i32, per_dark: f32) -> vec2f {
@@ -178,7 +181,7 @@ fn encode(@builtin(global_invocation_id) at: vec3u) {
     let y = i32(at.y);
     if (x >= frame.width) { return; }
     let scale = full_light();
-    let inverse = select(0.0, 1.0 / scale, scale > 0.0);
+    let inverse = over(scale);
     var rgb = vec3u(0);
     for (var c = 0u; c < 3u; c++) {
         let v = value(c, x, y, per_dark(scale));

@@ -6,6 +6,7 @@ use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::encode::local::LocalFilter;
 use crate::gpu::Result;
 use crate::gpu::device::{Device, Dispatch};
+use crate::wave::aperture;
 
 /// Pixels along each side that a workgroup corrects.
 const SIDE: usize = 16;
@@ -56,7 +57,7 @@ impl Local {
             device.buffer("what is missing", bytes)?,
             device.buffer("what is missing after a step", bytes)?,
         ];
-        let taps = LocalFilter::of_aperture(1.0);
+        let taps = LocalFilter::of_aperture(aperture::RADIUS);
         let taps = device.constants("the aperture's taps", bytemuck::cast_slice(taps.taps()))?;
 
         let program = device.program("the start", source.clone(), "begin");

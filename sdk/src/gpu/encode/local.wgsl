@@ -1,6 +1,6 @@
 // Local correction, after double_phase.wgsl; see encode/local.rs. `begin` leaves d = g − L·e of double phase's phasors
-// e, `step` that of the next ones, and `finish` takes the last step and leaves levels. The header that local.rs writes
-// gives GOAL_TURN and KEEP_TURN.
+// e, `step_on` that of the next ones, and `finish` takes the last step and leaves levels. The header that local.rs
+// writes gives GOAL_TURN and KEEP_TURN.
 
 // g times the scale.
 @group(0) @binding(10) var<storage, read> wanted: array<vec2f>;
@@ -32,7 +32,7 @@ fn begin(@builtin(global_invocation_id) at: vec3u) {
     let y = i32(at.y);
     if (x >= frame.width) { return; }
     let scale = full_light();
-    let inverse = select(0.0, 1.0 / scale, scale > 0.0);
+    let inverse = over(scale);
     let f = value(at.z, x, y, per_dark(scale));
     let norm = sqrt(dot(f, f));
     let none = norm <= 1.17549435e-38;
@@ -87,8 +87,7 @@ fn step_on(
     let x = i32(at.x);
     let y = i32(at.y);
     if (x >= frame.width || y >= frame.height) { return; }
-    let scale = full_light();
-    let g = goal(at.z, x, y, select(0.0, 1.0 / scale, scale > 0.0));
+    let g = goal(at.z, x, y, over(full_light()));
     let z = drawn(g, inside.xy);
     let length = light(at.z, x, y) / sqrt(max(dot(z, z), 1.17549435e-38));
     next[at.z * frame.plane + u32(y * frame.width + x)] = g - z * length;
@@ -103,8 +102,7 @@ fn finish(
 ) {
     let x = i32(at.x);
     let y = i32(at.y);
-    let scale = full_light();
-    let inverse = select(0.0, 1.0 / scale, scale > 0.0);
+    let inverse = over(full_light());
     var rgb = vec3u(0);
     for (var c = 0u; c < 3u; c++) {
         load(c, group, thread);
