@@ -32,6 +32,9 @@ pub struct Display {
     /// Bits of a modulator level.
     #[uniffi(default = 8)]
     pub bits: u32,
+    /// Radius of the aperture in the Fourier plane; 1 is the whole first order.
+    #[uniffi(default = 1.0)]
+    pub aperture_radius: f64,
 }
 
 /// Reads a display from its TOML form; what is left out has the default value.
@@ -58,6 +61,7 @@ impl From<phasefront::Display> for Display {
             volume_depth_mm: round(display.volume_depth_m() * 1e3),
             offset_mm: round(display.offset_m() * 1e3),
             bits: display.bits(),
+            aperture_radius: display.aperture_radius(),
         }
     }
 }
@@ -76,12 +80,14 @@ impl TryFrom<&Display> for phasefront::Display {
             volume_depth_mm,
             offset_mm,
             bits,
+            aperture_radius,
         } = display;
         // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same, all but the
         // case of NaN.
         let toml = format!(
             "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = [{red_nm:?}, {green_nm:?}, {blue_nm:?}]\n\
-             volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}"
+             volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}\n\
+             aperture_radius = {aperture_radius:?}"
         );
         Ok(phasefront::Display::from_toml(&toml.to_lowercase())?)
     }
@@ -94,7 +100,7 @@ mod tests {
 
     #[test]
     fn displays_go_and_come_back() {
-        let text = "width = 640\nheight = 480\npitch_um = 3.74\nwavelengths_nm = [639, 521.5, 450]\noffset_mm = -1.25\nbits = 4";
+        let text = "width = 640\nheight = 480\npitch_um = 3.74\nwavelengths_nm = [639, 521.5, 450]\noffset_mm = -1.25\nbits = 4\naperture_radius = 0.9";
         let display = display_from_toml(text.into()).unwrap();
         assert_eq!((display.width, display.green_nm), (640, 521.5));
         let core = phasefront::Display::try_from(&display).unwrap();

@@ -7,7 +7,6 @@
 //! are Adam's (Kingma and Ba, 2015).
 
 use crate::error::Result;
-use crate::reconstruct::APERTURE_RADIUS;
 use crate::scene::dice::Dice;
 use num_complex::Complex32;
 use phasefront::Display;
@@ -26,6 +25,7 @@ const SPREAD: f32 = 0.99;
 /// A plan for one shape and display.
 pub struct Ceiling {
     size: usize,
+    aperture_radius: f64,
     /// z, the way there from the modulator and the way back: the midpoint's first.
     planes: Vec<(f64, [Propagator; 3], [Propagator; 3])>,
 }
@@ -48,6 +48,7 @@ impl Ceiling {
         });
         Ok(Ceiling {
             size,
+            aperture_radius: display.aperture_radius(),
             planes: planes.collect::<Result<_>>()?,
         })
     }
@@ -85,11 +86,11 @@ impl Ceiling {
                 let mut missing = shown.clone();
                 // There and back is equally far, so both are padded alike.
                 let scratch = &mut scratches[at];
-                there[colour].propagate_through(&mut missing, APERTURE_RADIUS, scratch);
+                there[colour].propagate_through(&mut missing, self.aperture_radius, scratch);
                 for (u, wanted) in missing.iter_mut().zip(wanted[at]) {
                     *u -= *u * (wanted / u.norm().max(1e-12));
                 }
-                back[colour].propagate_through(&mut missing, APERTURE_RADIUS, scratch);
+                back[colour].propagate_through(&mut missing, self.aperture_radius, scratch);
                 // The midpoint counts as much as the planes that are drawn.
                 let weight = if at == 0 { 1.0 } else { 1.0 / DRAWN as f32 };
                 for ((gradient, missing), e) in gradient.iter_mut().zip(&missing).zip(&shown) {
@@ -120,7 +121,7 @@ mod tests {
         let mut sum = 0.0;
         for (colour, phases) in phases.chunks_exact(plane).enumerate() {
             let mut shown: Vec<Complex32> = phases.iter().map(|p| Complex32::from_polar(1.0, *p)).collect();
-            there[colour].propagate_through(&mut shown, APERTURE_RADIUS, &mut there[colour].scratch());
+            there[colour].propagate_through(&mut shown, 1.0, &mut there[colour].scratch());
             let wanted = &wanted[colour * plane..][..plane];
             sum += (shown.iter().zip(wanted))
                 .map(|(u, t)| f64::from(u.norm() - t).powi(2))

@@ -9,12 +9,13 @@
 use crate::calibrate::table::{self, AberrationFile};
 use crate::ceiling::Ceiling;
 use crate::dataset::{self, Manifest};
+use crate::depth_study::{self, DEGRADATIONS};
 use crate::error::Result;
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
 use crate::metrics;
 use crate::point_based::{self, Occlusion};
-use crate::reconstruct::{APERTURE_RADIUS, AberratedOptics};
+use crate::reconstruct::AberratedOptics;
 use crate::scene::dice::Dice;
 use crate::sm_lbm;
 use ndarray::{Array2, Array3, Axis, concatenate};
@@ -28,10 +29,11 @@ use phasefront::unstable::sweep::{
     hidden::{Hidden, NOTHING},
     hidden_reach,
 };
-use phasefront::unstable::wave::aperture::Aperture;
+use phasefront::unstable::wave::aperture::{Aperture, Opening};
 use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame, Sweep, Target};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::borrow::Cow;
 use std::cmp::Reverse;
 use std::f32::consts::TAU;
 use std::path::Path;
@@ -240,6 +242,8 @@ pub struct Shown {
     pub levels: Option<(Target, EncoderOptions)>,
     /// Steps of descent from there to the [`Ceiling`]; 0 shows the levels as they are.
     pub ceiling: usize,
+    /// The aperture that is looked through, where it is not the one that the levels are made for.
+    pub through: Option<Opening>,
 }
 
 impl Shown {
@@ -249,6 +253,7 @@ impl Shown {
             name: "complex".into(),
             levels: None,
             ceiling: 0,
+            through: None,
         }
     }
 
@@ -257,6 +262,7 @@ impl Shown {
             name: self.name.clone(),
             levels: (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options))),
             ceiling: self.ceiling,
+            through: self.through,
         }
     }
 }
@@ -378,8 +384,9 @@ impl Viewer {
                     self.lift(field, target, modulation.scale, shown.ceiling, &mut levels)?;
                 }
                 phase_only_field(&levels, &target.response, modulation.scale, &mut values);
-                light = self.light(&values)?;
-                of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(APERTURE_RADIUS))?;
+                let opening = (shown.through).unwrap_or(Opening::centred(target.display.aperture_radius()));
+                light = self.light(&values, opening)?;
+                of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(opening))?;
                 &of_levels
             }
         };
@@ -415,10 +422,10 @@ impl Viewer {
         Ok(())
     }
 
-    /// The share of the light of `shown`, (3, H, W) at the modulator, that passes the aperture.
-    fn light(&self, shown: &[Complex32]) -> Result<f64> {
+    /// The share of the light of `shown`, (3, H, W) at the modulator, that passes `opening`.
+    fn light(&self, shown: &[Complex32], opening: Opening) -> Result<f64> {
         let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
-        let aperture = Aperture::new(self.size, self.size, APERTURE_RADIUS)?;
+        let aperture = Aperture::new(self.size, self.size, opening)?;
         let mut scratch = aperture.scratch();
         let mut passed = shown.to_vec();
         for plane in passed.chunks_exact_mut(self.size * self.size) {
@@ -436,6 +443,34 @@ pub struct Seen {
     pub light: f64,
 }
 
+/// What methods are told of the depth of what is visible. Ragged and refined are those of a phone's sensor with all
+/// faults of [`DEGRADATIONS`]; hidden layers are then none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Depth {
+    /// As it was rendered
+    Rendered,
+    /// A sensor's readings, enlarged
+    Ragged,
+    /// A sensor's readings, refined by the core
+    Refined,
+}
+
+impl Depth {
+    /// The scene `ldi` with depth of this kind; `seed` chooses the sensor's faults.
+    fn of(self, ldi: &Ldi, seed: u64) -> Result<Cow<'_, Ldi>> {
+        if self == Depth::Rendered {
+            return Ok(Cow::Borrowed(ldi));
+        }
+        let (rgb, rendered) = depth_study::front(ldi);
+        let readings = depth_study::degrade(rendered.view(), &DEGRADATIONS[DEGRADATIONS.len() - 1], seed);
+        let depth = match self {
+            Depth::Refined => depth_study::refine(&readings, &rgb)?,
+            _ => depth_study::enlarge(&readings)?,
+        };
+        Ok(Cow::Owned(Ldi::new(vec![LdiLayer { rgb, depth }])?))
+    }
+}
+
 /// What is looked at of a data set.
 #[derive(Debug, Clone)]
 pub struct Sample {
@@ -443,6 +478,8 @@ pub struct Sample {
     pub scenes: Vec<usize>,
     /// Chooses the random depths of the focal stacks.
     pub seed: u64,
+    /// What methods are told of the depth of what is visible.
+    pub depth: Depth,
     /// Pixels at the border of each scene that do not count: into a small frame at an offset light comes from outside,
     /// which no modulator of its size sends.
     pub margin: usize,
@@ -461,7 +498,19 @@ pub fn evaluate(
     shown: &[Shown],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<Row>> {
-    let Sample { scenes, seed, margin } = sample;
+    let Sample {
+        scenes,
+        seed,
+        depth,
+        margin,
+    } = sample;
+    if *depth != Depth::Rendered && !manifest.size.is_multiple_of(depth_study::RATIO) {
+        return Err(crate::Error::Input(format!(
+            "scenes of {} px have no sensor's depth; their sides must be multiples of {}",
+            manifest.size,
+            depth_study::RATIO
+        )));
+    }
     if 2 * margin >= manifest.size {
         return Err(crate::Error::Input(format!(
             "a margin of {margin} px leaves nothing of scenes of {} px",
@@ -484,8 +533,9 @@ pub fn evaluate(
             z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
             let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
             let mut figures = Vec::with_capacity(methods.len() * shown.len());
+            let scene = depth.of(&pair.ldi, (seed << 32) + index as u64)?;
             for method in methods {
-                let field = (method.field)(&pair.ldi)?;
+                let field = (method.field)(&scene)?;
                 for shown in shown {
                     let seen = viewer.views(&field, &shown.of(method), &z_m)?;
                     figures.push(Figures {

@@ -8,10 +8,8 @@ use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::target::Aberration;
 use phasefront::unstable::refocus::{Refocus, phase_only_field};
+use phasefront::unstable::wave::aperture::Opening;
 use phasefront::unstable::wave::asm::Propagator;
-
-/// The radius of the Fourier aperture that phase-only holograms pass.
-pub const APERTURE_RADIUS: f64 = phasefront::unstable::wave::aperture::RADIUS;
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
 pub struct AberratedOptics([Propagator; 3]);
@@ -96,7 +94,7 @@ impl Hologram {
                     let modulator = (display.height(), display.width());
                     light.shine(values, shape, modulator);
                 }
-                (field, Some(APERTURE_RADIUS))
+                (field, Some(Opening::centred(file.target.display.aperture_radius())))
             }
         };
         if let Some(AberrationFile::Uniform(all)) = &file.aberration

@@ -264,7 +264,7 @@ impl SimulatedDisplay {
                 transfer.apply(kx, column);
                 let fx = bin(kx, pw);
                 for (ky, value) in column.iter_mut().enumerate() {
-                    if !aperture::passes(fx, bin(ky, ph), 1.0) {
+                    if !aperture::passes(fx, bin(ky, ph), self.display.aperture_radius()) {
                         *value = Complex32::ZERO;
                     }
                 }
@@ -377,7 +377,7 @@ fn normal(dice: &mut Dice) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use phasefront::unstable::wave::aperture::Aperture;
+    use phasefront::unstable::wave::aperture::{Aperture, Opening};
 
     fn small() -> SimulatedDisplay {
         let display = Display::from_toml("width = 48\nheight = 40").unwrap();
@@ -425,7 +425,7 @@ mod tests {
                 Complex32::from_polar(display.laser(1, y as f64, x as f64) as f32, phase as f32)
             })
             .collect();
-        let plan = Aperture::new(40, 48, 1.0).unwrap();
+        let plan = Aperture::new(40, 48, Opening::centred(1.0)).unwrap();
         plan.filter(&mut plane, &mut plan.scratch());
         for y in 12..28 {
             for x in 12..36 {

@@ -6,13 +6,14 @@ use num_complex::Complex32;
 use phasefront::target::Aberration;
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::wave::{
+    aperture::Opening,
     asm::{Padding, Propagator},
     zernike::Aberrations,
 };
 use phasefront::{Brightness, Display, EncoderOptions, Encoding};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::dataset::{self, Manifest};
-use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown, Viewer};
+use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown, Viewer};
 use phasefront_lab::files::{self, Hologram, HologramInfo};
 use phasefront_lab::models::Precision;
 use phasefront_lab::{metrics, models, scene, sm_lbm};
@@ -53,6 +54,7 @@ impl Data {
         let sample = Sample {
             scenes: vec![78, 79],
             seed: 5,
+            depth: Depth::Rendered,
             margin: 0,
         };
         evaluate::evaluate(&self.manifest, self.path(), &sample, methods, shown, &|| {}).unwrap()
@@ -78,6 +80,7 @@ fn encoded(display: &Display, name: &str, encoding: Encoding) -> Shown {
         name: name.into(),
         levels: Some((display.into(), options)),
         ceiling: 0,
+        through: None,
     }
 }
 
@@ -239,6 +242,7 @@ fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
         let sample = Sample {
             scenes: vec![78, 79],
             seed: 5,
+            depth: Depth::Rendered,
             margin,
         };
         let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
@@ -246,6 +250,54 @@ fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
     };
     let (whole, inner) = (psnr(0), psnr(10));
     assert!(inner > whole + 0.5 && inner > 18.0, "{whole} {inner}");
+}
+
+/// A correction for the aperture that is looked through shows more than one for another; one beside the axis shows less.
+#[test]
+fn what_is_shown_depends_on_the_aperture() {
+    let data = Data::new();
+    let of = |made_for: f64, radius: f64, shift: f64| {
+        let display = Display::from_toml(&format!("aperture_radius = {made_for:?}")).unwrap();
+        let options = EncoderOptions {
+            local_steps: 2,
+            ..Encoding::ANTI_ALIAS.into()
+        };
+        Shown {
+            name: format!("{made_for} {radius} {shift}"),
+            levels: Some(((&display).into(), options)),
+            ceiling: 0,
+            through: Some(Opening { radius, shift }),
+        }
+    };
+    let shown = [
+        of(0.7, 0.7, 0.0),
+        of(1.0, 0.7, 0.0),
+        of(1.0, 1.0, 0.0),
+        of(1.0, 1.0, 0.2),
+    ];
+    let rows = data.evaluate(&[Method::layers(&data.manifest.display, PLANES)], &shown);
+    let psnr: Vec<f64> = rows.iter().map(|row| row.mean.amplitude_psnr).collect();
+    assert!(psnr[0] > psnr[1] && psnr[2] > psnr[3], "{psnr:?}");
+    assert!(rows[1].mean.light < rows[2].mean.light, "{rows:?}");
+}
+
+#[test]
+fn ragged_depth_costs_and_refined_depth_gives_it_back() {
+    let data = Data::new();
+    let methods = [Method::visible(&data.manifest.display, PLANES)];
+    let [rendered, ragged, refined] = [Depth::Rendered, Depth::Ragged, Depth::Refined].map(|depth| {
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            depth,
+            margin: 0,
+        };
+        let shown = [Shown::complex()];
+        let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
+        rows[0].mean.focal_psnr
+    });
+    assert!(ragged < rendered && refined < rendered, "{rendered} {ragged} {refined}");
+    assert!(refined > ragged, "{ragged} {refined}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use divan::{Bencher, counter::ItemsCount};
 use num_complex::Complex32;
 use phasefront::unstable::encode::Encoder;
 use phasefront::unstable::wave::{
-    aperture::Aperture,
+    aperture::{Aperture, Opening},
     asm::{Padding, Propagator},
 };
 use phasefront::{Encoding, Target};
@@ -38,7 +38,7 @@ fn propagate_mm(bencher: Bencher<'_, '_>, mm: f64) {
 
 #[divan::bench]
 fn aperture(bencher: Bencher<'_, '_>) {
-    let plan = Aperture::new(SIZE.0, SIZE.1, 1.0).unwrap();
+    let plan = Aperture::new(SIZE.0, SIZE.1, Opening::centred(1.0)).unwrap();
     let (mut plane, mut scratch) = (field(1), plan.scratch());
     let run = || plan.filter(&mut plane, &mut scratch);
     bencher.counter(pixels(1)).bench_local(run);

@@ -19,6 +19,7 @@ pub struct Display {
     volume_depth_m: f64,
     offset_m: f64,
     bits: u32,
+    aperture_radius: f64,
 }
 
 /// The file's form of a [`Display`]: what is left out has the value of [`Display::default`].
@@ -32,10 +33,12 @@ struct DisplayToml {
     volume_depth_mm: f64,
     offset_mm: f64,
     bits: u32,
+    aperture_radius: f64,
 }
 
 impl Default for Display {
-    /// The paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm around the modulator, 8 bits.
+    /// The paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm around the modulator, 8 bits, an aperture as wide
+    /// as the first order.
     fn default() -> Self {
         Display {
             width: 1920,
@@ -45,6 +48,7 @@ impl Default for Display {
             volume_depth_m: 6e-3,
             offset_m: 0.0,
             bits: 8,
+            aperture_radius: 1.0,
         }
     }
 }
@@ -67,6 +71,7 @@ impl From<Display> for DisplayToml {
             volume_depth_mm: round(d.volume_depth_m * 1e3),
             offset_mm: round(d.offset_m * 1e3),
             bits: d.bits,
+            aperture_radius: d.aperture_radius,
         }
     }
 }
@@ -84,6 +89,7 @@ impl TryFrom<DisplayToml> for Display {
             volume_depth_m: t.volume_depth_mm / 1e3,
             offset_m: t.offset_mm / 1e3,
             bits: t.bits,
+            aperture_radius: t.aperture_radius,
         };
         display.check()?;
         Ok(display)
@@ -152,6 +158,12 @@ impl Display {
         if !(1..=10).contains(&self.bits) {
             return refuse(format!("bits is {}; it must lie in 1..=10", self.bits));
         }
+        if !(0.25..=1.25).contains(&self.aperture_radius) {
+            return refuse(format!(
+                "aperture_radius is {}; it must lie in 0.25..=1.25, where 1 is the whole first order",
+                self.aperture_radius
+            ));
+        }
         Ok(())
     }
 
@@ -188,6 +200,12 @@ impl Display {
     /// Bits of a modulator level, 1 to 10; over 8 only sessions make.
     pub fn bits(&self) -> u32 {
         self.bits
+    }
+
+    /// Radius of the aperture in the Fourier plane that lets the picture through and stops double phase's checkerboard
+    /// (Eq. 8): 1 reaches the Nyquist frequency ½/pitch, the paper's r of half the image's resolution.
+    pub fn aperture_radius(&self) -> f64 {
+        self.aperture_radius
     }
 
     /// The same display with its modulator at z = `offset_m`.
@@ -241,6 +259,8 @@ mod tests {
             ("volume_depth_mm = 0", "volume_depth_mm"),
             ("offset_mm = inf", "offset_mm"),
             ("bits = 11", "bits"),
+            ("aperture_radius = 0", "aperture_radius"),
+            ("aperture_radius = nan", "aperture_radius"),
             ("pich_um = 8", "pich_um"),
             ("width = ", "line 1"),
         ] {

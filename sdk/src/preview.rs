@@ -199,6 +199,7 @@ mod tests {
     use crate::encode::{EncoderOptions, Encoding};
     use crate::modulator::Modulator;
     use crate::refocus::{Refocus, phase_only_field};
+    use crate::wave::aperture::Opening;
 
     const SHAPE: (usize, usize) = (96, 128);
 
@@ -241,7 +242,7 @@ mod tests {
             let mut shown = vec![Complex32::ZERO; levels.len()];
             phase_only_field(&levels, &response, scale, &mut shown);
             for z_m in [1e-3, -2e-3, offset_m] {
-                let full = Refocus::new(height, width, &display, &[z_m], Some(1.0)).unwrap();
+                let full = Refocus::new(height, width, &display, &[z_m], Some(Opening::centred(1.0))).unwrap();
                 let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
                 for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
                     let plan = Preview::new(SHAPE, &target, z_m, screen).unwrap();

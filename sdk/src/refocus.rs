@@ -6,7 +6,7 @@
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::slm::Response;
-use crate::wave::aperture;
+use crate::wave::aperture::{Aperture, Opening};
 use crate::wave::asm::{self, Padding, Transfer};
 use crate::wave::fft::{Fft2, Scratch};
 use num_complex::Complex32;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 pub struct Refocus {
     display: Display,
     fft: Fft2,
-    aperture_radius: Option<f64>,
+    aperture: Option<Opening>,
     reach_m: f64,
 }
 
@@ -29,26 +29,20 @@ pub struct Spectrum {
 
 impl Refocus {
     /// Plans views of a (`height`, `width`) hologram that stands at `display.offset_m()`, from every z
-    /// of `z_m`, metres. `aperture_radius` is that of the Fourier aperture, `None` for a complex
-    /// hologram that needs none.
+    /// of `z_m`, metres. `aperture` is the one in the Fourier plane, `None` for a complex hologram,
+    /// which needs none.
     ///
     /// # Errors
     /// No z, or one that [`asm::padded_shape`] refuses.
-    pub fn new(
-        height: usize,
-        width: usize,
-        display: &Display,
-        z_m: &[f64],
-        aperture_radius: Option<f64>,
-    ) -> Result<Self> {
+    pub fn new(height: usize, width: usize, display: &Display, z_m: &[f64], aperture: Option<Opening>) -> Result<Self> {
         if z_m.is_empty() {
             return Err(Error::Plan("no z to refocus at; give at least one".into()));
         }
         if let Some(z) = z_m.iter().find(|z| !z.is_finite()) {
             return Err(Error::Plan(format!("cannot refocus at z = {z} m; it must be finite")));
         }
-        if let Some(radius) = aperture_radius {
-            aperture::Aperture::new(1, 1, radius)?;
+        if let Some(opening) = aperture {
+            Aperture::new(1, 1, opening)?;
         }
         let reach_m = z_m.iter().map(|z| (z - display.offset_m()).abs()).fold(0.0, f64::max);
         let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
@@ -56,7 +50,7 @@ impl Refocus {
         Ok(Refocus {
             display: display.clone(),
             fft: Fft2::new(height, width, padded.0, padded.1),
-            aperture_radius,
+            aperture,
             reach_m,
         })
     }
@@ -71,25 +65,15 @@ impl Refocus {
     /// # Panics
     /// If `plane` has not H·W values or `colour` is over 2.
     pub fn spectrum(&self, plane: &[Complex32], colour: usize, scratch: &mut Scratch) -> Spectrum {
-        let (padded_height, padded_width) = self.fft.padded_shape();
-        let mut columns = vec![Complex32::ZERO; padded_height * padded_width];
-        let pass = |kx: usize, ky: usize| match self.aperture_radius {
-            None => true,
-            Some(radius) => {
-                let fx = kx.min(padded_width - kx) as f64 / padded_width as f64;
-                let fy = ky.min(padded_height - ky) as f64 / padded_height as f64;
-                aperture::passes(fx, fy, radius)
-            }
-        };
+        let shape = self.fft.padded_shape();
+        let mut columns = vec![Complex32::ZERO; shape.0 * shape.1];
         self.fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
         self.fft.spectrum(
             &scratch.rows,
             &mut columns,
             |kx, column, _| {
-                for (ky, value) in column.iter_mut().enumerate() {
-                    if !pass(kx, ky) {
-                        *value = Complex32::ZERO;
-                    }
+                if let Some(opening) = self.aperture {
+                    opening.stop(kx, shape, column);
                 }
             },
             &mut scratch.work,

@@ -15,7 +15,7 @@ use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::preview::Preview;
 use phasefront::unstable::slm::per_pixel;
 use phasefront::unstable::wave::{
-    aperture::Aperture,
+    aperture::{Aperture, Opening},
     asm::{Padding, Propagator},
 };
 use phasefront::{Display, Encoding, Method, Network, RgbdFrame, Sweep, Target};
@@ -114,7 +114,7 @@ fn hot_calls_allocate_nothing() {
             let plan = Propagator::new(h, w, 8e-6, 520e-9, 3e-3, Padding::Reach).unwrap();
             let mut scratch = plan.scratch();
             assert_eq!(count(|| plan.propagate(&mut plane, &mut scratch)), 0);
-            let plan = Aperture::new(h, w, 1.0).unwrap();
+            let plan = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
             let mut scratch = plan.scratch();
             assert_eq!(count(|| plan.filter(&mut plane, &mut scratch)), 0);
             for encoding in [

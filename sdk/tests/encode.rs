@@ -11,7 +11,7 @@ use phasefront::unstable::encode::band_limit::BandLimit;
 use phasefront::unstable::encode::local::{self, LocalFilter};
 use phasefront::unstable::encode::midpoint::{self, MidpointSteps};
 use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::wave::aperture::Aperture;
+use phasefront::unstable::wave::aperture::{Aperture, Opening};
 use phasefront::unstable::wave::asm::{Padding, Propagator};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use reference::test_plane;
@@ -57,10 +57,12 @@ fn check(shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderO
     const SCALE: f32 = 1.3;
     let (h, w) = shape;
     let response = Response::linear(8).unwrap();
+    let radius = if laser.is_some() { 0.9 } else { 1.0 };
+    let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
     let target = Target {
         response: response.clone(),
         illumination: laser.cloned(),
-        ..Display::default().with_size(h, w).unwrap().into()
+        ..display.with_size(h, w).unwrap().into()
     };
     let given: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 40 + c)).collect();
     let mut results = [1, 3].map(|threads| {
@@ -91,7 +93,7 @@ fn check(shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderO
         let start = start(&filtered, shape, &options.encoding, dark, &light);
         let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
         let goal: Vec<Complex64> = plane.iter().map(goal).collect();
-        let filter = LocalFilter::of_aperture(1.0);
+        let filter = LocalFilter::of_aperture(radius);
         let expected = local::reference(&filter, shape, &start, &goal, &light, options.local_steps);
         let mut squares = 0.0;
         for (z, phase) in expected.iter().zip(phases) {
@@ -163,7 +165,7 @@ fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illuminati
     if let Some(laser) = laser {
         laser.shine(&mut shown, shape, shape);
     }
-    let aperture = Aperture::new(h, w, 1.0).unwrap();
+    let aperture = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
     for plane in shown.chunks_exact_mut(h * w) {
         aperture.filter(plane, &mut aperture.scratch());
     }
@@ -321,6 +323,34 @@ fn a_dark_frame_is_dark() {
     assert_eq!(scale, 0.0);
     let sum: Complex32 = phases[..24].iter().map(|p| Complex32::from_polar(1.0, *p)).sum();
     assert!(sum.norm() < 1e-4);
+}
+
+/// A value that is no number costs what lies around it, not the frame.
+#[test]
+fn no_number_stays_where_it_is() {
+    let shape @ (h, w) = (40, 50);
+    let target = Target::from(Display::default().with_size(h, w).unwrap());
+    let good: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 60 + c)).collect();
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let steps = MidpointSteps::new(shape, &target, 2).unwrap();
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut field = good.clone();
+        field[20 * w + 25].im = bad;
+        let [expected, phases] = [&good, &field].map(|field| {
+            let mut phases = vec![0.0; field.len()];
+            encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
+            phases
+        });
+        for (at, (expected, phase)) in expected.iter().zip(&phases).enumerate() {
+            let near = at < h * w && (at / w).abs_diff(20) <= 6 && (at % w).abs_diff(25) <= 6;
+            assert!((0.0..std::f32::consts::TAU).contains(phase));
+            assert!(near || expected == phase, "{at}: {expected} {phase}");
+        }
+        let mut corrected = phases.clone();
+        steps.correct(&field, 1.2, &mut corrected, &mut steps.scratch());
+        assert_eq!(corrected[..h * w], phases[..h * w]);
+        assert_ne!(corrected[h * w..], phases[h * w..]);
+    }
 }
 
 fn refused(options: EncoderOptions, what: &str) {

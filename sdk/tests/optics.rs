@@ -14,7 +14,7 @@ use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::slm::per_pixel;
 use phasefront::unstable::wave;
 use phasefront::unstable::wave::{
-    aperture::Aperture,
+    aperture::{Aperture, Opening},
     asm::{self, Padding, Propagator},
 };
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target};
@@ -231,7 +231,7 @@ fn every_encoding_brings_a_smooth_field_back_through_the_aperture() {
         response.levels(&phase, 0, &mut levels);
         let mut shown = vec![Complex32::ZERO; phase.len()];
         phase_only_field(&levels, &response, scale, &mut shown);
-        let aperture = Aperture::new(h, w, 0.7).unwrap();
+        let aperture = Aperture::new(h, w, Opening::centred(0.7)).unwrap();
         for (shown, wanted) in shown.chunks_exact_mut(h * w).zip(field.outer_iter()) {
             aperture.filter(shown, &mut aperture.scratch());
             let wanted: Vec<_> = wanted.iter().copied().collect();

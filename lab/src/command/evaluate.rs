@@ -6,9 +6,10 @@ use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
 use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
+use phasefront::unstable::wave::aperture::Opening;
 use phasefront::{Display, EncoderOptions, Sweep, Target};
 use phasefront_lab::dataset::Manifest;
-use phasefront_lab::evaluate::{self, Method, Row, Sample, Shown};
+use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};
 use phasefront_lab::{Error, Result, models};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -61,6 +62,15 @@ pub(crate) struct Evaluate {
     /// Bits of the modulator that encoded holograms are for
     #[arg(long, value_name = "N", default_value_t = 8)]
     bits: u32,
+    /// Radius of the aperture that is looked through [default: the display's, which holograms are made for]
+    #[arg(long, value_name = "R")]
+    look_radius: Option<f64>,
+    /// How far its centre lies beside the optical axis, of its radius
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    look_shift: f64,
+    /// Depth that methods are given
+    #[arg(long, value_enum, default_value_t = Depth::Rendered)]
+    depth: Depth,
     /// Which pairs
     #[arg(long, value_enum, default_value_t = Split::Test)]
     split: Split,
@@ -135,6 +145,7 @@ impl Evaluate {
         let sample = Sample {
             scenes,
             seed: self.seed,
+            depth: self.depth,
             margin: self.margin,
         };
         let rows = evaluate::evaluate(&manifest, &self.data, &sample, &methods, &shown, &|| bar.inc(1))?;
@@ -158,6 +169,7 @@ impl Evaluate {
             "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
             "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
             "offset_mm": self.offset_mm, "bits": self.bits, "margin": self.margin,
+            "look_radius": self.look_radius, "look_shift": self.look_shift, "depth": self.depth.to_possible_value().map(|v| v.get_name().to_owned()),
             "focal_stack": {
                 "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
             },
@@ -172,6 +184,11 @@ impl Evaluate {
             response: Response::linear(self.bits)?,
             ..display.clone().with_offset_m(self.offset_mm / 1e3)?.into()
         };
+        let radius = self.look_radius.unwrap_or(display.aperture_radius());
+        let through = Some(Opening {
+            radius,
+            shift: self.look_shift * radius,
+        });
         let mut shown = vec![Shown::complex()];
         for encoder in &self.encoder {
             let encoding = encoder.encoding(None).map_err(|_| {
@@ -197,6 +214,7 @@ impl Evaluate {
                             },
                         )),
                         ceiling: 0,
+                        through,
                     }));
                 }
             }

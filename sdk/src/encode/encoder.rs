@@ -10,7 +10,6 @@ use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
 use crate::target::Target;
-use crate::wave::aperture;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
@@ -87,7 +86,7 @@ impl Encoder {
             prefilter,
             dark: options.dark,
             local: (options.local_steps > 0).then(|| Local {
-                filter: LocalFilter::of_aperture(aperture::RADIUS),
+                filter: LocalFilter::of_aperture(target.display.aperture_radius()),
                 steps: options.local_steps,
             }),
             illumination: illumination.map(|light| (light, target.modulator())),

@@ -245,10 +245,19 @@ fn begin(field: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32,
             let dark = norm <= f32::MIN_POSITIVE;
             let inverse = 1.0 / if dark { 1.0 } else { norm };
             let (re, im) = (if dark { 1.0 } else { f.re * inverse }, f.im * inverse);
-            to.re = g.re * per_scale - light * (re * cosine - im * sine);
-            to.im = g.im * per_scale - light * (re * sine + im * cosine);
+            *to = counted(
+                g.re * per_scale - light * (re * cosine - im * sine),
+                g.im * per_scale - light * (re * sine + im * cosine),
+            );
         }
     }
+}
+
+/// What is missing at a pixel. Where that is no number nothing is, so that its neighbours are corrected all the same.
+#[inline(always)]
+fn counted(re: f32, im: f32) -> Complex32 {
+    let is = re * re + im * im < f32::INFINITY;
+    Complex32::new(if is { re } else { 0.0 }, if is { im } else { 0.0 })
 }
 
 /// g − L·z/|z| of a row.
@@ -258,8 +267,7 @@ fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f3
     for (((z, g), light), to) in values.zip(to) {
         let square = (z.re * z.re + z.im * z.im).max(f32::MIN_POSITIVE);
         let length = light / square.sqrt();
-        to.re = g.re * per_scale - z.re * length;
-        to.im = g.im * per_scale - z.im * length;
+        *to = counted(g.re * per_scale - z.re * length, g.im * per_scale - z.im * length);
     }
 }
 

@@ -12,7 +12,6 @@
 use crate::error::Result;
 use crate::illumination::Illumination;
 use crate::target::Target;
-use crate::wave::aperture;
 use crate::wave::asm::{Padding, Propagator};
 use crate::wave::fft::ConvolveScratch;
 use crate::wave::zernike::Aberration;
@@ -22,9 +21,9 @@ use rayon::prelude::*;
 
 /// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal
 /// stack.
-const WAVE: f32 = 0.5;
+pub(crate) const WAVE: f32 = 0.5;
 /// How far a step goes.
-const GAIN: f32 = 1.5;
+pub(crate) const GAIN: f32 = 1.5;
 /// Most steps. After the third they bring little.
 pub(super) const MAX_STEPS: usize = 100;
 
@@ -33,6 +32,7 @@ pub struct MidpointSteps {
     height: usize,
     width: usize,
     steps: usize,
+    aperture_radius: f64,
     /// From the modulator to the midpoint, and to the modulator.
     back: [Propagator; 3],
     forth: [Propagator; 3],
@@ -75,10 +75,23 @@ impl MidpointSteps {
             height: shape.0,
             width: shape.1,
             steps,
+            aperture_radius: target.display.aperture_radius(),
             back: ways(-offset_m, reversed.as_ref())?,
             forth: ways(offset_m, target.correction.as_ref())?,
             illumination: (target.illumination.clone()).map(|light| (light, target.modulator())),
         })
+    }
+
+    /// From the modulator to the midpoint, each colour.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn back(&self) -> &[Propagator; 3] {
+        &self.back
+    }
+
+    /// From the midpoint to the modulator, each colour.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn forth(&self) -> &[Propagator; 3] {
+        &self.forth
     }
 
     /// Working memory for one call at a time, for the threads of the current pool.
@@ -94,7 +107,8 @@ impl MidpointSteps {
     }
 
     /// Corrects `phases`, (3, H, W) in \[0, 2π), toward `field`, (3, H, W) at the modulator, neither filtered nor
-    /// scaled, of which amplitude `scale` stands for full light. Allocates nothing.
+    /// scaled, of which amplitude `scale` stands for full light. A colour whose field has values that are no numbers is
+    /// left as it is. Allocates nothing.
     ///
     /// # Panics
     /// If `field` or `phases` has not 3·H·W values.
@@ -125,13 +139,16 @@ impl MidpointSteps {
             shown,
             light,
         } = scratch;
-        let (width, radius) = (self.width, aperture::RADIUS);
+        let (width, radius) = (self.width, self.aperture_radius);
         if let Some((illumination, modulator)) = &self.illumination {
             let rows = light.par_chunks_exact_mut(width).enumerate();
             rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));
         }
         wanted.copy_from_slice(field);
         self.back[colour].propagate(wanted, wave);
+        if !wanted.par_iter().all(|value| value.is_finite()) {
+            return; // Transforms would spread it over the frame.
+        }
         let rows =
             (shown.par_chunks_exact_mut(width).zip(phases.par_chunks_exact(width))).zip(light.par_chunks_exact(width));
         rows.for_each(|((shown, phases), light)| {

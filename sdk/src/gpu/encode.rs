@@ -6,6 +6,7 @@ mod double_phase;
 mod filter;
 mod local;
 mod mean_phase;
+mod midpoint;
 
 pub(super) use mean_phase::MeanPhase;
 
@@ -221,7 +222,9 @@ mod tests {
                 local_steps,
                 ..encoding.clone().into()
             };
-            let display = Display::default().with_size(size.0, size.1).unwrap();
+            let aperture_radius = if lit { 0.9 } else { 1.0 };
+            let display = Display::from_toml(&format!("aperture_radius = {aperture_radius:?}")).unwrap();
+            let display = display.with_size(size.0, size.1).unwrap();
             let target = Target {
                 response: response.clone(),
                 illumination: lit.then(|| laser.clone()),

@@ -366,7 +366,7 @@ mod twins {
     use super::super::device::testing::{apart, device, field, read, run, upload};
     use super::*;
     use crate::encode::band_limit::BandLimit;
-    use crate::wave::aperture::{self, Aperture};
+    use crate::wave::aperture::{self, Aperture, Opening};
     use crate::wave::asm::{Padding, Propagator};
 
     const WAVELENGTHS_M: [f64; 3] = [638e-9, 520e-9, 450e-9];
@@ -418,7 +418,7 @@ mod twins {
         let Some(device) = device() else { return };
         for size in [(61, 47), (48, 96), (384, 384), (540, 960)] {
             let plans = (
-                Aperture::new(size.0, size.1, 0.8).unwrap(),
+                Aperture::new(size.0, size.1, Opening::centred(0.8)).unwrap(),
                 BandLimit::new(size.0, size.1, 1.0).unwrap(),
             );
             let round = |kx: usize, ky: usize| {

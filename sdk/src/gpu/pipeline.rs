@@ -134,11 +134,6 @@ impl GpuPipeline {
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
         job.encoder.check()?;
         job.target.check()?;
-        if job.encoder.midpoint_steps > 0 {
-            return Err(GpuError::Refused(
-                "steps at the midpoint, which are the CPU's; midpoint_steps 0 is right".into(),
-            ));
-        }
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;
         }

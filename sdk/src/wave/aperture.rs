@@ -5,10 +5,6 @@ use super::fft::{ConvolveScratch, Fft2};
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 
-/// The radius of the aperture that holograms are made for and looked at through: the whole first order, as in the
-/// paper.
-pub const RADIUS: f64 = 1.0;
-
 /// Whether the aperture passes the frequency (`fx`, `fy`), in cycles a pixel: fx² + fy² ≤ (radius/2)².
 ///
 /// `radius` 1 reaches the Nyquist frequency ½, which is the paper's r of half the image
@@ -18,24 +14,61 @@ pub fn passes(fx: f64, fy: f64, radius: f64) -> bool {
     fx * fx + fy * fy <= 0.25 * radius * radius
 }
 
-/// A plan for one shape and radius. Immutable; shared between threads.
+/// A round hole in the Fourier plane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Opening {
+    /// 1 reaches the Nyquist frequency.
+    pub radius: f64,
+    /// How far its centre lies beside the optical axis along x, of the Nyquist frequency; 0 for one that is adjusted.
+    pub shift: f64,
+}
+
+impl Opening {
+    /// One of `radius` on the axis.
+    pub fn centred(radius: f64) -> Self {
+        Opening { radius, shift: 0.0 }
+    }
+
+    /// What passes it of column `kx` of a spectrum of (H', W') = `shape` that is stored column by column.
+    pub(crate) fn stop(self, kx: usize, (height, width): (usize, usize), column: &mut [Complex32]) {
+        let signed = if 2 * kx > width {
+            kx as f64 - width as f64
+        } else {
+            kx as f64
+        };
+        let fx = signed / width as f64 - 0.5 * self.shift;
+        for (ky, value) in column.iter_mut().enumerate() {
+            let fy = ky.min(height - ky) as f64 / height as f64;
+            if !passes(fx, fy, self.radius) {
+                *value = Complex32::ZERO;
+            }
+        }
+    }
+
+    fn check(self) -> Result<()> {
+        if self.radius > 0.0 && self.radius.is_finite() && self.shift.is_finite() {
+            return Ok(());
+        }
+        Err(Error::Plan(format!(
+            "an aperture of radius {} shifted by {} passes nothing; the radius must be above 0 (1 is the whole first order)",
+            self.radius, self.shift
+        )))
+    }
+}
+
+/// A plan for one shape and opening. Immutable; shared between threads.
 pub struct Aperture {
     fft: Fft2,
-    radius: f64,
+    opening: Opening,
 }
 
 impl Aperture {
-    /// Plans the filtering of (`height`, `width`) planes, periodic as in Eq. 8, by an aperture of
-    /// `radius` (1: the whole first order).
+    /// Plans the filtering of (`height`, `width`) planes, periodic as in Eq. 8, by `opening`.
     ///
     /// # Errors
     /// A radius that is not positive, or an empty plane.
-    pub fn new(height: usize, width: usize, radius: f64) -> Result<Self> {
-        if !(radius > 0.0 && radius.is_finite()) {
-            return Err(Error::Plan(format!(
-                "an aperture of radius {radius} passes nothing; it must be above 0 (1 is the whole first order)"
-            )));
-        }
+    pub fn new(height: usize, width: usize, opening: Opening) -> Result<Self> {
+        opening.check()?;
         if height == 0 || width == 0 {
             return Err(Error::Plan(format!(
                 "a plane of {width}×{height} is empty; each side must be at least 1"
@@ -43,7 +76,7 @@ impl Aperture {
         }
         Ok(Aperture {
             fft: Fft2::new(height, width, height, width),
-            radius,
+            opening,
         })
     }
 
@@ -57,16 +90,13 @@ impl Aperture {
     /// # Panics
     /// If `plane` has not H·W values or `scratch` is another plan's.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
-        let (height, width) = self.fft.padded_shape();
-        let scale = 1.0 / (height * width) as f32;
+        let shape = self.fft.padded_shape();
+        let scale = 1.0 / (shape.0 * shape.1) as f32;
         self.fft.convolve(
             plane,
             |kx, column| {
-                let fx = kx.min(width - kx) as f64 / width as f64;
-                for (ky, value) in column.iter_mut().enumerate() {
-                    let fy = ky.min(height - ky) as f64 / height as f64;
-                    *value *= if passes(fx, fy, self.radius) { scale } else { 0.0 };
-                }
+                self.opening.stop(kx, shape, column);
+                column.iter_mut().for_each(|value| *value *= scale);
             },
             scratch,
         );

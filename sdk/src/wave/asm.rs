@@ -181,6 +181,24 @@ impl Transfer {
         &self.factors
     }
 
+    /// [`Self::factors`] behind an aperture of `radius`, 1 reaching the Nyquist frequency.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn factors_through(&self, radius: f64) -> Vec<Complex32> {
+        let (width, height) = (self.padded_width, self.padded_height);
+        let rows = if self.even { height / 2 + 1 } else { height };
+        let stopped = |(at, factor): (usize, &Complex32)| {
+            let (kx, ky) = (at / rows, at % rows);
+            let fx = kx.min(width - kx) as f64 / width as f64;
+            let fy = ky.min(height - ky) as f64 / height as f64;
+            if passes(fx, fy, radius) {
+                *factor
+            } else {
+                Complex32::ZERO
+            }
+        };
+        self.factors.iter().enumerate().map(stopped).collect()
+    }
+
     /// Multiplies column `x` of a spectrum by the transfer function.
     pub fn apply(&self, x: usize, column: &mut [Complex32]) {
         wide!(self.multiply(x, column));

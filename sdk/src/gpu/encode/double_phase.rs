@@ -112,7 +112,7 @@ impl DoublePhase {
         } else {
             None
         };
-        let (local, encode) = if job.options.local_steps > 0 {
+        let (local, encode) = if job.options.local_steps + job.options.midpoint_steps > 0 {
             (Some(Local::new(device, job, shared, buffers)?), Vec::new())
         } else {
             let program = device.program("double phase", shared.source.clone(), "encode");

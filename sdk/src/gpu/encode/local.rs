@@ -1,12 +1,12 @@
-//! Local correction: one dispatch for the start, one for each step, the last of which writes levels. The twin of
-//! [`crate::encode::local`].
+//! Correction: one dispatch for the start, one for each local step, and steps at the midpoint behind them. The last
+//! writes levels. The twin of [`crate::encode::local`].
 
 use super::double_phase::Shared;
+use super::midpoint::Midpoint;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::encode::local::LocalFilter;
 use crate::gpu::Result;
 use crate::gpu::device::{Device, Dispatch};
-use crate::wave::aperture;
 
 /// Pixels along each side that a workgroup corrects.
 const SIDE: usize = 16;
@@ -15,10 +15,16 @@ const SIDE: usize = 16;
 pub(super) struct Local {
     /// Where a filter leaves nothing of the field that is wanted.
     keep: Option<Dispatch>,
-    /// The start, and all steps but the last.
+    /// The start, and all local steps but the last of all.
     begin: Vec<Dispatch>,
-    /// The last step, for each of the buffers.
-    finish: Vec<Dispatch>,
+    last: Last,
+}
+
+/// What leaves levels.
+enum Last {
+    /// A local step, for each of the buffers.
+    Local(Vec<Dispatch>),
+    Midpoint(Box<Midpoint>),
 }
 
 impl Local {
@@ -57,7 +63,7 @@ impl Local {
             device.buffer("what is missing", bytes)?,
             device.buffer("what is missing after a step", bytes)?,
         ];
-        let taps = LocalFilter::of_aperture(aperture::RADIUS);
+        let taps = LocalFilter::of_aperture(job.target.display.aperture_radius());
         let taps = device.constants("the aperture's taps", bytemuck::cast_slice(taps.taps()))?;
 
         let program = device.program("the start", source.clone(), "begin");
@@ -74,17 +80,24 @@ impl Local {
             arguments
         };
         let grid = [width.div_ceil(SIDE), height.div_ceil(SIDE)];
-        let last = job.options.local_steps - 1;
+        let (steps, to_midpoint) = (job.options.local_steps, job.options.midpoint_steps > 0);
         let program = device.program("a local step", source.clone(), "step_on");
-        for step in 0..last {
+        let before = if to_midpoint { steps } else { steps - 1 };
+        for step in 0..before {
             let mut arguments = of_step(step, &[0, 1, 3, 5, 9]);
             arguments.push((12, rooms[(step + 1) % 2].as_entire_binding()));
             begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
         }
-        let program = device.program("the last local step", source, "finish");
-        let arguments = of_step(last, &[0, 1, 3, 5, 8]);
-        let finish = shared.levels_program(device, &program, &arguments, [grid[0], grid[1], 1], buffers)?;
-        Ok(Local { keep, begin, finish })
+        let last = if to_midpoint {
+            let rooms = [&wanted, &rooms[before % 2], &rooms[(before + 1) % 2]];
+            let midpoint = Midpoint::new(device, job, shared, &source, rooms, buffers)?;
+            Last::Midpoint(Box::new(midpoint))
+        } else {
+            let program = device.program("the last local step", source, "finish");
+            let arguments = of_step(before, &[0, 1, 3, 5, 8]);
+            Last::Local(shared.levels_program(device, &program, &arguments, [grid[0], grid[1], 1], buffers)?)
+        };
+        Ok(Local { keep, begin, last })
     }
 
     /// To be called before the field is filtered.
@@ -97,6 +110,9 @@ impl Local {
     /// Corrects into the buffers of that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         self.begin.iter().for_each(|step| step.run(pass));
-        self.finish[buffers].run(pass);
+        match &self.last {
+            Last::Local(finish) => finish[buffers].run(pass),
+            Last::Midpoint(midpoint) => midpoint.run(pass, buffers),
+        }
     }
 }

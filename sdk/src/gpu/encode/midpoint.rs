@@ -1,0 +1,193 @@
+//! Steps at the midpoint: two convolutions a step, each with a dispatch behind it. The twin of
+//! [`crate::encode::midpoint`].
+
+use super::double_phase::Shared;
+use super::{COLUMNS, EncoderJob, LevelsBuffers};
+use crate::encode::midpoint::{GAIN, MidpointSteps, WAVE};
+use crate::gpu::Result;
+use crate::gpu::device::{Device, Dispatch};
+use crate::gpu::fft::{Convolution, Planes};
+use num_complex::Complex32;
+
+/// The steps of one field, into several buffers.
+pub(super) struct Midpoint {
+    steps: usize,
+    depart: Dispatch,
+    /// To the midpoint: what is wanted, and what is shown, through the aperture.
+    aim: Convolution,
+    back: Convolution,
+    ask: Dispatch,
+    forth: Convolution,
+    follow: Dispatch,
+    /// For each of the buffers.
+    arrive: Vec<Dispatch>,
+}
+
+impl Midpoint {
+    /// After what `source` makes: it leaves g − L·e in `missing`, of the g in `wanted`. `phasors` is of the same size.
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        shared: &Shared<'_>,
+        source: &str,
+        [wanted, missing, phasors]: [&wgpu::Buffer; 3],
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
+        let (height, width) = job.size;
+        let aim = device.buffer("the wave at the midpoint", 24 * height * width)?;
+        let source = format!(
+            "const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n{source}{}",
+            include_str!("midpoint.wgsl")
+        );
+        let by_rows = [width.div_ceil(COLUMNS), height, 3];
+        let dispatch = |what: &str, entry: &'static str, bindings: &[u32], own: &[(u32, &wgpu::Buffer)]| {
+            let mut arguments = shared.arguments(bindings);
+            arguments.extend(own.iter().map(|(at, buffer)| (*at, buffer.as_entire_binding())));
+            device
+                .program(what, source.clone(), entry)
+                .on(device, &arguments, by_rows)
+        };
+        let ways = MidpointSteps::new(job.size, job.target, job.options.midpoint_steps)?;
+        let convolution = |field: &wgpu::Buffer, factors: [&[Complex32]; 3], padded| {
+            let planes = Planes {
+                field,
+                size: job.size,
+                padded,
+                factors: &factors,
+                turn: None,
+            };
+            Convolution::new(device, &planes)
+        };
+        let radius = job.target.display.aperture_radius();
+        let [back, forth] = [ways.back(), ways.forth()];
+        let free = back.each_ref().map(|way| way.transfer().factors());
+        let stopped = [back, forth].map(|way| way.each_ref().map(|way| way.transfer().factors_through(radius)));
+        let [there, here] = stopped.each_ref().map(|way| way.each_ref().map(Vec::as_slice));
+        let arrive = device.program("levels after the midpoint", source.clone(), "arrive");
+        let mut arguments = shared.arguments(&[0, 8]);
+        arguments.push((16, phasors.as_entire_binding()));
+        Ok(Midpoint {
+            steps: job.options.midpoint_steps,
+            depart: dispatch(
+                "the way to the midpoint",
+                "depart",
+                &[0, 1, 3, 5],
+                &[(10, wanted), (14, &aim), (15, missing), (16, phasors)],
+            )?,
+            aim: convolution(&aim, free, back[0].padded_shape())?,
+            back: convolution(missing, there, back[0].padded_shape())?,
+            ask: dispatch(
+                "what is missing at the midpoint",
+                "ask",
+                &[0],
+                &[(14, &aim), (15, missing)],
+            )?,
+            forth: convolution(missing, here, forth[0].padded_shape())?,
+            follow: dispatch(
+                "a step at the midpoint",
+                "follow",
+                &[0, 1, 5, 9],
+                &[(15, missing), (16, phasors)],
+            )?,
+            arrive: shared.levels_program(device, &arrive, &arguments, [by_rows[0], height, 1], buffers)?,
+        })
+    }
+
+    /// Corrects into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
+        self.depart.run(pass);
+        self.aim.run(pass);
+        for _ in 0..self.steps {
+            self.back.run(pass);
+            self.ask.run(pass);
+            self.forth.run(pass);
+            self.follow.run(pass);
+        }
+        self.arrive[buffers].run(pass);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::super::device::testing::{device, field, run, upload};
+    use super::super::{Encoder, EncoderJob, LevelsBuffers};
+    use crate::brightness::Brightness;
+    use crate::display::Display;
+    use crate::encode::EncoderOptions;
+    use crate::gpu::chain::ChainOptions;
+    use crate::illumination::Illumination;
+    use crate::modulator::Modulator;
+    use crate::slm::Response;
+    use crate::target::Target;
+    use crate::wave::zernike::Aberration;
+    use ndarray::Array3;
+
+    #[test]
+    fn steps_are_those_of_the_cpu() {
+        let Some(device) = device() else { return };
+        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
+        let laser = Illumination::new(beam.view()).unwrap();
+        let lens = Aberration::new([[0.0, 0.0, 1.5, 0.0, 0.0]; 3]).unwrap();
+        let cases = [
+            ((61, 47), 0.0, 1.0, (1, 1), false, None),
+            ((61, 47), 2e-3, 0.9, (0, 2), true, None),
+            ((40, 66), -1e-3, 1.0, (2, 3), false, None),
+            ((48, 70), 1e-3, 1.0, (1, 2), true, Some(lens)),
+            ((1, 1), 0.0, 1.0, (0, 1), false, None),
+        ];
+        for (size, offset_m, radius, (local_steps, midpoint_steps), lit, correction) in cases {
+            let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+            let display = display.with_size(size.0, size.1).unwrap();
+            let target = Target {
+                illumination: lit.then(|| laser.clone()),
+                correction,
+                ..display.with_offset_m(offset_m).unwrap().into()
+            };
+            let options = EncoderOptions {
+                brightness: Brightness::Fixed(1.2),
+                local_steps,
+                midpoint_steps,
+                ..Default::default()
+            };
+            let area = size.0 * size.1;
+            let mut values = field(area);
+            let buffer = upload(&device, &values);
+            let (encoder, buffers) = device
+                .guarded(|| {
+                    let buffers = [LevelsBuffers::new(&device, size)?];
+                    let job = EncoderJob {
+                        field: &buffer,
+                        size,
+                        options: &options,
+                        chain: ChainOptions::default(),
+                        target: &target,
+                        response: &Response::Linear { bits: 8 },
+                        turn: None,
+                    };
+                    Ok((Encoder::new(&device, &job, &buffers)?, buffers))
+                })
+                .unwrap();
+            run(&device, |pass| encoder.run(pass, 0));
+            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&buffers[0].levels, 4 * area).unwrap());
+            let twin = Modulator::new(size, &target, &options).unwrap();
+            let mut levels = vec![0; 3 * area];
+            twin.modulate(&mut values, &mut levels, &mut twin.scratch());
+            let apart = levels.iter().enumerate().map(|(at, level)| {
+                let other = (words[at % area] >> (8 * (at / area))) as u8;
+                level.wrapping_sub(other).min(other.wrapping_sub(*level))
+            });
+            let apart: Vec<u8> = apart.collect();
+            // Another level where rounding says so, and more only where little was left of a value.
+            let (beside, beyond) = (
+                apart.iter().filter(|d| **d > 0).count(),
+                apart.iter().filter(|d| **d > 1).count(),
+            );
+            assert!(
+                beside * 50 <= apart.len() && beyond * 1000 <= apart.len(),
+                "{beside} and {beyond} of {} beside, {size:?} at {offset_m}",
+                apart.len()
+            );
+        }
+    }
+}
