@@ -9,7 +9,7 @@ use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::network::{Precision, f32_peak, int8_peak};
-use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -27,8 +27,8 @@ pub struct Case<'a> {
     pub size: (usize, usize),
     /// Threads of the pool.
     pub threads: usize,
-    /// The pre-filter of the deep encoding; AA-DPM without.
-    pub prefilter: Option<&'a Arc<Network>>,
+    /// How its field becomes levels, at one brightness.
+    pub encoder: &'a EncoderOptions,
 }
 
 /// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
@@ -52,8 +52,6 @@ pub struct Row {
     pub threads: usize,
     /// z of the modulator against the midpoint, mm.
     pub offset_mm: f64,
-    /// `anti-alias` or `deep`.
-    pub encoder: &'static str,
     /// Each stage's median.
     pub stage_ms: BTreeMap<&'static str, f64>,
     /// The median of whole frames.
@@ -126,16 +124,8 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
     let (width, height) = case.size;
     let (name, network) = named(case.method);
     forget_peak_memory();
-    let brightness = Brightness::Fixed(1.0);
-    let encoding = match case.prefilter {
-        Some(network) => Encoding::Deep(network.clone()),
-        None => Encoding::ANTI_ALIAS,
-    };
     let plain = Target::from(&target.display);
-    let options = EncoderOptions {
-        brightness,
-        ..encoding.into()
-    };
+    let options = full_light(case.encoder);
     let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
     let Times {
         stages,
@@ -167,10 +157,6 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
         height,
         threads: case.threads,
         offset_mm: target.display.offset_m() * 1e3,
-        encoder: match case.prefilter {
-            Some(_) => "deep",
-            None => "anti-alias",
-        },
         total_ms,
         spread_ms: [totals[0], totals[totals.len() - 1]],
         table_percent: (!table_encode.is_empty())
@@ -183,6 +169,14 @@ fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Ro
             .map(|(peak, gmac_per_s)| 100.0 * gmac_per_s * 1e9 / peak),
         peak_memory_mb: peak_memory_mb(),
     })
+}
+
+/// `encoder` at one brightness.
+fn full_light(encoder: &EncoderOptions) -> EncoderOptions {
+    EncoderOptions {
+        brightness: Brightness::Fixed(1.0),
+        ..encoder.clone()
+    }
 }
 
 /// Times of frames, milliseconds.
@@ -198,10 +192,7 @@ struct Times {
 fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Duration) -> Result<Times> {
     let (width, height) = case.size;
     let (name, _) = named(case.method);
-    let options = EncoderOptions {
-        brightness: Brightness::Fixed(1.0),
-        ..Encoding::ANTI_ALIAS.into()
-    };
+    let options = full_light(case.encoder);
     let by_table = (target.response.shape())
         .map(|_| Modulator::new((height, width), target, &options))
         .transpose()?;

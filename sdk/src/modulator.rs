@@ -37,8 +37,6 @@ pub struct ModulatorScratch {
 
 /// What steps at the midpoint work on.
 struct OfMidpoint {
-    /// The field before it was encoded.
-    wanted: Vec<Complex32>,
     phases: Vec<f32>,
     scratch: MidpointScratch,
 }
@@ -103,7 +101,6 @@ impl Modulator {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
             midpoint: self.midpoint.as_ref().map(|plan| OfMidpoint {
-                wanted: vec![Complex32::ZERO; 3 * self.height * self.width],
                 phases: vec![0.0; 3 * self.height * self.width],
                 scratch: plan.scratch(),
             }),
@@ -132,7 +129,8 @@ impl Modulator {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] for steady brightness, whose scale comes from `past`.
+    /// [`Self::modulate`] of a frame that follows another: steady brightness comes from `past`, and steps at the midpoint go
+    /// on where the frame before ended.
     pub(crate) fn modulate_after(
         &self,
         past: Option<Past>,
@@ -144,9 +142,9 @@ impl Modulator {
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
         let scale = match (&self.midpoint, &mut scratch.midpoint) {
             (Some(plan), Some(of)) => {
-                of.wanted.copy_from_slice(field);
+                plan.keep(field, past.map(|past| past.scale), &mut of.scratch);
                 let scale = (self.encoder).encode(field, scale, &mut of.phases, &mut scratch.encoder);
-                plan.correct(&of.wanted, scale, &mut of.phases, &mut of.scratch);
+                plan.correct(scale, &mut of.phases, &mut of.scratch);
                 self.encoder.levels(&of.phases, levels);
                 scale
             }
@@ -168,12 +166,13 @@ impl Modulator {
     ) -> Modulation {
         let start = Instant::now();
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-        if let Some(of) = &mut scratch.midpoint {
-            of.wanted.copy_from_slice(field);
+        let mut midpoint = self.midpoint.as_ref().zip(scratch.midpoint.as_mut());
+        if let Some((plan, of)) = &mut midpoint {
+            plan.keep(field, past.map(|past| past.scale), &mut of.scratch);
         }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
-        if let (Some(plan), Some(of)) = (&self.midpoint, &mut scratch.midpoint) {
-            plan.correct(&of.wanted, scale, phases, &mut of.scratch);
+        if let Some((plan, of)) = midpoint {
+            plan.correct(scale, phases, &mut of.scratch);
         }
         Modulation {
             scale,

@@ -251,7 +251,9 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
             pool.build().unwrap().install(|| {
                 let plan = MidpointSteps::new(shape, &target, steps).unwrap();
                 let mut phases = start.clone();
-                plan.correct(&field, SCALE, &mut phases, &mut plan.scratch());
+                let mut scratch = plan.scratch();
+                plan.keep(&field, None, &mut scratch);
+                plan.correct(SCALE, &mut phases, &mut scratch);
                 phases
             })
         });
@@ -305,9 +307,63 @@ fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
     encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
     assert!((levels(0).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
     let plan = MidpointSteps::new(shape, &target, 2).unwrap();
-    plan.correct(&field, 1.2, &mut phases, &mut plan.scratch());
+    let mut scratch = plan.scratch();
+    plan.keep(&field, None, &mut scratch);
+    plan.correct(1.2, &mut phases, &mut scratch);
     assert!((levels(2).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
     assert_ne!(levels(0), levels(2));
+}
+
+/// In video one step a frame leads where many lead; where the field changes it begins anew, as a frame by itself.
+#[test]
+fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
+    const SCALE: f32 = 1.2;
+    let shape @ (_, w) = (40, 66);
+    let target = Target::from(Display::from_toml("width = 66\nheight = 40\noffset_mm = 1").unwrap());
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let first: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 70 + c)).collect();
+    let moved = |at: usize| at % w > w / 2;
+    let second = first
+        .iter()
+        .zip((0..3).flat_map(|c| test_plane(shape, 80 + c)))
+        .enumerate();
+    let second: Vec<_> = second
+        .map(|(at, (still, other))| if moved(at) { other } else { *still })
+        .collect();
+    let encoded = |field: &[Complex32]| {
+        let mut phases = vec![0.0; field.len()];
+        encoder.encode(&mut field.to_vec(), Some(SCALE), &mut phases, &mut encoder.scratch());
+        phases
+    };
+    let run = |steps: usize, frames: &[(&[Complex32], Option<f32>)]| {
+        let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+        let mut scratch = plan.scratch();
+        let each = frames.iter().map(|(field, past)| {
+            let mut phases = encoded(field);
+            plan.keep(field, *past, &mut scratch);
+            plan.correct(SCALE, &mut phases, &mut scratch);
+            phases
+        });
+        each.last().unwrap()
+    };
+    let apart = |a: f32, b: f32| (Complex32::cis(a) - Complex32::cis(b)).norm();
+    let follows = Some(SCALE);
+    let still: [(&[Complex32], _); 3] = [(&first, None), (&first, follows), (&first, follows)];
+    let most = run(1, &still)
+        .into_iter()
+        .zip(run(3, &still[..1]))
+        .map(|(a, b)| apart(a, b));
+    assert!(most.fold(0.0, f32::max) < 1e-2);
+    assert_eq!(run(1, &[(&first, None), (&first, None)]), run(1, &still[..1]));
+
+    // Away from what stands still, what moves is as it would be by itself.
+    let anew = run(1, &[(&second, None)]);
+    let after = run(1, &[(&first, None), (&second, follows)]);
+    let far = (0..anew.len()).filter(|at| at % w > w / 2 + 20);
+    let squares: f32 = far.clone().map(|at| apart(anew[at], after[at]).powi(2)).sum();
+    assert!((squares / far.count() as f32).sqrt() < 0.1);
+    let still = (0..anew.len()).filter(|at| !moved(*at) && apart(anew[*at], after[*at]) > 1e-3);
+    assert!(still.count() * 3 > anew.len() / 2);
 }
 
 #[test]
@@ -347,7 +403,9 @@ fn no_number_stays_where_it_is() {
             assert!(near || expected == phase, "{at}: {expected} {phase}");
         }
         let mut corrected = phases.clone();
-        steps.correct(&field, 1.2, &mut corrected, &mut steps.scratch());
+        let mut scratch = steps.scratch();
+        steps.keep(&field, None, &mut scratch);
+        steps.correct(1.2, &mut corrected, &mut scratch);
         assert_eq!(corrected[..h * w], phases[..h * w]);
         assert_ne!(corrected[h * w..], phases[h * w..]);
     }

@@ -1,19 +1,32 @@
 //! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
 //! measured in the same run.
 
-use super::{median, named};
+use super::{full_light, median, named};
 use crate::error::Result;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
 use phasefront::unstable::gpu::{
     ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
 };
-use phasefront::{Brightness, Method, StageTimes, Target};
+use phasefront::{EncoderOptions, Method, StageTimes, Target};
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// What was measured of one method and frame size on a GPU. Times are milliseconds, medians over frames.
+/// One combination that is measured on a GPU.
+#[derive(Debug, Clone)]
+pub struct GpuCase<'a> {
+    /// What makes the hologram.
+    pub method: &'a Method,
+    /// Width and height, pixels.
+    pub size: (usize, usize),
+    /// How its field becomes levels, at one brightness.
+    pub encoder: &'a EncoderOptions,
+    /// How a network computes.
+    pub chain: ChainOptions,
+}
+
+/// What was measured of one [`GpuCase`]. Times are milliseconds, medians over frames.
 #[derive(Debug, Clone, Serialize)]
 pub struct GpuRow {
     /// `network`, `sweep` or `seeded`, which is also the name of its stage.
@@ -51,23 +64,17 @@ pub struct GpuRow {
     pub bandwidth_percent: Option<f64>,
 }
 
-/// Measures `method` on frames of (`width`, `height`) on `device`: frames until `budget` is spent, five at least, after
+/// Measures `case` on `device`: frames until `budget` is spent, five at least, after
 /// one that is not counted; where the modulator has a table for each pixel, each frame once more through it.
 ///
 /// # Errors
 /// A case that cannot be planned there, or a device that does not answer as the CPU does.
-pub fn measure(
-    method: &Method,
-    (width, height): (usize, usize),
-    device: &Arc<Device>,
-    target: &Target,
-    chain: ChainOptions,
-    budget: Duration,
-) -> Result<GpuRow> {
-    let (name, network) = named(method);
-    let mut job = Job::new((height, width), method.clone(), &target.display);
-    job.encoder.brightness = Brightness::Fixed(1.0);
-    job.chain = chain;
+pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget: Duration) -> Result<GpuRow> {
+    let (width, height) = case.size;
+    let (name, network) = named(case.method);
+    let mut job = Job::new((height, width), case.method.clone(), &target.display);
+    job.encoder = full_light(case.encoder);
+    job.chain = case.chain;
     probe(device, &job)?;
     let format = ColourFormat::Nv12(YuvEncoding::default());
     job.colour = Colour::Camera {

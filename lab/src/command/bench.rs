@@ -1,12 +1,12 @@
 //! `phasefront bench`: how fast a frame is on this machine, stage by stage.
 
-use super::flags::{BackendFlags, DisplayFlags, parse_size, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use phasefront::unstable::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront::unstable::network;
 use phasefront::{Method, Network, Sweep, Target};
-use phasefront_lab::bench::gpu::GpuRow;
+use phasefront_lab::bench::gpu::{GpuCase, GpuRow};
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, Precision};
 use phasefront_lab::plot::{self, Bar};
@@ -36,9 +36,8 @@ pub(crate) struct Bench {
     /// Seconds to spend on each combination; five frames at least
     #[arg(long, value_name = "S", default_value_t = 2.0)]
     seconds: f64,
-    /// ONNX file of a pre-filter, for the deep encoding instead of AA-DPM
-    #[arg(long, value_name = "FILE")]
-    prefilter: Option<String>,
+    #[command(flatten)]
+    encoder: EncoderFlags,
     /// Draw the stages' times there
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -73,14 +72,15 @@ impl Bench {
         let target = self.display.read()?.target;
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
+        let encoder = self.encoder.read()?;
         let device = self.backend.device()?;
         let methods = self.methods(&target, device.is_some())?;
         let sizes = self
             .size
             .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| vec![size]);
         match device {
-            Some(options) => self.on_gpu(&methods, &sizes, &target, &options, budget, json),
-            None => self.on_cpu(&methods, &sizes, &target, threads, budget, json),
+            Some(options) => self.on_gpu(&methods, &sizes, (&target, &encoder), &options, budget, json),
+            None => self.on_cpu(&methods, &sizes, (&target, &encoder), threads, budget, json),
         }
     }
 
@@ -118,15 +118,11 @@ impl Bench {
         &self,
         methods: &[Method],
         sizes: &[(usize, usize)],
-        target: &Target,
+        (target, encoder): (&Target, &Encoder),
         threads: Option<usize>,
         budget: Duration,
         json: bool,
     ) -> Result<()> {
-        let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, Precision::Float32)?),
-            None => None,
-        };
         let machine = Machine::this();
         let threads = match threads {
             Some(threads) => vec![threads],
@@ -140,7 +136,7 @@ impl Bench {
                     method,
                     size,
                     threads,
-                    prefilter: prefilter.as_ref(),
+                    encoder: &encoder.options,
                 }));
             }
         }
@@ -152,12 +148,12 @@ impl Bench {
         }
         bar.finish_and_clear();
         if let Some(path) = &self.plot {
-            plot::write_bars(path, &title(&machine, &rows[0]), &bars(&rows))?;
+            plot::write_bars(path, &title(&machine, &encoder.describe(), &rows[0]), &bars(&rows))?;
         }
         super::print(
             json,
-            &json!({"machine": machine, "rows": rows}),
-            as_table(&machine, &rows),
+            &json!({"machine": machine, "encoder": encoder.describe(), "rows": rows}),
+            as_table(&machine, &encoder.describe(), &rows),
         );
         Ok(())
     }
@@ -179,13 +175,13 @@ impl Bench {
         &self,
         methods: &[Method],
         sizes: &[(usize, usize)],
-        target: &Target,
+        (target, encoder): (&Target, &Encoder),
         options: &DeviceOptions,
         budget: Duration,
         json: bool,
     ) -> Result<()> {
-        if self.plot.is_some() || self.prefilter.is_some() {
-            return Err(Error::Input("--plot and --prefilter go with --backend cpu".into()));
+        if self.plot.is_some() {
+            return Err(Error::Input("--plot goes with --backend cpu".into()));
         }
         let device = Arc::new(Device::open(options)?);
         let fusions = match self.fusion {
@@ -211,8 +207,13 @@ impl Bench {
             for &size in sizes {
                 for &float in &floats {
                     for &fusion in fusions {
-                        let chain = ChainOptions { float, fusion };
-                        rows.push(bench::gpu::measure(method, size, &device, target, chain, budget)?);
+                        let case = GpuCase {
+                            method,
+                            size,
+                            encoder: &encoder.options,
+                            chain: ChainOptions { float, fusion },
+                        };
+                        rows.push(bench::gpu::measure(&case, &device, target, budget)?);
                     }
                 }
             }
@@ -220,15 +221,15 @@ impl Bench {
         gpu::keep_programs(&device);
         super::print(
             json,
-            &json!({"machine": device.name(), "rows": rows}),
-            as_gpu_table(&device, &rows),
+            &json!({"machine": device.name(), "encoder": encoder.describe(), "rows": rows}),
+            as_gpu_table(&device, &encoder.describe(), &rows),
         );
         Ok(())
     }
 }
 
-fn as_gpu_table(device: &Device, rows: &[GpuRow]) -> String {
-    let mut text = format!("{}\n\n", device.name());
+fn as_gpu_table(device: &Device, encoder: &str, rows: &[GpuRow]) -> String {
+    let mut text = format!("{}; {encoder}\n\n", device.name());
     text += "| method | layers | numbers | kernels | size | input ms | method ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
     text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
@@ -258,8 +259,8 @@ fn as_gpu_table(device: &Device, rows: &[GpuRow]) -> String {
     text
 }
 
-fn as_table(machine: &Machine, rows: &[Row]) -> String {
-    let mut text = format!("{}, {} cores\n\n", machine.cpu, machine.cores);
+fn as_table(machine: &Machine, encoder: &str, rows: &[Row]) -> String {
+    let mut text = format!("{}, {} cores; {encoder}\n\n", machine.cpu, machine.cores);
     text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB | table % |\n";
     text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
     for row in rows {
@@ -292,10 +293,10 @@ fn tenths(value: Option<f64>) -> String {
     value.map_or("–".into(), |value| format!("{value:.1}"))
 }
 
-fn title(machine: &Machine, row: &Row) -> String {
+fn title(machine: &Machine, encoder: &str, row: &Row) -> String {
     format!(
-        "{}, {} cores: ms a frame, offset {} mm, {}",
-        machine.cpu, machine.cores, row.offset_mm, row.encoder
+        "{}, {} cores: ms a frame, offset {} mm, {encoder}",
+        machine.cpu, machine.cores, row.offset_mm
     )
 }
 

@@ -89,7 +89,8 @@ impl EncoderFlags {
             Some(file) => Some(models::network(file, Precision::Float32)?),
             None => None,
         };
-        let name = self.encoder.unwrap_or(EncoderName("anti-alias"));
+        let usual = if prefilter.is_some() { DEEP } else { "anti-alias" };
+        let name = self.encoder.unwrap_or(EncoderName(usual));
         Ok(self.encoder(name.encoding(prefilter)?, name))
     }
 

@@ -1,5 +1,6 @@
-//! Correction of a phase map at the midpoint, for stills: what is shown is taken there, drawn toward the wanted field,
-//! and taken back. Four transforms a colour and step.
+//! Correction of a phase map at the midpoint: what is shown is taken there, drawn toward the wanted field, and taken
+//! back. Four transforms a colour and step. In video a pixel whose field stands still goes on from the frame before, so
+//! that one step a frame comes to where many lead.
 //!
 //! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture,
 //! and propagation back over the offset) and T the wanted field there over the scale, a step is
@@ -24,6 +25,8 @@ use rayon::prelude::*;
 pub(crate) const WAVE: f32 = 0.5;
 /// How far a step goes.
 pub(crate) const GAIN: f32 = 1.5;
+/// A pixel stands still whose field changes by up to so much, of full light.
+pub(crate) const STILL: f32 = 0.1;
 /// Most steps. After the third they bring little.
 pub(super) const MAX_STEPS: usize = 100;
 
@@ -43,6 +46,10 @@ pub struct MidpointSteps {
 /// Working memory of [`MidpointSteps`] for one call at a time.
 pub struct MidpointScratch {
     wave: ConvolveScratch,
+    /// The field at the modulator, all colours: of this frame or, between frames, of the one before.
+    field: Vec<Complex32>,
+    /// The phases of the frame before, all colours: NaN where there is none that this one can begin with.
+    before: Vec<f32>,
     /// T of one colour.
     wanted: Vec<Complex32>,
     /// u, then r.
@@ -99,6 +106,8 @@ impl MidpointSteps {
         let plane = || vec![Complex32::ZERO; self.height * self.width];
         MidpointScratch {
             wave: self.back[0].scratch(),
+            field: vec![Complex32::ZERO; 3 * self.height * self.width],
+            before: vec![f32::NAN; 3 * self.height * self.width],
             wanted: plane(),
             missing: plane(),
             shown: plane(),
@@ -106,34 +115,56 @@ impl MidpointSteps {
         }
     }
 
-    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward `field`, (3, H, W) at the modulator, neither filtered nor
-    /// scaled, of which amplitude `scale` stands for full light. A colour whose field has values that are no numbers is
-    /// left as it is. Allocates nothing.
+    /// Keeps `field`, (3, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward. Of
+    /// a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
     ///
     /// # Panics
-    /// If `field` or `phases` has not 3·H·W values.
-    pub fn correct(&self, field: &[Complex32], scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
-        let plane = self.height * self.width;
-        assert!(field.len() == 3 * plane && phases.len() == 3 * plane);
-        if scale <= 0.0 {
-            return; // In darkness there is nothing to correct.
-        }
-        let colours = field.chunks_exact(plane).zip(phases.chunks_exact_mut(plane));
-        for (colour, (field, phases)) in colours.enumerate() {
-            self.correct_colour(colour, field, 1.0 / scale, phases, scratch);
-        }
+    /// If `field` has not 3·H·W values.
+    pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut MidpointScratch) {
+        assert_eq!(field.len(), scratch.field.len());
+        let bound = past.map_or(-1.0, |scale| (STILL * scale).powi(2));
+        let rows = (scratch.field.par_chunks_exact_mut(self.width))
+            .zip(scratch.before.par_chunks_exact_mut(self.width))
+            .zip(field.par_chunks_exact(self.width));
+        rows.for_each(|((kept, before), field)| {
+            for ((kept, before), field) in kept.iter_mut().zip(before).zip(field) {
+                let still = (field - *kept).norm_sqr() <= bound;
+                *before = if still { *before } else { f32::NAN };
+                *kept = *field;
+            }
+        });
     }
 
-    fn correct_colour(
-        &self,
-        colour: usize,
-        field: &[Complex32],
-        per_scale: f32,
-        phases: &mut [f32],
-        scratch: &mut MidpointScratch,
-    ) {
+    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward the field that was kept, of which amplitude `scale` stands for
+    /// full light. A colour whose field has values that are no numbers is left as it is. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `phases` has not 3·H·W values.
+    pub fn correct(&self, scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
+        assert_eq!(phases.len(), scratch.field.len());
+        if scale <= 0.0 {
+            scratch.before.fill(f32::NAN);
+            return; // In darkness there is nothing to correct.
+        }
+        let rows = phases
+            .par_chunks_exact_mut(self.width)
+            .zip(scratch.before.par_chunks_exact(self.width));
+        rows.for_each(|(phases, before)| {
+            for (phase, before) in phases.iter_mut().zip(before) {
+                *phase = if before.is_nan() { *phase } else { *before };
+            }
+        });
+        for (colour, phases) in phases.chunks_exact_mut(self.height * self.width).enumerate() {
+            self.correct_colour(colour, 1.0 / scale, phases, scratch);
+        }
+        scratch.before.copy_from_slice(phases);
+    }
+
+    fn correct_colour(&self, colour: usize, per_scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
         let MidpointScratch {
             wave,
+            field,
+            before: _,
             wanted,
             missing,
             shown,
@@ -144,7 +175,7 @@ impl MidpointSteps {
             let rows = light.par_chunks_exact_mut(width).enumerate();
             rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));
         }
-        wanted.copy_from_slice(field);
+        wanted.copy_from_slice(&field[colour * phases.len()..][..phases.len()]);
         self.back[colour].propagate(wanted, wave);
         if !wanted.par_iter().all(|value| value.is_finite()) {
             return; // Transforms would spread it over the frame.

@@ -116,8 +116,9 @@ impl Encoder {
         })
     }
 
-    /// Where the scale of the frame comes from that is submitted next, if it is steady.
+    /// Which frame the one follows that is submitted next: steady brightness and steps at the midpoint go on from there.
     pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+        self.double_phase.heed(device, past);
         if let Some(steadier) = &self.steadier {
             steadier.heed(device, past);
         }

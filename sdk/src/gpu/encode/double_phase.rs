@@ -3,7 +3,7 @@
 use super::filter::Filtered;
 use super::local::Local;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
-use crate::brightness::Brightness;
+use crate::brightness::{Brightness, Past};
 use crate::gpu::Result;
 use crate::gpu::device::{Constants, Device, Dispatch, Program};
 use crate::slm::{Response, per_pixel};
@@ -123,6 +123,13 @@ impl DoublePhase {
             )
         };
         Ok(DoublePhase { peak, encode, local })
+    }
+
+    /// Which frame the one follows that is submitted next.
+    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+        if let Some(local) = &self.local {
+            local.heed(device, past);
+        }
     }
 
     /// To be called before the field is filtered.

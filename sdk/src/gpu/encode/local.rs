@@ -4,6 +4,7 @@
 use super::double_phase::Shared;
 use super::midpoint::Midpoint;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
+use crate::brightness::Past;
 use crate::encode::local::LocalFilter;
 use crate::gpu::Result;
 use crate::gpu::device::{Device, Dispatch};
@@ -89,7 +90,7 @@ impl Local {
             begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
         }
         let last = if to_midpoint {
-            let rooms = [&wanted, &rooms[before % 2], &rooms[(before + 1) % 2]];
+            let rooms = [&wanted, &rooms[before % 2]];
             let midpoint = Midpoint::new(device, job, shared, &source, rooms, buffers)?;
             Last::Midpoint(Box::new(midpoint))
         } else {
@@ -98,6 +99,13 @@ impl Local {
             Last::Local(shared.levels_program(device, &program, &arguments, [grid[0], grid[1], 1], buffers)?)
         };
         Ok(Local { keep, begin, last })
+    }
+
+    /// Which frame the one follows that is submitted next.
+    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+        if let Last::Midpoint(midpoint) = &self.last {
+            midpoint.heed(device, past);
+        }
     }
 
     /// To be called before the field is filtered.

@@ -3,15 +3,17 @@
 
 use super::double_phase::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
-use crate::encode::midpoint::{GAIN, MidpointSteps, WAVE};
+use crate::brightness::Past;
+use crate::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
 use crate::gpu::Result;
-use crate::gpu::device::{Device, Dispatch};
+use crate::gpu::device::{Constants, Device, Dispatch};
 use crate::gpu::fft::{Convolution, Planes};
 use num_complex::Complex32;
 
 /// The steps of one field, into several buffers.
 pub(super) struct Midpoint {
     steps: usize,
+    bound: Constants,
     depart: Dispatch,
     /// To the midpoint: what is wanted, and what is shown, through the aperture.
     aim: Convolution,
@@ -24,17 +26,20 @@ pub(super) struct Midpoint {
 }
 
 impl Midpoint {
-    /// After what `source` makes: it leaves g − L·e in `missing`, of the g in `wanted`. `phasors` is of the same size.
+    /// After what `source` makes: it leaves g − L·e in `missing`, of the g in `wanted`.
     pub(super) fn new(
         device: &Device,
         job: &EncoderJob<'_>,
         shared: &Shared<'_>,
         source: &str,
-        [wanted, missing, phasors]: [&wgpu::Buffer; 3],
+        [wanted, missing]: [&wgpu::Buffer; 2],
         buffers: &[LevelsBuffers],
     ) -> Result<Self> {
         let (height, width) = job.size;
-        let aim = device.buffer("the wave at the midpoint", 24 * height * width)?;
+        let room = |what| device.buffer(what, 24 * height * width);
+        let aim = room("the wave at the midpoint")?;
+        let (phasors, kept) = (room("what is shown")?, room("the wanted field of the frame before")?);
+        let bound = device.constants("what stands still", bytemuck::cast_slice(&[-1.0f32; 4]))?;
         let source = format!(
             "const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n{source}{}",
             include_str!("midpoint.wgsl")
@@ -72,7 +77,14 @@ impl Midpoint {
                 "the way to the midpoint",
                 "depart",
                 &[0, 1, 3, 5],
-                &[(10, wanted), (14, &aim), (15, missing), (16, phasors)],
+                &[
+                    (10, wanted),
+                    (14, &aim),
+                    (15, missing),
+                    (16, &phasors),
+                    (17, &kept),
+                    (18, &bound.buffer),
+                ],
             )?,
             aim: convolution(&aim, free, back[0].padded_shape())?,
             back: convolution(missing, there, back[0].padded_shape())?,
@@ -87,10 +99,17 @@ impl Midpoint {
                 "a step at the midpoint",
                 "follow",
                 &[0, 1, 5, 9],
-                &[(15, missing), (16, phasors)],
+                &[(15, missing), (16, &phasors)],
             )?,
             arrive: shared.levels_program(device, &arrive, &arguments, [by_rows[0], height, 1], buffers)?,
+            bound,
         })
+    }
+
+    /// Which frame the one follows that is submitted next.
+    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+        let bound = past.map_or(-1.0, |past| (STILL * past.scale).powi(2));
+        (device.queue).write_buffer(&self.bound.buffer, 0, bytemuck::cast_slice(&[bound; 4]));
     }
 
     /// Corrects into the buffers of that index.
@@ -112,7 +131,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::super::device::testing::{device, field, run, upload};
     use super::super::{Encoder, EncoderJob, LevelsBuffers};
-    use crate::brightness::Brightness;
+    use crate::brightness::{Brightness, Past};
     use crate::display::Display;
     use crate::encode::EncoderOptions;
     use crate::gpu::chain::ChainOptions;
@@ -122,6 +141,7 @@ mod tests {
     use crate::target::Target;
     use crate::wave::zernike::Aberration;
     use ndarray::Array3;
+    use num_complex::Complex32;
 
     #[test]
     fn steps_are_those_of_the_cpu() {
@@ -168,26 +188,38 @@ mod tests {
                     Ok((Encoder::new(&device, &job, &buffers)?, buffers))
                 })
                 .unwrap();
-            run(&device, |pass| encoder.run(pass, 0));
-            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&buffers[0].levels, 4 * area).unwrap());
             let twin = Modulator::new(size, &target, &options).unwrap();
-            let mut levels = vec![0; 3 * area];
-            twin.modulate(&mut values, &mut levels, &mut twin.scratch());
-            let apart = levels.iter().enumerate().map(|(at, level)| {
-                let other = (words[at % area] >> (8 * (at / area))) as u8;
-                level.wrapping_sub(other).min(other.wrapping_sub(*level))
-            });
-            let apart: Vec<u8> = apart.collect();
-            // Another level where rounding says so, and more only where little was left of a value.
-            let (beside, beyond) = (
-                apart.iter().filter(|d| **d > 0).count(),
-                apart.iter().filter(|d| **d > 1).count(),
-            );
-            assert!(
-                beside * 50 <= apart.len() && beyond * 1000 <= apart.len(),
-                "{beside} and {beyond} of {} beside, {size:?} at {offset_m}",
-                apart.len()
-            );
+            let mut scratch = twin.scratch();
+            let past = Past { scale: 1.2, share: 1.0 };
+            // A frame by itself, and one that follows: of it a part stands still.
+            for past in [None, Some(past)] {
+                if past.is_some() {
+                    values
+                        .iter_mut()
+                        .step_by(3)
+                        .for_each(|value| *value *= Complex32::new(0.3, 0.6));
+                }
+                device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&values));
+                encoder.heed(&device, past);
+                run(&device, |pass| encoder.run(pass, 0));
+                let words = device.read(&buffers[0].levels, 4 * area).unwrap();
+                let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
+                let mut levels = vec![0; 3 * area];
+                twin.modulate_after(past, &mut values.clone(), &mut levels, &mut scratch);
+                let apart = levels.iter().enumerate().map(|(at, level)| {
+                    let other = (words[at % area] >> (8 * (at / area))) as u8;
+                    level.wrapping_sub(other).min(other.wrapping_sub(*level))
+                });
+                let apart: Vec<u8> = apart.collect();
+                // Another level where rounding says so, and more only where little was left of a value.
+                let beside = apart.iter().filter(|d| **d > 0).count();
+                let beyond = apart.iter().filter(|d| **d > 1).count();
+                assert!(
+                    beside * 50 <= apart.len() && beyond * 1000 <= apart.len(),
+                    "{beside} and {beyond} of {} beside, {size:?} at {offset_m}, {past:?}",
+                    apart.len()
+                );
+            }
         }
     }
 }

@@ -1,13 +1,17 @@
 // Steps at the midpoint, after local.wgsl; see encode/midpoint.rs. `depart` takes what double phase or local steps leave,
-// `ask` and `follow` are a step's two halves, each behind its way through the aperture, and `arrive` writes levels. The
+// or where a pixel stands still what the frame before ended with; `ask` and `follow` are a step's two halves, each behind its way through the aperture, and `arrive` writes levels. The
 // header that midpoint.rs writes gives WAVE and GAIN.
 
 // T, the wanted field over the scale: at the modulator, then at the midpoint.
 @group(0) @binding(14) var<storage, read_write> aim: array<vec2f>;
 // L·e, then u, r and Kᴴ·r.
 @group(0) @binding(15) var<storage, read_write> missing: array<vec2f>;
-// L·e.
+// L·e; between frames that of the one before.
 @group(0) @binding(16) var<storage, read_write> phasors: array<vec2f>;
+// The wanted field of the frame before at the modulator.
+@group(0) @binding(17) var<storage, read_write> kept: array<vec2f>;
+// The square of the most that a pixel changes which stands still; below 0 where there is no frame before.
+@group(0) @binding(18) var<uniform> bound: vec4f;
 
 fn place(at: vec3u) -> u32 { return at.z * frame.plane + at.y * u32(frame.width) + at.x; }
 
@@ -15,8 +19,11 @@ fn place(at: vec3u) -> u32 { return at.z * frame.plane + at.y * u32(frame.width)
 @compute @workgroup_size(64)
 fn depart(@builtin(global_invocation_id) at: vec3u) {
     if (i32(at.x) >= frame.width) { return; }
-    let g = goal(at.z, i32(at.x), i32(at.y), over(full_light()));
-    let e = g - missing[place(at)];
+    let u = goal(at.z, i32(at.x), i32(at.y), 1.0);
+    let change = u - kept[place(at)];
+    let g = u * over(full_light());
+    let e = select(g - missing[place(at)], phasors[place(at)], dot(change, change) <= bound.x);
+    kept[place(at)] = u;
     aim[place(at)] = g;
     missing[place(at)] = e;
     phasors[place(at)] = e;
