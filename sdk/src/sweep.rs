@@ -46,6 +46,9 @@ pub const MAX_TAPS: usize = 63;
 pub const CARRIED: f64 = 0.5;
 /// Most hidden layers.
 pub const MAX_HIDDEN_LAYERS: usize = 2;
+/// Light that spreads farther than this through the volume, in pixels, is not swept: fitting the way home would take
+/// seconds, and every tile would read the whole frame.
+pub const MAX_REACH: usize = 2048;
 /// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
 /// from the midpoint by Fourier transforms.
 pub const MAX_HOME_REACH: usize = 32;
@@ -118,6 +121,13 @@ impl Sweep {
                 self.taps,
                 2 * reach.ceil() as usize + 1,
                 (reach * self.planes as f64 / (self.taps / 2) as f64).ceil(),
+            ));
+        }
+        let reach = reach_px(display, display.volume_depth_m());
+        if reach > MAX_REACH as f64 {
+            return refuse(format!(
+                "light spreads {reach:.0} pixels through the volume; {MAX_REACH} are the most: a volume of {:.3} mm or a larger pitch is right",
+                display.volume_depth_m() * 1e3 * MAX_REACH as f64 / reach
             ));
         }
         if self.hidden_layers > MAX_HIDDEN_LAYERS {
