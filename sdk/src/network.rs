@@ -6,6 +6,7 @@
 //! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
 //! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
+mod bounds;
 pub mod chain;
 mod filter;
 mod fused;
@@ -76,8 +77,10 @@ impl Network {
     /// f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata.
     ///
     /// # Errors
-    /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right.
+    /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right; a file of over
+    /// 2²⁸ bytes or 2¹⁷ parts. What is allocated is at most 4 times the file and 200 MB.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
+        bounds::check(bytes)?;
         let proto = ModelProto::decode(bytes)
             .map_err(|why| Error::Network(format!("not an ONNX file, or a truncated one: {why}")))?;
         let graph = proto

@@ -57,7 +57,7 @@ enum Value<'a> {
     /// An integer constant after DequantizeLinear: value and scales, one or one an output channel.
     Dequantised {
         constant: &'a Constant,
-        scale: Vec<f32>,
+        scale: &'a [f32],
     },
 }
 
@@ -230,8 +230,14 @@ impl<'a> Reader<'a> {
     }
 
     /// The scales of a Quantize- or DequantizeLinear, each finite and positive.
-    fn scales(&self, node: &NodeProto) -> Read<Vec<f32>> {
-        let scale = self.constant(node, 1)?.f32s()?.to_vec();
+    fn scales(&self, node: &NodeProto) -> Read<&'a [f32]> {
+        let scale = self.constant(node, 1)?.f32s()?;
+        if scale.len() > MAX_CHANNELS {
+            return Err(format!(
+                "{} scales; {MAX_CHANNELS} are the most, one a channel",
+                scale.len()
+            ));
+        }
         match scale.iter().find(|s| !s.is_normal() || **s < 0.0) {
             Some(bad) => Err(format!(
                 "scale '{}' holds {bad}; every scale must be finite and positive",
@@ -243,7 +249,7 @@ impl<'a> Reader<'a> {
 
     /// Scale and zero point of an activation's u8 values.
     fn activation_quantisation(&self, node: &NodeProto) -> Read<Quantisation> {
-        let &[scale] = &self.scales(node)?[..] else {
+        let &[scale] = self.scales(node)? else {
             return Err("activations are quantised per tensor: one scale".into());
         };
         let zero_point = match node.input.get(2).filter(|name| !name.is_empty()) {
