@@ -17,6 +17,11 @@ use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
 
+/// Most pixels of an image.
+pub const MOST_PIXELS: usize = 1 << 26;
+/// Most pixels along a side of one.
+const MOST_SIDE: usize = 1 << 14;
+
 /// A plan for one hologram shape, z and screen size. Immutable; shared between threads.
 pub struct Preview {
     hologram: (usize, usize),
@@ -32,6 +37,19 @@ pub struct Preview {
     y: Axis,
 }
 
+/// Checks that an image of `screen` (H, W) is one for a screen, before there is memory for it.
+///
+/// # Errors
+/// One over [`MOST_PIXELS`], or over 2¹⁴ pixels a side.
+pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
+    if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
+        return Err(Error::Plan(format!(
+            "a preview of {width}×{height} is too large; {MOST_SIDE} pixels a side and {MOST_PIXELS} in all are the most"
+        )));
+    }
+    Ok(())
+}
+
 /// Working memory of a [`Preview`] for one call at a time.
 pub struct PreviewScratch {
     field: Vec<Complex32>,
@@ -43,7 +61,8 @@ impl Preview {
     /// Plans views at `z_m` of (H, W) holograms for `target`, through what it corrects, as images of `screen` (H, W).
     ///
     /// # Errors
-    /// A hologram under 2 pixels a side, an empty screen, a z too far away, or a table for another modulator.
+    /// A hologram under 2 pixels a side, an empty screen or one over [`MOST_PIXELS`], a z too far away, or a table for
+    /// another modulator.
     pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
         if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
             return Err(Error::Plan(format!(
@@ -51,6 +70,7 @@ impl Preview {
                 screen.1, screen.0
             )));
         }
+        check_screen(screen)?;
         // Even, so that both colours of the checkerboard weigh alike.
         let ratio = (height as f64 / screen.0 as f64).min(width as f64 / screen.1 as f64);
         let factor = ((ratio / 2.0) as usize * 2).clamp(2, 8);

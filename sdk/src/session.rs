@@ -12,6 +12,7 @@ mod brightness;
 mod engine;
 mod event;
 mod hologram;
+mod home;
 mod live;
 mod on_cpu;
 #[cfg(feature = "gpu")]
@@ -35,6 +36,7 @@ use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::target::Target;
+use home::Home;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
 use queue::{Gate, Queue};
@@ -66,9 +68,17 @@ pub struct SessionOptions {
     /// Which GPU, and how.
     #[cfg(feature = "gpu")]
     pub gpu: GpuOptions,
-    /// Threads to compute with; None for as many as the device has.
+    /// Threads to compute with, [`MOST_THREADS`] at most; None for as many as the device has, and no more than that.
     pub threads: Option<NonZeroUsize>,
+    /// Most pixels of a rung and of the modulator: what a session allocates is a multiple of them.
+    pub most_pixels: usize,
 }
+
+/// Most threads of a session's pool. A live session has one more.
+pub const MOST_THREADS: usize = 256;
+
+/// [`SessionOptions::most_pixels`] unless it is set: 8192×4096, which holds 8K UHD.
+pub const MOST_PIXELS: usize = 1 << 25;
 
 impl SessionOptions {
     /// Holograms of the modulator's resolution by `method`: AA-DPM, steady brightness, near and far by percentiles, no
@@ -91,12 +101,28 @@ impl SessionOptions {
             #[cfg(feature = "gpu")]
             gpu: GpuOptions::default(),
             threads: None,
+            most_pixels: MOST_PIXELS,
             target,
         }
     }
 
     fn check(&self) -> Result<()> {
         quality::check(&self.ladder, self.quality, self.target.modulator())?;
+        // Rungs are no larger than the modulator.
+        let (height, width) = self.target.modulator();
+        if height.saturating_mul(width) > self.most_pixels {
+            return Err(Error::Plan(format!(
+                "a session for {width}×{height} pixels; most_pixels allows {}: set it higher where the memory is there",
+                self.most_pixels
+            )));
+        }
+        if let Some(threads) = self.threads
+            && threads.get() > MOST_THREADS
+        {
+            return Err(Error::Plan(format!(
+                "{threads} threads are too many; 1 to {MOST_THREADS} are right, or none for as many as the device has"
+            )));
+        }
         if let Some(rate) = self.target_rate_hz
             && !(rate.is_finite() && (0.01..=1000.0).contains(&rate))
         {
@@ -142,7 +168,9 @@ struct Control {
 
 /// What callers and the session's thread share.
 struct Shared {
-    stages: Mutex<Stages>,
+    home: Home,
+    /// None when the session has ended: its memory went back.
+    stages: Mutex<Option<Stages>>,
     control: Mutex<Control>,
     recent: Mutex<Recent>,
 }
@@ -153,7 +181,8 @@ enum Mode {
     Live(Live<LiveWork>),
 }
 
-/// Frames in, holograms out. Every method may be called from any thread, at any moment.
+/// Frames in, holograms out. Every method may be called from any thread, at any moment. A session belongs to the process
+/// that made it: in a fork of it, calls that need its threads are refused.
 ///
 /// ```no_run
 /// use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
@@ -192,11 +221,20 @@ impl Work for LiveWork {
     type Output = Made;
 
     fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
-        self.0.process(&mut lock(&self.0.stages), &frame.frame()?, !fresh)
+        match &mut *lock(&self.0.stages) {
+            Some(stages) => self.0.process(stages, &frame.frame()?, !fresh),
+            None => Err(queue::closed()),
+        }
     }
 
     fn recover(&mut self) {
-        lock(&self.0.stages).recover();
+        self.0.recover();
+    }
+}
+
+impl Drop for LiveWork {
+    fn drop(&mut self) {
+        self.0.end();
     }
 }
 
@@ -211,6 +249,18 @@ impl Shared {
             recent.backend = backend;
         }
         Ok(made)
+    }
+
+    fn recover(&self) {
+        if let Some(stages) = &mut *lock(&self.stages) {
+            stages.recover();
+        }
+    }
+
+    /// Gives back all memory but the statistics'; waits for a frame that is being processed.
+    fn end(&self) {
+        let stages = lock(&self.stages).take();
+        drop(stages);
     }
 }
 
@@ -230,7 +280,8 @@ impl Session {
         let mut stages = Stages::new(options)?;
         let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.rung());
         let shared = Arc::new(Shared {
-            stages: Mutex::new(stages),
+            home: Home::here(),
+            stages: Mutex::new(Some(stages)),
             control: Mutex::new(control),
             recent: Mutex::new(recent),
         });
@@ -262,6 +313,7 @@ impl Session {
                 ));
             }
         };
+        self.shared.home.check()?;
         let mut stages = lock(&self.shared.stages);
         let fresh = {
             let mut gate = lock(gate);
@@ -272,9 +324,11 @@ impl Session {
             }
             std::mem::take(&mut gate.fresh)
         };
+        // There are stages as long as the gate is open.
+        let stages = stages.as_mut().ok_or_else(queue::closed)?;
         let (result, panicked) = guarded(|| {
             frame.check()?;
-            self.shared.process(&mut stages, frame, video && !fresh)
+            self.shared.process(stages, frame, video && !fresh)
         });
         if panicked {
             stages.recover();
@@ -303,6 +357,7 @@ impl Session {
                 "it is not live; process frames, or make a live session".into(),
             ));
         };
+        self.shared.home.check()?;
         frame.check()?;
         let dropped = live.submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))?;
         Ok(dropped.map_or(Submission::Queued, Submission::Dropped))
@@ -311,9 +366,11 @@ impl Session {
     /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
     ///
     /// # Errors
-    /// A panic inside.
+    /// A session that is closed, or a panic inside.
     pub fn warm_up(&self) -> Result<()> {
+        self.shared.home.check()?;
         let mut stages = lock(&self.shared.stages);
+        let stages = stages.as_mut().ok_or_else(queue::closed)?;
         let (result, panicked) = guarded(|| stages.warm_up());
         if panicked {
             stages.recover();
@@ -350,12 +407,18 @@ impl Session {
         }
     }
 
-    /// Takes no more frames. A live session drops what waits or is in flight; when this returns, its listener has heard
-    /// everything and will not be called again (called by the listener itself, it returns at once). Results that were
-    /// handed out stay valid. Dropping a session closes it.
+    /// Takes no more frames and gives the memory back; the statistics stay. An image or video session first ends the
+    /// frame in flight. A live session drops what waits or is in flight; when this returns, its listener has heard
+    /// everything and will not be called again. Called by a listener, of this session or another, it does not wait for
+    /// that. Results that were handed out stay valid. Dropping a session closes it.
     pub fn close(&self) {
         match &self.mode {
-            Mode::Image(gate) | Mode::Video(gate) => lock(gate).closed = true,
+            Mode::Image(gate) | Mode::Video(gate) => {
+                lock(gate).closed = true;
+                if self.shared.home.is_here() {
+                    self.shared.end();
+                }
+            }
             Mode::Live(live) => live.close(),
         }
     }
@@ -380,7 +443,7 @@ impl Session {
     /// [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the next start, save compiling.
     #[cfg(feature = "gpu")]
     pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
-        lock(&self.shared.stages).gpu()
+        lock(&self.shared.stages).as_ref()?.gpu()
     }
 
     /// What the session has done so far. Never waits for a frame.

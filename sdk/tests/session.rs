@@ -8,9 +8,9 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{DropReason, Event, Quality, RunningMode, Submission, Thermal};
+use phasefront::session::{DropReason, Event, Quality, Rung, RunningMode, Submission, Thermal};
 use phasefront::target::Response;
-use phasefront::{Brightness, Display, Error, Session, SessionOptions, Target};
+use phasefront::{Brightness, Display, Error, Method, Session, SessionOptions, Sweep, Target};
 use std::sync::mpsc;
 
 const W: usize = 64;
@@ -433,6 +433,41 @@ fn a_listener_may_panic_and_may_close() {
 }
 
 #[test]
+fn closing_while_a_frame_is_processed_leaves_none_pending() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    for _ in 0..20 {
+        let session = image_session();
+        let begun = std::sync::Barrier::new(3);
+        std::thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| {
+                    begun.wait();
+                    while session.process(&frame(1, &scene, &metres)).is_ok() {}
+                });
+            }
+            begun.wait();
+            std::thread::yield_now();
+            session.close();
+            let statistics = session.statistics();
+            assert_eq!(statistics.pending, 0);
+            assert_eq!(statistics.submitted, statistics.processed + statistics.refused);
+        });
+        assert!(session.warm_up().unwrap_err().to_string().contains("closed"));
+    }
+}
+
+#[test]
+fn a_preview_beyond_any_screen_is_refused_before_it_is_planned() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let hologram = image_session().process(&frame(1, &scene, &metres)).unwrap();
+    let mut rgba = vec![0; 4 << 15];
+    let refused = hologram.preview(0.0, 1, 1 << 15, &mut rgba).unwrap_err().to_string();
+    assert!(refused.contains("16384 pixels a side"), "{refused}");
+}
+
+#[test]
 fn options_that_cannot_be_meant_are_named() {
     let refuse = |change: &dyn Fn(&mut SessionOptions), word: &str| {
         let mut options = options(W, H);
@@ -445,6 +480,22 @@ fn options_that_cannot_be_meant_are_named() {
     refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
     refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
+    refuse(
+        &|o| o.threads = std::num::NonZeroUsize::new(70_000),
+        "1 to 256 are right",
+    );
+    refuse(&|o| o.most_pixels = W * H - 1, "most_pixels allows 3071");
+    let worse = |o: &mut SessionOptions| {
+        let planes = Sweep {
+            planes: 0,
+            ..Sweep::for_display(&o.target.display)
+        };
+        o.ladder.push(Rung {
+            method: Method::Sweep(planes),
+            ..o.ladder[0].clone()
+        });
+    };
+    refuse(&worse, "rung 1: sweep: 0 planes");
     refuse(&|o| o.encoder.brightness = Brightness::Fixed(0.0), "full light");
     refuse(&|o| o.depth.least_confidence = 2.0, "confidence");
     let session = image_session();

@@ -1,11 +1,13 @@
 //! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
 
+use super::home::Home;
 use super::live::lock;
 use super::statistics::FrameTimes;
 use crate::error::{Error, Result};
 use crate::output::Levels;
-use crate::preview::{Preview, PreviewScratch};
+use crate::preview::{Preview, PreviewScratch, check_screen};
 use crate::target::Target;
+use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -55,7 +57,10 @@ impl<T> Drop for Pooled<T> {
 
 /// What looking at results needs; shared by all of a session's.
 pub(super) struct Viewer {
+    home: Home,
     target: Target,
+    /// The session's threads, so that views are computed on no others.
+    pool: Arc<ThreadPool>,
     plan: Mutex<Option<ViewPlan>>,
 }
 
@@ -67,9 +72,11 @@ struct ViewPlan {
 }
 
 impl Viewer {
-    pub(super) fn new(target: Target) -> Self {
+    pub(super) fn new(target: Target, pool: Arc<ThreadPool>) -> Self {
         Viewer {
+            home: Home::here(),
             target,
+            pool,
             plan: Mutex::new(None),
         }
     }
@@ -184,34 +191,49 @@ impl Hologram {
         self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)
     }
 
+    /// Bytes of the image that [`Self::preview`] fills.
+    ///
+    /// # Errors
+    /// A preview over 2²⁶ pixels, or over 2¹⁴ a side.
+    pub fn preview_bytes(height: usize, width: usize) -> Result<usize> {
+        check_screen((height, width))?;
+        Ok(4 * height * width)
+    }
+
     /// What an eye focused at `z_m` sees, as (`height`, `width`) rows of red, green, blue, alpha 255 into `rgba`. The
     /// plan is kept for the next call, of this or another result of the session, with the same z and size.
     ///
     /// # Errors
-    /// An empty image, a length of `rgba` other than 4·height·width, or a z too far away.
+    /// An empty image or one over 2²⁶ pixels or 2¹⁴ a side, a length of `rgba` other than 4·height·width, a z too far
+    /// away, or a process that was forked from the session's.
     pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
-        if rgba.len() != height.saturating_mul(width).saturating_mul(4) {
+        if rgba.len() != Self::preview_bytes(height, width)? {
             return Err(Error::Plan(format!(
                 "a preview of {width}×{height} needs 4 bytes a pixel; the image has {}",
                 rgba.len()
             )));
         }
+        self.viewer.home.check()?;
+        // Locked before the pool is entered, whose threads may else take up another view while this one waits.
         let mut plan = lock(&self.viewer.plan);
         let fits = |plan: &&mut ViewPlan| {
             plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
         };
         if plan.as_mut().filter(fits).is_none() {
             let target = &self.viewer.target;
-            let preview = Preview::new(self.shape, target, z_m, (height, width))?;
-            *plan = Some(ViewPlan {
-                shape: self.shape,
-                z_m,
-                scratch: preview.scratch(),
-                preview,
-            });
+            *plan = Some(self.viewer.pool.install(|| -> Result<_> {
+                let preview = Preview::new(self.shape, target, z_m, (height, width))?;
+                Ok(ViewPlan {
+                    shape: self.shape,
+                    z_m,
+                    scratch: preview.scratch(),
+                    preview,
+                })
+            })?);
         }
         if let Some(ViewPlan { preview, scratch, .. }) = &mut *plan {
-            preview.look(self.levels(), self.scale, rgba, scratch);
+            let look = || preview.look(self.levels(), self.scale, rgba, scratch);
+            self.viewer.pool.install(look);
         }
         Ok(())
     }

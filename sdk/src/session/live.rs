@@ -2,11 +2,13 @@
 //! is not known here.
 
 use super::event::DropReason;
+use super::home::Home;
 use super::queue::{Queue, Ticket};
 use crate::error::{Error, Result};
+use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::{JoinHandle, ThreadId};
+use std::thread::JoinHandle;
 
 /// What a live session does with its frames.
 pub(super) trait Work: Send + 'static {
@@ -69,11 +71,16 @@ pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, boo
     }
 }
 
+thread_local! {
+    /// Whether this is the thread of a live session, which its listener is called on.
+    static LISTENS: Cell<bool> = const { Cell::new(false) };
+}
+
 /// A running live session.
 pub(super) struct Live<W: Work> {
+    home: Home,
     shared: Arc<Shared<W::Frame>>,
     thread: Mutex<Option<JoinHandle<()>>>,
-    id: ThreadId,
 }
 
 impl<W: Work> Live<W> {
@@ -99,8 +106,8 @@ impl<W: Work> Live<W> {
             })
             .map_err(|e| Error::Session(format!("its thread cannot be started: {e}")))?;
         Ok(Live {
+            home: Home::here(),
             shared,
-            id: thread.thread().id(),
             thread: Mutex::new(Some(thread)),
         })
     }
@@ -154,11 +161,15 @@ impl<W: Work> Live<W> {
         look(&lock(&self.shared.queue))
     }
 
-    /// Drops what is on its way and ends the thread; when it is back, all events have been told. Called by the
-    /// listener, it cannot wait for that and does not.
+    /// Drops what is on its way and ends the thread; when it is back, all events have been told. Called by a listener
+    /// it does not wait for that: not for its own thread, which cannot end before it returns, nor for another's, whose
+    /// listener may be waiting for this one.
     pub(super) fn close(&self) {
+        if !self.home.is_here() {
+            return;
+        }
         self.change(Queue::close);
-        if std::thread::current().id() == self.id {
+        if LISTENS.get() {
             return;
         }
         // Held while joining, so that whoever closes too waits as well.
@@ -187,6 +198,7 @@ enum Next<F> {
 }
 
 fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut(Report<W::Output>)) {
+    LISTENS.set(true);
     let mut tell = |report| {
         let told = catch_unwind(AssertUnwindSafe(|| listener(report)));
         if told.is_err() {
@@ -369,6 +381,35 @@ mod tests {
             }
         }
         assert!(done > 300 && internal > 5);
+    }
+
+    /// What is told of two sessions goes to listeners that close the other one.
+    #[test]
+    fn listeners_may_close_each_others_session() {
+        let fake = || Fake {
+            random: ChaCha8Rng::seed_from_u64(0),
+            broken: false,
+        };
+        let both = Arc::new(std::sync::Barrier::new(2));
+        let sessions: Arc<[std::sync::OnceLock<Live<Fake>>; 2]> = Arc::default();
+        let (sender, closed) = mpsc::channel();
+        for i in 0..2 {
+            let (both, others, sender) = (both.clone(), sessions.clone(), sender.clone());
+            let mut first = true;
+            let listener = move |_| {
+                if std::mem::take(&mut first) {
+                    both.wait();
+                    others[1 - i].wait().close();
+                    sender.send(()).unwrap();
+                }
+            };
+            let live = Live::start(fake(), None, listener).unwrap();
+            live.submit(1, |_| vec![1]).unwrap();
+            assert!(sessions[i].set(live).is_ok());
+        }
+        for _ in 0..2 {
+            closed.recv_timeout(std::time::Duration::from_secs(60)).unwrap();
+        }
     }
 
     /// Copying that panics leaves no frame behind that the thread would wait for.

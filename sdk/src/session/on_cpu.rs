@@ -40,6 +40,20 @@ impl OnCpu {
         })
     }
 
+    /// Whether `rung` can be planned.
+    ///
+    /// # Errors
+    /// As [`Self::new`], for less memory.
+    pub(super) fn check(options: &SessionOptions, rung: &Rung) -> Result<()> {
+        Pipeline::new(
+            (rung.height, rung.width),
+            rung.method.clone(),
+            &options.target,
+            &options.encoder,
+        )
+        .map(|_| ())
+    }
+
     pub(super) fn report(&self) -> BackendReport {
         let engine = self.pipeline.method().engine();
         engine.map_or_else(BackendReport::default, |engine| BackendReport {

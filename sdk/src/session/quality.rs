@@ -91,6 +91,8 @@ pub enum QualityReason {
     Thermal,
     /// The caller said so.
     Asked,
+    /// The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+    Refused,
 }
 
 /// A step on the ladder.
@@ -98,7 +100,7 @@ pub enum QualityReason {
 pub struct QualityChange {
     /// The rung before.
     pub from: usize,
-    /// The rung now.
+    /// The rung now; the one before where the step was [`QualityReason::Refused`].
     pub to: usize,
     /// Why.
     pub reason: QualityReason,
@@ -118,7 +120,8 @@ const ROOM: f64 = 0.7;
 /// Decides on steps from what frames cost. Knows no clock and no frames.
 #[derive(Debug)]
 pub(super) struct Ladder {
-    rungs: usize,
+    /// Whether each rung can be planned, as far as is known.
+    rungs: Vec<bool>,
     rung: usize,
     slow: u32,
     roomy: u32,
@@ -130,7 +133,7 @@ pub(super) struct Ladder {
 impl Ladder {
     pub(super) fn new(rungs: usize, rung: usize) -> Self {
         Ladder {
-            rungs,
+            rungs: vec![true; rungs],
             rung,
             slow: 0,
             roomy: 0,
@@ -155,7 +158,8 @@ impl Ladder {
             return self.step(rung, QualityReason::Asked);
         }
         if thermal == Thermal::Critical {
-            return self.step(self.rungs - 1, QualityReason::Thermal);
+            let lowest = self.rungs.iter().rposition(|plans| *plans);
+            return self.step(lowest.unwrap_or(self.rung), QualityReason::Thermal);
         }
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
@@ -172,7 +176,9 @@ impl Ladder {
                 self.roomy_needed = ROOMY_FRAMES;
             }
         }
-        if self.slow >= SLOW_FRAMES && self.rung + 1 < self.rungs {
+        if self.slow >= SLOW_FRAMES
+            && let Some(below) = (self.rung + 1..self.rungs.len()).find(|rung| self.rungs[*rung])
+        {
             if self.since_up.take().is_some() {
                 self.roomy_needed = (self.roomy_needed * 2).min(MOST_ROOMY_FRAMES);
             }
@@ -180,19 +186,33 @@ impl Ladder {
                 true => QualityReason::Thermal,
                 false => QualityReason::TooSlow,
             };
-            return self.step(self.rung + 1, reason);
+            return self.step(below, reason);
         }
-        if self.roomy >= self.roomy_needed && self.rung > 0 {
-            let change = self.step(self.rung - 1, QualityReason::Room);
+        if self.roomy >= self.roomy_needed
+            && let Some(above) = self.rungs[..self.rung].iter().rposition(|plans| *plans)
+        {
+            let change = self.step(above, QualityReason::Room);
             self.since_up = Some(0);
             return change;
         }
         None
     }
 
+    /// Takes back a step to a rung that cannot be planned, which is not tried again.
+    pub(super) fn refuse(&mut self, QualityChange { from, to, .. }: QualityChange) -> QualityChange {
+        self.rungs[to] = false;
+        self.rung = from;
+        self.since_up = None;
+        QualityChange {
+            from,
+            to: from,
+            reason: QualityReason::Refused,
+        }
+    }
+
     fn step(&mut self, to: usize, reason: QualityReason) -> Option<QualityChange> {
         let from = self.rung;
-        if to == from {
+        if to == from || !self.rungs[to] {
             return None;
         }
         self.rung = to;
@@ -280,6 +300,31 @@ mod tests {
         assert_eq!((steps.len(), steps[0].0, ladder.rung()), (1, 0, 2));
         run(&mut ladder, &costs, Thermal::Nominal, 500);
         assert_eq!(ladder.rung(), 0);
+    }
+
+    #[test]
+    fn a_rung_that_cannot_be_planned_is_stepped_over() {
+        let mut ladder = Ladder::new(3, 0);
+        let steps = |ladder: &mut Ladder, costs: &[u64]| run(ladder, costs, Thermal::Nominal, 500);
+        let down = QualityChange {
+            from: 0,
+            to: 1,
+            reason: QualityReason::TooSlow,
+        };
+        ladder.rung = 1;
+        assert_eq!(ladder.refuse(down).to, 0);
+        assert_eq!(ladder.rung(), 0);
+        let slow = steps(&mut ladder, &[90, 0, 12]);
+        assert_eq!((slow.len(), slow[0].1.to), (1, 2));
+        assert_eq!(steps(&mut ladder, &[10, 0, 10])[0].1.to, 0);
+        let asked =
+            |ladder: &mut Ladder, rung| ladder.observe(PERIOD, Some(PERIOD), Thermal::Nominal, Quality::Fixed(rung));
+        assert_eq!(asked(&mut ladder, 1), None);
+        assert_eq!(asked(&mut ladder, 2).map(|c| c.to), Some(2));
+        // The lowest, too: heat takes the lowest that there is.
+        let change = QualityChange { from: 0, to: 2, ..down };
+        ladder.refuse(change);
+        assert!(run(&mut ladder, &[90; 3], Thermal::Critical, 50).is_empty());
     }
 
     #[test]

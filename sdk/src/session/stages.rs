@@ -1,16 +1,19 @@
 //! All stages of a session's frames, and what one frame leaves for the next. Which frame is next is not known here.
 
-use super::SessionOptions;
 use super::brightness::BrightnessTracker;
 use super::engine::{Engine, FrameInput, GpuState, LevelsOut, RungContext};
 use super::hologram::{Hologram, Pool, Viewer};
+use super::live::guarded;
+use super::on_cpu::OnCpu;
 use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
+use super::{MOST_THREADS, SessionOptions};
 use crate::depth::camera::CameraFrame;
 use crate::depth::stream::DepthStream;
 use crate::error::{Error, Result};
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame};
 use rayon::ThreadPool;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -28,7 +31,8 @@ struct RungPlan {
 /// The stages of a session.
 pub(super) struct Stages {
     options: SessionOptions,
-    pool: ThreadPool,
+    /// Shared with the viewer, so that views need no other threads.
+    pool: Arc<ThreadPool>,
     ladder: Ladder,
     gpu: GpuState,
     /// None after a panic: it is made anew.
@@ -49,23 +53,22 @@ pub(super) struct Made {
 
 impl Stages {
     pub(super) fn new(options: SessionOptions) -> Result<Self> {
-        let mut pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("phasefront {i}"));
-        if let Some(threads) = options.threads {
-            pool = pool.num_threads(threads.get());
-        }
-        let pool = pool
-            .build()
-            .map_err(|e| Error::Session(format!("its threads cannot be started: {e}")))?;
+        let pool = start_threads(options.threads)?;
         let start = match options.quality {
             Quality::Adaptive => 0,
             Quality::Fixed(rung) => rung,
         };
+        // A rung that cannot be planned is better known now than at the first step down.
+        for (i, rung) in options.ladder.iter().enumerate().filter(|(i, _)| *i != start) {
+            let planned = pool.install(|| OnCpu::check(&options, rung));
+            planned.map_err(|why| why.of(&format!("rung {i}")))?;
+        }
         let mut stages = Stages {
             ladder: Ladder::new(options.ladder.len(), start),
             gpu: GpuState::default(),
             plan: None,
             brightness: BrightnessTracker::default(),
-            viewer: Arc::new(Viewer::new(options.target.clone())),
+            viewer: Arc::new(Viewer::new(options.target.clone(), pool.clone())),
             levels: Pool::default(),
             words: Pool::default(),
             depths: Pool::default(),
@@ -182,12 +185,23 @@ impl Stages {
             .target_rate_hz
             .map(|rate| Duration::from_secs_f64(1.0 / rate));
         let change = self.ladder.observe(start.elapsed(), period, thermal, quality);
-        if change.is_some() {
-            // The memory of the rung before goes first.
-            self.plan = None;
-            self.plan = Some(self.plan_rung()?);
-        }
+        let change = change.map(|change| self.step(change));
         Ok(Made { hologram, change })
+    }
+
+    /// Plans the rung that the ladder stands on; where that fails, stays on the one before. The frame is made either
+    /// way.
+    fn step(&mut self, change: QualityChange) -> QualityChange {
+        // The memory of the rung before goes first.
+        self.plan = None;
+        if let (Ok(plan), _) = guarded(|| self.plan_rung()) {
+            self.plan = Some(plan);
+            return change;
+        }
+        let change = self.ladder.refuse(change);
+        // Should even this fail, the next frame tries it again, and says why.
+        self.plan = guarded(|| self.plan_rung()).0.ok();
+        change
     }
 
     fn run(&mut self, plan: &mut RungPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
@@ -259,5 +273,63 @@ impl Stages {
             rung: ladder.rung(),
             viewer: self.viewer.clone(),
         })
+    }
+}
+
+/// The threads of a session.
+fn start_threads(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>> {
+    let pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("phasefront {i}"));
+    let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let pool = match threads {
+        Some(threads) => pool.num_threads(threads.get()),
+        None if device > MOST_THREADS => pool.num_threads(MOST_THREADS),
+        None => pool,
+    };
+    let started = pool.build();
+    Ok(Arc::new(started.map_err(|e| {
+        Error::Session(format!("its threads cannot be started: {e}"))
+    })?))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::depth::image::{DepthFormat, DepthImage};
+    use crate::display::Display;
+    use crate::frame::{ColourFormat, ColourImage, Plane};
+    use crate::method::Method;
+    use crate::session::quality::{QualityReason, Rung};
+    use crate::sweep::Sweep;
+
+    #[test]
+    fn a_step_that_fails_loses_no_frame_and_is_told() {
+        let display = Display::default().with_size(12, 16).unwrap();
+        let sweep = Sweep::for_display(&display);
+        let mut options = SessionOptions::new(display, Method::Sweep(sweep));
+        let best = options.ladder[0].clone();
+        options.ladder.push(best.clone());
+        let mut stages = Stages::new(options).unwrap();
+        // What was fine at the start is not any more.
+        let worse = Sweep { planes: 0, ..sweep };
+        stages.options.ladder[1] = Rung {
+            method: Method::Sweep(worse),
+            ..best
+        };
+        let bytes = [100; 4 * 12 * 16];
+        let plane = Plane::new(&bytes, 4 * 16, 4);
+        let colour = ColourImage::new(ColourFormat::Rgba, 16, 12, &[plane]).unwrap();
+        let plane = Plane::new(&bytes, 16, 1);
+        let depth = DepthImage::new(DepthFormat::NormalizedU8, 16, 12, plane).unwrap();
+        let mut process = |time| {
+            let frame = CameraFrame::new(time, colour, depth);
+            stages.process(&frame, false, Thermal::Nominal, Quality::Fixed(1))
+        };
+        let change = process(1).unwrap().change.unwrap();
+        assert_eq!((change.from, change.to, change.reason), (0, 0, QualityReason::Refused));
+        for time in 2..5 {
+            let made = process(time).unwrap();
+            assert_eq!((made.hologram.rung(), made.change), (0, None));
+        }
     }
 }
