@@ -48,9 +48,22 @@ impl From<phasefront::Error> for PhasefrontError {
     }
 }
 
-impl From<uniffi::UnexpectedUniFFICallbackError> for PhasefrontError {
+/// What a listener threw, whatever it was. An error that comes in must not be flat: a flat one only goes out, and
+/// taking it in would be a panic on the session's thread.
+#[derive(Debug, Clone, PartialEq, thiserror::Error, uniffi::Error)]
+pub enum ListenerError {
+    /// With its own words.
+    #[error("the listener threw: {reason}")]
+    Threw {
+        /// What it said.
+        reason: String,
+    },
+}
+
+impl From<uniffi::UnexpectedUniFFICallbackError> for ListenerError {
     fn from(error: uniffi::UnexpectedUniFFICallbackError) -> Self {
-        PhasefrontError::Session(format!("the listener threw: {}", error.reason))
+        let reason = error.reason.replace('\n', " ");
+        ListenerError::Threw { reason }
     }
 }
 

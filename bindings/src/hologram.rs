@@ -96,12 +96,7 @@ impl RawHologram {
     pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Result<Arc<RawImage>, PhasefrontError> {
         guard(|| {
             let (w, h) = (width as usize, height as usize);
-            if w.saturating_mul(h) > MOST_PIXELS {
-                return Err(PhasefrontError::Setting(format!(
-                    "a preview of {width}×{height} is too large; {MOST_PIXELS} pixels are the most"
-                )));
-            }
-            let mut bytes = vec![0; 4 * w * h];
+            let mut bytes = vec![0; session::Hologram::preview_bytes(h, w)?];
             self.core.preview(z_mm / 1e3, h, w, &mut bytes)?;
             Ok(Arc::new(RawImage {
                 bytes,
@@ -133,9 +128,6 @@ impl RawHologram {
         })
     }
 }
-
-/// Most pixels of a preview.
-const MOST_PIXELS: usize = 1 << 26;
 
 /// An image, row by row without gaps. For the layers by hand.
 #[derive(Debug, uniffi::Object)]

@@ -20,7 +20,7 @@ mod statistics;
 mod target;
 
 pub use display::{Display, display_from_toml};
-pub use error::PhasefrontError;
+pub use error::{ListenerError, PhasefrontError};
 pub use frame::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
     Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,

@@ -162,8 +162,12 @@ pub struct SessionOptions {
     pub depth_range: DepthRange,
     /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
     pub least_confidence: f32,
-    /// Threads to compute with; none for as many as the device has.
+    /// Threads to compute with, at most 256; none for as many as the device has.
     pub threads: Option<u32>,
+    /// Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple of
+    /// them.
+    #[uniffi(default = 33554432)]
+    pub most_pixels: u64,
     /// Where frames are computed.
     pub backend: Backend,
 }
@@ -306,6 +310,7 @@ impl SessionOptions {
             },
             least_confidence: core.depth.least_confidence,
             threads: core.threads.map(|threads| threads.get() as u32),
+            most_pixels: core.most_pixels as u64,
             backend: match core.backend {
                 session::Backend::Cpu => Backend::Cpu,
                 session::Backend::Gpu => Backend::Gpu,
@@ -364,6 +369,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             Backend::Cpu => session::Backend::Cpu,
             Backend::Gpu => session::Backend::Gpu,
         };
+        to.most_pixels = usize::try_from(options.most_pixels).unwrap_or(usize::MAX);
         to.threads = match options.threads {
             None => None,
             Some(threads) => Some(NonZeroUsize::new(threads as usize).ok_or_else(|| {

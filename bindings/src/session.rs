@@ -1,13 +1,13 @@
 //! Sessions: frames in, holograms out.
 
-use crate::error::{PhasefrontError, guard};
+use crate::error::{ListenerError, PhasefrontError, guard};
 use crate::frame::{FrameInfo, FrameMemory};
 use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
 use crate::statistics::Statistics;
 use phasefront::session::{self, Event, Session, Submission};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Why a frame was not made into a hologram, without fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
@@ -53,6 +53,8 @@ pub enum QualityReason {
     Thermal,
     /// The caller said so.
     Asked,
+    /// The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+    Refused,
     /// For a reason that this version of the bindings does not know.
     Other,
 }
@@ -62,7 +64,7 @@ pub enum QualityReason {
 pub struct QualityChange {
     /// The rung before.
     pub from_rung: u32,
-    /// The rung now.
+    /// The rung now; the one before where the step was refused.
     pub to_rung: u32,
     /// Why.
     pub reason: QualityReason,
@@ -73,29 +75,24 @@ pub struct QualityChange {
 #[uniffi::export(foreign)]
 pub trait SessionListener: Send + Sync {
     /// A frame became a hologram.
-    fn on_hologram(&self, hologram: Arc<RawHologram>) -> Result<(), PhasefrontError>;
+    fn on_hologram(&self, hologram: Arc<RawHologram>) -> Result<(), ListenerError>;
 
     /// A frame was dropped.
-    fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), PhasefrontError>;
+    fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), ListenerError>;
 
     /// A frame could not be processed. The session goes on.
-    fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), PhasefrontError>;
+    fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), ListenerError>;
 
     /// The frames after this one are made on another rung of the ladder.
-    fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), PhasefrontError>;
+    fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), ListenerError>;
 }
 
 /// A session. Every call may come from any thread, at any moment.
 #[derive(uniffi::Object)]
 pub struct RawSession {
-    state: RwLock<State>,
+    core: Session,
+    closed: AtomicBool,
     listener_failures: Arc<AtomicU64>,
-}
-
-/// A closed session gives its memory back and keeps its statistics.
-enum State {
-    Open(Arc<Session>),
-    Closed(Box<Statistics>),
 }
 
 #[uniffi::export]
@@ -141,7 +138,8 @@ impl RawSession {
             let backend = session.statistics().backend;
             log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
             Ok(Arc::new(RawSession {
-                state: RwLock::new(State::Open(Arc::new(session))),
+                core: session,
+                closed: AtomicBool::new(false),
                 listener_failures,
             }))
         })
@@ -249,53 +247,34 @@ impl RawSession {
     /// What the session has done so far; of a closed one, what it did. Never waits for a frame.
     pub fn statistics(&self) -> Result<Statistics, PhasefrontError> {
         guard(|| {
-            Ok(match &*self.read() {
-                State::Open(session) => self.statistics_of(session),
-                State::Closed(statistics) => (**statistics).clone(),
-            })
+            let failures = self.listener_failures.load(Ordering::Relaxed);
+            Ok(Statistics::new(self.core.statistics(), failures))
         })
     }
 
     /// Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-    /// be called again; called by the listener itself, it returns at once. Closing twice does nothing.
+    /// be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
+    /// nothing.
     pub fn shut_down(&self) -> Result<(), PhasefrontError> {
         guard(|| {
-            // Not under the lock: the listener may call while its session ends.
-            let session = match &*self.read() {
-                State::Open(session) => session.clone(),
-                State::Closed(_) => return Ok(()),
-            };
-            session.close();
-            let statistics = Box::new(self.statistics_of(&session));
-            let mut state = self.state.write().unwrap_or_else(PoisonError::into_inner);
-            if let State::Open(_) = *state {
-                *state = State::Closed(statistics);
-            }
+            self.closed.store(true, Ordering::Relaxed);
+            self.core.close();
             Ok(())
         })
     }
 }
 
 impl RawSession {
-    fn read(&self) -> std::sync::RwLockReadGuard<'_, State> {
-        self.state.read().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn session(&self) -> Result<Arc<Session>, PhasefrontError> {
-        match &*self.read() {
-            State::Open(session) => Ok(session.clone()),
-            State::Closed(_) => Err(PhasefrontError::Session("session: it is closed; make a new one".into())),
+    fn session(&self) -> Result<&Session, PhasefrontError> {
+        match self.closed.load(Ordering::Relaxed) {
+            false => Ok(&self.core),
+            true => Err(PhasefrontError::Session("session: it is closed; make a new one".into())),
         }
-    }
-
-    fn statistics_of(&self, session: &Session) -> Statistics {
-        let failures = self.listener_failures.load(Ordering::Relaxed);
-        Statistics::new(session.statistics(), failures)
     }
 }
 
 /// Tells `listener` of `event`.
-fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), PhasefrontError> {
+fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerError> {
     match event {
         Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram)),
         Event::Dropped { timestamp_ns, reason } => listener.on_dropped(timestamp_ns, reason.into()),
@@ -309,6 +288,7 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), PhasefrontEr
                 session::QualityReason::Room => QualityReason::Room,
                 session::QualityReason::Thermal => QualityReason::Thermal,
                 session::QualityReason::Asked => QualityReason::Asked,
+                session::QualityReason::Refused => QualityReason::Refused,
                 _ => QualityReason::Other,
             };
             log::info!("from rung {} to {}: {reason:?}", change.from, change.to);

@@ -87,6 +87,10 @@ _DEPTH_TYPES = {
 }
 
 
+#: What is generated counts bytes in 32 bits.
+_MOST_BYTES = 2**31 - 1
+
+
 class _Memory:
     """The memory of an array, passed without a copy."""
 
@@ -111,6 +115,8 @@ class _ByRefBytes:
         to = _ffi._UniffiForeignBytes()
         if isinstance(value, bytes):
             value = _Memory(numpy.frombuffer(value, numpy.uint8))
+        if value.size > _MOST_BYTES:
+            raise PhasefrontError.Setting(f"{value.size} bytes are too many; {_MOST_BYTES} are the most")
         to.len = value.size
         if value.size > 0:
             to.data = ctypes.cast(value.address, ctypes.POINTER(ctypes.c_char))
@@ -133,11 +139,19 @@ def _plane(what: str, array, dtype: str, pixel: int) -> tuple[_Memory, _ffi.Plan
     if array.ndim != dimensions or (pixel > 1 and array.shape[2] != pixel):
         right = "(H, W)" if pixel == 1 else f"(H, W, {pixel})"
         raise PhasefrontError.Frame(f"frame: {what} is {array.shape}; {right} is right")
-    is_plain = all(s >= array.itemsize for s in array.strides[:2]) and (pixel == 1 or array.strides[2] == array.itemsize)
-    if not is_plain:
-        array = numpy.ascontiguousarray(array)
+    # Row by row, as cameras give it; what is turned or mirrored is copied.
     rows, pixels = array.strides[:2]
-    return _Memory(array), _ffi.PlaneInfo(row_stride=rows, pixel_stride=pixels), array.shape[1], array.shape[0]
+    value = pixel * array.itemsize
+    is_plain = pixels >= value and rows >= (array.shape[1] - 1) * pixels + value
+    if not (is_plain and (pixel == 1 or array.strides[2] == array.itemsize)):
+        array = numpy.ascontiguousarray(array)
+        rows, pixels = array.strides[:2]
+    memory = _Memory(array)
+    if memory.size > _MOST_BYTES or rows >= 2**32:
+        raise PhasefrontError.Frame(
+            f"frame: {what} is {array.shape} over {memory.size} bytes; {_MOST_BYTES} bytes are the most"
+        )
+    return memory, _ffi.PlaneInfo(row_stride=rows, pixel_stride=pixels), array.shape[1], array.shape[0]
 
 
 class Frame:
@@ -376,7 +390,8 @@ class Session:
 
     def close(self) -> None:
         """Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, the
-        listener has heard everything; called by the listener, it returns at once. Closing twice does nothing."""
+        listener has heard everything; called by a listener, of this session or another, it does not wait for that. Closing
+        twice does nothing."""
         self._raw.shut_down()
 
     def __enter__(self) -> Session:

@@ -1,6 +1,8 @@
 """Sessions from Python: threads, live streams, misuse, memory."""
 
 import gc
+import os
+import signal
 import threading
 
 import numpy
@@ -67,6 +69,9 @@ def test_views_with_strides_are_taken_as_they_are(options):
             (large[10:58, 20:84], depth[::2, ::2]),
             (large[::2, ::2, :3], depth[1:25, 3:35]),
             (large[::-2, ::2], depth[::-1]),
+            (large[:48, :64].transpose(1, 0, 2).copy().transpose(1, 0, 2), depth.T.copy().T),
+            (numpy.asfortranarray(large[:48, :64]), numpy.asfortranarray(depth)),
+            (numpy.broadcast_to(large[5, 7], (48, 64, 4)), numpy.broadcast_to(depth[:1], depth.shape)),
         ]:
             views = session.process(Frame(colour, metres)).levels.copy()
             copies = session.process(Frame(colour.copy(), metres.copy())).levels
@@ -81,6 +86,8 @@ def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
     assert hologram.z_at(0.5, 0.5) > hologram.z_at(0.02, 0.02)
     with pytest.raises(PhasefrontError.Setting, match="0×24"):
         hologram.preview(0.0, 0, 24)
+    with pytest.raises(PhasefrontError.Setting, match="67108864×1 is too large"):
+        hologram.preview(0.0, 67108864, 1)
 
 
 def test_output_is_what_the_modulator_takes(options):
@@ -122,17 +129,18 @@ def test_a_bad_frame_in_a_stream_harms_nothing(options):
 
 
 def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
-    events = Events()
-
     def listener(event):
         events(event)
-        raise ValueError("no thanks")
+        raise raised
 
-    with Session(options, RunningMode.LIVE_STREAM, listener) as session:
-        for i in range(3):
-            session.submit(still(timestamp_ns=i + 1))
-            events.wait(i + 1)
-    assert session.statistics().listener_failures == 3
+    for raised in (ValueError("no thanks"), PhasefrontError.Frame("no thanks")):
+        events = Events()
+        with Session(options, RunningMode.LIVE_STREAM, listener) as session:
+            for i in range(3):
+                session.submit(still(timestamp_ns=i + 1))
+                events.wait(i + 1)
+        assert session.statistics().listener_failures == 3
+        assert [type(event) for event in events.all] == [Made] * 3
 
 
 def test_a_listener_may_call_its_session(options):
@@ -228,6 +236,81 @@ def test_unusable_frames_are_named(options, colour, depth, words):
         session.process(still())
 
 
+def test_arrays_of_two_gibibytes_are_refused():
+    """Views of little memory: no more is looked at."""
+    small = numpy.zeros((48, 64, 3), "u1")
+    side = 2**31 // 64 + 1
+    wide = numpy.lib.stride_tricks.as_strided(numpy.ones(1, "f4"), (16, side), (4 * side, 4))
+    tall = numpy.lib.stride_tricks.as_strided(numpy.zeros(4, "u1"), (side, 64, 4), (2**8, 4, 1))
+    for colour, depth in [(small, wide), (tall, numpy.ones((4, 4), "f4"))]:
+        with pytest.raises(PhasefrontError.Frame, match="2147483647 bytes are the most"):
+            Frame(colour, depth)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_in_a_fork_what_is_the_parents_is_refused_and_what_is_new_works(options):
+    live = Session(options, RunningMode.LIVE_STREAM, lambda _: None)
+    with live, Session(options) as session:
+        hologram = session.process(still())
+        hologram.preview(0.0, 8, 8)
+        child = os.fork()
+        if child == 0:
+            signal.alarm(60)  # one that hangs is a failure
+            result = 1
+            try:
+                calls = [lambda: session.process(still()), session.warm_up, lambda: live.submit(still())]
+                for call in [*calls, lambda: hologram.preview(0.0, 8, 8)]:
+                    with pytest.raises(PhasefrontError.Session, match="forked"):
+                        call()
+                session.close()
+                live.close()
+                with Session(options) as own:
+                    assert own.process(still()).preview(0.0, 8, 8).shape == (8, 8, 4)
+                result = 0
+            finally:
+                os._exit(result)
+        assert os.waitpid(child, 0)[1] == 0
+        session.process(still())
+
+
+def test_closing_while_a_frame_is_processed_leaves_none_pending(options):
+    for _ in range(10):
+        session = Session(options)
+
+        def work():
+            with pytest.raises(PhasefrontError.Session, match="closed"):
+                while True:
+                    session.process(still())
+
+        threads = [threading.Thread(target=work) for _ in range(2)]
+        [t.start() for t in threads]
+        session.close()
+        [t.join() for t in threads]
+        statistics = session.statistics()
+        assert statistics.pending == 0 and statistics.submitted == statistics.processed + statistics.refused
+
+
+def test_listeners_may_close_each_others_session(options):
+    sessions, done = [], [threading.Event(), threading.Event()]
+    both = threading.Barrier(2)
+
+    def listener(i):
+        def listen(event):
+            if isinstance(event, Made):
+                both.wait(60)
+                sessions[1 - i].close()
+                done[i].set()
+
+        return listen
+
+    sessions += [Session(options, RunningMode.LIVE_STREAM, listener(i)) for i in range(2)]
+    [session.submit(still(timestamp_ns=1)) for session in sessions]
+    assert all(event.wait(60) for event in done)
+    [session.close() for session in sessions]
+    assert [session.statistics().pending for session in sessions] == [0, 0]
+
+
 def test_planes_of_another_number_are_refused(options):
     luma, chroma = numpy.zeros((48, 64), "u1"), numpy.full((24, 32, 2), 128, "u1")
     depth = numpy.ones((24, 32), "f4")
@@ -316,6 +399,8 @@ def test_settings_that_cannot_be_meant_are_named(network, display):
     for changes, words in [
         ({"ladder": []}, "ladder is empty"),
         ({"threads": 0}, "0 threads"),
+        ({"threads": 70_000}, "1 to 256"),
+        ({"most_pixels": 100}, "most_pixels"),
         ({"target_rate_hz": float("nan")}, "target rate"),
         ({"quality": Quality.FIXED(rung=3)}, "no rung 3"),
     ]:
@@ -336,6 +421,46 @@ def test_messages_reach_the_log(options):
     phasefront.send_log(LogLevel.INFO, None)
     Session(options).close()
     assert [level for level, _ in messages] == [LogLevel.INFO] and "IMAGE" in messages[0][1].upper()
+
+
+def test_a_log_handler_that_raises_is_told_of_the_next_message(options):
+    messages = []
+
+    def handler(level, message):
+        messages.append(message)
+        raise raised
+
+    for raised in (ValueError("no thanks"), PhasefrontError.Session("no thanks")):
+        phasefront.send_log(LogLevel.INFO, handler)
+        for _ in range(2):
+            Session(options).close()
+    phasefront.send_log(LogLevel.INFO, None)
+    assert len(messages) == 4
+
+
+def test_a_log_handler_may_use_the_library_as_it_ends(options):
+    class Handler:
+        def __call__(self, level, message):
+            messages.append(message)
+
+        def __del__(self):
+            Session(options).close()
+
+    messages = []
+    phasefront.send_log(LogLevel.INFO, Handler())
+    gc.collect()
+
+    def replace():
+        phasefront.send_log(LogLevel.INFO, lambda level, message: messages.append(message))
+        gc.collect()
+
+    # A second thread, so that a deadlock is a failure and not a test without end.
+    thread = threading.Thread(target=replace, daemon=True)
+    thread.start()
+    thread.join(60)
+    assert not thread.is_alive()
+    phasefront.send_log(LogLevel.INFO, None)
+    assert len(messages) == 1
 
 
 def resident_mb():
