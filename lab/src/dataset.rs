@@ -18,19 +18,21 @@ use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
+use crate::npy;
 use crate::scene::Texture;
 use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
-use ndarray_npy::{NpzReader, NpzWriter};
+use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::BufReader;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Read, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use zip::ZipArchive;
 
 /// The first words of a manifest: what reads it knows what follows.
 const FORMAT: &str = "phasefront-dataset-1";
@@ -247,7 +249,7 @@ pub fn make(
     mine.par_bridge().try_for_each(|i| {
         let index = i * shards + shard;
         let path = Manifest::pair_path(dir, index);
-        if !path.exists() {
+        if !is_whole(&path) {
             let (seed, size) = (manifest.scene_seed(index), manifest.size);
             let scene = match manifest.look {
                 Look::Objects => scene::random_scene(seed, size, size),
@@ -307,6 +309,32 @@ pub struct Pair {
     pub hologram: Array3<Complex32>,
 }
 
+/// The arrays of a pair.
+const ARRAYS: [&str; 3] = ["rgb.npy", "depth.npy", "hologram.npy"];
+
+/// Whether there is a whole pair: what a full disk or a lost write left is none.
+fn is_whole(path: &Path) -> bool {
+    let archive = File::open(path).map(|file| ZipArchive::new(BufReader::new(file)));
+    matches!(archive, Ok(Ok(archive)) if ARRAYS.iter().all(|name| archive.index_for_name(name).is_some()))
+}
+
+/// The file of array `name` in `archive`, whose values have `most` bytes.
+fn array_bytes(
+    archive: &mut ZipArchive<BufReader<File>>,
+    name: &str,
+    most: usize,
+) -> std::result::Result<Vec<u8>, String> {
+    /// Of a header, at most.
+    const HEADER: usize = 1 << 16;
+    let array = archive
+        .by_name(&format!("{name}.npy"))
+        .map_err(|e| format!("{name}: {e}"))?;
+    let mut bytes = Vec::new();
+    let limit = (most + HEADER) as u64;
+    (array.take(limit).read_to_end(&mut bytes)).map_err(|e| format!("{name}: {e}"))?;
+    Ok(bytes)
+}
+
 /// Reads pair `index` of the data set in `dir`, which `manifest` describes.
 ///
 /// # Errors
@@ -320,10 +348,15 @@ pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> 
         )
     })?;
     let damaged = |e: &dyn std::fmt::Display| Error::file(&path, format!("is no whole pair: {e}"));
-    let mut npz = NpzReader::new(BufReader::new(file)).map_err(|e| damaged(&e))?;
-    let rgb: Array4<u8> = npz.by_name("rgb").map_err(|e| damaged(&e))?;
-    let depth: Array3<u16> = npz.by_name("depth").map_err(|e| damaged(&e))?;
-    let hologram: Array3<Complex32> = npz.by_name("hologram").map_err(|e| damaged(&e))?;
+    let mut archive = ZipArchive::new(BufReader::new(file)).map_err(|e| damaged(&e))?;
+    let pixels = manifest.size * manifest.size;
+    let mut bytes = |name, most| array_bytes(&mut archive, name, most).map_err(|e| damaged(&e));
+    let rgb = bytes("rgb", 4 * manifest.ldi_layers * pixels)?;
+    let rgb: Array4<u8> = npy::read(&rgb).map_err(|e| damaged(&e))?;
+    let depth = bytes("depth", 2 * manifest.ldi_layers * pixels)?;
+    let depth: Array3<u16> = npy::read(&depth).map_err(|e| damaged(&e))?;
+    let hologram = bytes("hologram", 24 * pixels)?;
+    let hologram: Array3<Complex32> = npy::read(&hologram).map_err(|e| damaged(&e))?;
     let (layers, size) = (manifest.ldi_layers, manifest.size);
     if rgb.dim() != (layers, size, size, 4) || depth.dim() != (layers, size, size) || hologram.dim() != (3, size, size)
     {
@@ -381,6 +414,40 @@ mod tests {
         let other = manifest(Look::photographs(&[]));
         let refused = make(&other, &[], dir.path(), (1, 4), &|| {}).unwrap_err();
         assert!(refused.to_string().contains("other parameters"), "{refused}");
+    }
+
+    #[test]
+    fn a_pair_that_is_not_whole_is_made_anew() {
+        let dir = tempfile::tempdir().unwrap();
+        let ours = manifest(Look::Objects);
+        let make = || make(&ours, &[], dir.path(), (1, 4), &|| {}).unwrap();
+        make();
+        let path = Manifest::pair_path(dir.path(), 1);
+        let whole = std::fs::read(&path).unwrap();
+        for left in [0, 10, whole.len() / 2, whole.len() - 1] {
+            std::fs::write(&path, &whole[..left]).unwrap();
+            assert!(read_pair(&ours, dir.path(), 1).is_err());
+            make();
+            assert_eq!(std::fs::read(&path).unwrap(), whole);
+        }
+    }
+
+    #[test]
+    fn a_pair_that_promises_more_than_there_is_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let ours = manifest(Look::Objects);
+        let text = "{'descr': '|u1', 'fortran_order': False, 'shape': (2, 1000000, 1000000, 4), }";
+        let header = [b"\x93NUMPY\x01\x00", &[text.len() as u8, 0][..], text.as_bytes()].concat();
+        let mut archive = zip::ZipWriter::new(File::create(Manifest::pair_path(dir.path(), 0)).unwrap());
+        for name in ARRAYS {
+            archive
+                .start_file(name, zip::write::SimpleFileOptions::default())
+                .unwrap();
+            archive.write_all(&header).unwrap();
+        }
+        archive.finish().unwrap();
+        let refused = read_pair(&ours, dir.path(), 0).map(|_| ()).unwrap_err().to_string();
+        assert!(refused.contains("is no whole pair"), "{refused}");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The one error type of the laboratory. Each message is one line that names what is wrong and what would be right.
 
+use phasefront::unstable::error::Line;
 use std::path::PathBuf;
 
 /// Why the laboratory refused to go on.
@@ -7,7 +8,7 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder that cannot be read, written or understood.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}: {}", Line(&path.display().to_string()), Line(reason))]
     File {
         /// The file or folder.
         path: PathBuf,
@@ -15,7 +16,7 @@ pub enum Error {
         reason: String,
     },
     /// A value, shape or scene that cannot be used as asked.
-    #[error("{0}")]
+    #[error("{}", Line(.0))]
     Input(String),
     /// The core refused.
     #[error(transparent)]

@@ -5,17 +5,20 @@
 
 use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
-use image::{DynamicImage, ImageReader};
-use ndarray::{Array2, Array3, ArrayView3};
-use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use crate::npy;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
+use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::target::Response;
 use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufReader, BufWriter, Write};
-use std::path::Path;
-use std::sync::Arc;
+use std::io::{BufRead, BufReader, BufWriter, Cursor, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// Name of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";
@@ -76,7 +79,8 @@ pub enum Hologram {
     Complex(Array3<Complex32>, HologramInfo),
 }
 
-/// Opens the file at a temporary place beside `path`, lets `write` fill it, and renames it to `path`.
+/// Opens the file at a temporary place beside `path`, lets `write` fill it, waits until it is on the disk, and renames it
+/// to `path`.
 ///
 /// # Errors
 /// Whatever goes wrong, naming `path`; what was there is left as it was.
@@ -92,30 +96,91 @@ pub fn write_atomically(
     if path.is_dir() {
         return Err(Error::file(path, "is a folder; a file's name is needed"));
     }
-    let mut temporary = tempfile::Builder::new()
-        .prefix(".phasefront-")
-        .tempfile_in(folder)
-        .map_err(refuse)?;
+    remove_left_over(folder);
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY);
+    #[cfg(unix)]
+    {
+        // A temporary file is its owner's alone unless it is said; the umask takes from this as from any other file.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut temporary = builder.tempfile_in(folder).map_err(refuse)?;
+    // Held as long as it is written: what nobody holds was left over. A file system without locks writes all the same.
+    let _ = temporary.as_file().try_lock();
     let mut buffer = BufWriter::new(temporary.as_file_mut());
     write(&mut buffer).and_then(|()| buffer.flush()).map_err(refuse)?;
     drop(buffer);
-    #[cfg(unix)]
-    {
-        // A temporary file is its owner's alone; the file itself is as any other that is created.
-        use std::os::unix::fs::PermissionsExt;
-        let mode = std::fs::Permissions::from_mode(0o644);
-        temporary.as_file().set_permissions(mode).map_err(refuse)?;
-    }
+    temporary.as_file().sync_all().map_err(refuse)?;
     temporary.persist(path).map_err(|e| refuse(e.error))?;
     Ok(())
 }
 
-fn open_image(path: &Path) -> Result<DynamicImage> {
-    ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?
-        .decode()
-        .map_err(|e| Error::file(path, format!("is not a whole PNG or JPEG image: {e}")))
+/// How names of temporary files and folders begin.
+pub(crate) const TEMPORARY: &str = ".phasefront-";
+/// How old a temporary file must be to be thought left over: none is unlocked that long.
+const LEFT_OVER: Duration = Duration::from_secs(60);
+
+/// Removes what killed runs left over in `folder`: temporary files and folders that no process holds. Once a folder, as
+/// far as it can be done.
+pub(crate) fn remove_left_over(folder: &Path) {
+    static DONE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    if !DONE.lock().is_ok_and(|mut done| done.insert(folder.to_owned())) {
+        return;
+    }
+    let Ok(entries) = std::fs::read_dir(folder) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let is_ours = entry.file_name().to_string_lossy().starts_with(TEMPORARY);
+        let Some(about) = entry.metadata().ok().filter(|_| is_ours) else {
+            continue;
+        };
+        let age = about.modified().ok().and_then(|then| then.elapsed().ok());
+        if age.is_some_and(|age| age >= LEFT_OVER) && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+        {
+            let _ = match about.is_dir() {
+                true => std::fs::remove_dir_all(entry.path()),
+                false => std::fs::remove_file(entry.path()),
+            };
+        }
+    }
+}
+
+/// Most pixels of an image that is read, 8192²: over two 8K frames.
+pub const MOST_PIXELS: u64 = 1 << 26;
+
+/// The image in `bytes`.
+///
+/// # Errors
+/// What is not a whole PNG or JPEG, or has over [`MOST_PIXELS`].
+pub(crate) fn decode(bytes: &[u8]) -> std::result::Result<DynamicImage, String> {
+    decode_from(ImageReader::new(Cursor::new(bytes)).with_guessed_format())
+}
+
+fn decode_from<R: BufRead + Seek>(
+    reader: std::io::Result<ImageReader<R>>,
+) -> std::result::Result<DynamicImage, String> {
+    let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
+    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
+        return Err("is not a PNG or JPEG image".into());
+    }
+    let broken = |e| format!("is not a whole PNG or JPEG image: {e}");
+    let mut decoder = reader.into_decoder().map_err(broken)?;
+    let (width, height) = decoder.dimensions();
+    // A small file may hold a large image.
+    if u64::from(width) * u64::from(height) > MOST_PIXELS {
+        return Err(format!(
+            "has {width}×{height} pixels; {MOST_PIXELS} in all are the most"
+        ));
+    }
+    decoder.set_limits(image::Limits::default()).map_err(broken)?;
+    DynamicImage::from_decoder(decoder).map_err(broken)
+}
+
+pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
+    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+    decode_from(reader).map_err(|e| Error::file(path, e))
 }
 
 /// The amplitudes of an image, (3, H, W) in \[0, 1]. Grey images have three equal colours; alpha is left out.
@@ -123,12 +188,24 @@ fn open_image(path: &Path) -> Result<DynamicImage> {
 /// # Errors
 /// A file that is missing, cut short, or not a PNG or JPEG.
 pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
-    let image = open_image(path)?.into_rgb32f();
+    let image = open_image(path)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let pixels = image.into_raw();
-    Ok(Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-        pixels[3 * (y * width + x) + c].clamp(0.0, 1.0)
-    }))
+    let amplitudes =
+        |at: &dyn Fn(usize) -> f32| Array3::from_shape_fn((3, height, width), |(c, y, x)| at(3 * (y * width + x) + c));
+    // Not by way of floats: that would be all of it twice.
+    Ok(match image {
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let pixels = image.into_rgb16().into_raw();
+            amplitudes(&|i| f32::from(pixels[i]) / 65535.0)
+        }
+        image => {
+            let pixels = image.into_rgb8().into_raw();
+            amplitudes(&|i| f32::from(pixels[i]) / 255.0)
+        }
+    })
 }
 
 /// The (H, W) of an image and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is left out.
@@ -176,21 +253,18 @@ pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 }
 
 fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
-    let read = |_: ()| -> Result<BufReader<File>> {
-        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        Ok(BufReader::new(file))
-    };
+    let file = read_file(path)?;
     let over = |most: f32| if normalized { most } else { 1.0 };
-    if let Ok(depth) = Array2::<f32>::read_npy(read(())?) {
+    if let Ok(depth) = npy::read::<f32, Ix2>(&file) {
         return Ok(depth);
     }
-    if let Ok(depth) = Array2::<f64>::read_npy(read(())?) {
+    if let Ok(depth) = npy::read::<f64, Ix2>(&file) {
         return Ok(depth.mapv(|v| v as f32));
     }
-    if let Ok(depth) = Array2::<u16>::read_npy(read(())?) {
+    if let Ok(depth) = npy::read::<u16, Ix2>(&file) {
         return Ok(depth.mapv(|v| f32::from(v) / over(65535.0)));
     }
-    Array2::<u8>::read_npy(read(())?)
+    npy::read::<u8, Ix2>(&file)
         .map(|depth| depth.mapv(|v| f32::from(v) / over(255.0)))
         .map_err(|_| {
             Error::file(
@@ -198,6 +272,15 @@ fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
                 "is not a whole .npy of shape (H, W) and type float32, float64, uint16 or uint8",
             )
         })
+}
+
+/// The bytes of a regular file: what never ends, as a device, is not begun.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
+    let refuse = |e: std::io::Error| Error::file(path, format!("cannot be read: {e}"));
+    if !std::fs::metadata(path).map_err(refuse)?.is_file() {
+        return Err(Error::file(path, "is no regular file"));
+    }
+    std::fs::read(path).map_err(refuse)
 }
 
 /// Writes amplitudes, (3, H, W), as an 8-bit RGB PNG; what is over 1 is white.
@@ -281,8 +364,7 @@ pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &Holog
 /// A file that is missing or cut short, or an image that is no hologram of ours.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
-        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        let field = Array3::<Complex32>::read_npy(BufReader::new(file))
+        let field = npy::read::<Complex32, Ix3>(&read_file(path)?)
             .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (3, H, W): {e}")))?;
         if field.dim().0 != 3 || field.is_empty() {
             return Err(Error::file(

@@ -3,15 +3,16 @@
 //! How a scene becomes an LDI is in [`crate::scene`].
 
 use std::fs::{self, File};
-use std::io::{BufReader, BufWriter};
+use std::io::BufWriter;
 use std::path::Path;
 
 use image::codecs::png::PngEncoder;
-use image::{DynamicImage, ExtendedColorType, ImageEncoder, ImageReader};
+use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use ndarray::{Array2, Array3};
 use phasefront::unstable::network::Source;
 
 use crate::error::{Error, Result};
+use crate::files::{TEMPORARY, open_image, remove_left_over};
 
 /// A layered depth image: at least one layer, front first, all of one shape.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,7 +109,11 @@ impl Ldi {
             Some(parent) if !parent.as_os_str().is_empty() => parent,
             _ => Path::new("."),
         };
+        remove_left_over(parent);
         let temp = temp_dir(parent).map_err(|e| Error::file(dir, format!("cannot write here: {e}")))?;
+        // Held as long as it is written, as temporary files are.
+        let held = File::open(temp.path());
+        let _ = held.as_ref().map(File::try_lock);
         for (index, layer) in self.layers.iter().enumerate() {
             write_layer(temp.path(), index, layer).map_err(|e| Error::file(dir.join(layer_name(index)), e))?;
         }
@@ -271,9 +276,9 @@ fn count_layers(dir: &Path) -> Result<usize> {
 }
 
 fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
-    let colour = decode(&dir.join(layer_name(index)))?.to_rgba8();
+    let colour = open_image(&dir.join(layer_name(index)))?.to_rgba8();
     let depth_path = dir.join(depth_name(index));
-    let (depth_shape, depths): (_, Vec<f32>) = match decode(&depth_path)? {
+    let (depth_shape, depths): (_, Vec<f32>) = match open_image(&depth_path)? {
         DynamicImage::ImageLuma16(image) => (image.dimensions(), image.iter().map(|&v| depth_of_code(v)).collect()),
         DynamicImage::ImageLuma8(image) => (
             image.dimensions(),
@@ -295,14 +300,6 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
         ));
     }
     Ok(from_codes((height as usize, width as usize), colour.as_raw(), &depths))
-}
-
-fn decode(path: &Path) -> Result<DynamicImage> {
-    let file = File::open(path).map_err(|e| Error::file(path, e))?;
-    let reader = ImageReader::with_format(BufReader::new(file), image::ImageFormat::Png);
-    reader
-        .decode()
-        .map_err(|e| Error::file(path, format!("not a readable PNG: {e}")))
 }
 
 fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> std::result::Result<(), String> {
@@ -328,7 +325,7 @@ fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> std::result::Resul
 /// A temporary folder with the permissions of an ordinary new one.
 fn temp_dir(parent: &Path) -> std::io::Result<tempfile::TempDir> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".phasefront-");
+    builder.prefix(TEMPORARY);
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
     builder.tempdir_in(parent)
@@ -472,7 +469,7 @@ mod tests {
         restore();
         let bytes = fs::read(dir.join("layer_1.png")).unwrap();
         fs::write(dir.join("layer_1.png"), &bytes[..bytes.len() / 2]).unwrap();
-        assert_refused(&dir, "layer_1.png", "not a readable PNG");
+        assert_refused(&dir, "layer_1.png", "not a whole PNG");
         restore();
         image::GrayImage::new(3, 3).save(dir.join("depth_0.png")).unwrap();
         assert_refused(&dir, "depth_0.png", "3x3 pixels, but its layer has 7x5");

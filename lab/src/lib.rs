@@ -14,6 +14,7 @@ pub mod gpu;
 pub mod ldi;
 pub mod metrics;
 pub mod models;
+mod npy;
 pub mod occlusion;
 pub mod plot;
 pub mod point_based;

@@ -11,6 +11,7 @@
 //! pixel (row, column) lies at (column + ½, row + ½); z in parts of the volume's depth, toward the viewer, from
 //! +½ (nearest) to −½ (farthest). Normalized depth is d = ½ − z. A scene so described fits any display.
 
+mod beside;
 pub mod dice;
 mod gltf_file;
 mod model;

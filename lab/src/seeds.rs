@@ -11,15 +11,15 @@ use crate::depth_study::{Degradation, RATIO, degrade, refine};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::ldi::depth_of_code;
+use crate::npy;
 use crate::scene::dice::Dice;
-use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, concatenate, s};
-use ndarray_npy::{ReadNpyExt, WriteNpyExt};
+use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, Ix3, concatenate, s};
+use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{RgbdFrame, Sweep};
 use rayon::prelude::*;
-use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What a field is multiplied by: amplitudes up to 4 fit, in steps of 1.2·10⁻⁴.
@@ -97,8 +97,7 @@ pub fn make(
 }
 
 fn read_depths(path: &Path, size: usize) -> Result<Array3<u16>> {
-    let file = File::open(path).map_err(|e| Error::file(path, e))?;
-    let depths = Array3::<u16>::read_npy(BufReader::new(file)).map_err(|e| Error::file(path, e))?;
+    let depths = npy::read::<u16, Ix3>(&files::read_file(path)?).map_err(|e| Error::file(path, e))?;
     match depths.dim() {
         (_, height, width) if (height, width) == (size, size) => Ok(depths),
         (_, height, width) => Err(Error::file(

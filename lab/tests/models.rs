@@ -337,9 +337,72 @@ fn broken_gltf_is_refused_by_name() {
         &|json| json["images"][0] = json!({"uri": "%ff.png"}),
         "not the name of a file",
     );
-    refused(&|json| json["nodes"] = json!([{"mesh": 0, "children": [0]}]), "circle");
+    refused(&|json| json["nodes"] = json!([{"mesh": 0, "children": [0]}]), "its own");
+    let twice = json!([{"children": [1, 1]}, {"mesh": 0}]);
+    refused(&|json| json["nodes"] = twice.clone(), "node 1 has two parents");
     refused(&|json| json["nodes"][0]["scale"] = json!([1e39, 1, 1]), "not finite");
     refused(&|json| json["nodes"][0]["scale"] = json!([0, 0, 1]), "has no size");
+}
+
+#[test]
+fn nodes_may_lie_as_deep_as_they_like() {
+    let folder = tempfile::tempdir().unwrap();
+    let deep = changed(folder.path(), |json| {
+        let nodes: Vec<_> = (1..5000).map(|child| json!({"children": [child]})).collect();
+        json["nodes"] = json!([nodes, vec![json!({"mesh": 0})]].concat());
+    });
+    assert_eq!(quarters(&seen(&deep))[0], RED);
+}
+
+/// Files that a model names are regular ones of its own folder.
+#[test]
+fn a_model_reads_nothing_but_its_folder() {
+    let all = tempfile::tempdir().unwrap();
+    let folder = all.path().join("model");
+    fs::create_dir_all(folder.join("pictures")).unwrap();
+    fs::write(all.path().join("secret.png"), picture(255)).unwrap();
+    fs::write(folder.join("pictures/own.png"), picture(255)).unwrap();
+    let of = |uri: &str| changed(&folder, |json| json["images"][0] = json!({"uri": uri}));
+    assert_eq!(quarters(&seen(&of("pictures/own.png")))[0], RED);
+    for (uri, reason) in [
+        ("../secret.png", "outside the model's folder"),
+        ("/etc/passwd", "outside the model's folder"),
+        ("/dev/zero", "outside the model's folder"),
+        ("file:///etc/passwd", "no such file"),
+        ("pictures", "no regular file"),
+    ] {
+        refused(&of(uri), reason);
+        refused(&changed(&folder, |json| json["buffers"][0]["uri"] = json!(uri)), reason);
+        fs::write(folder.join("model.mtl"), format!("newmtl painted\nmap_Kd {uri}\n")).unwrap();
+        if uri != "file:///etc/passwd" {
+            refused(&obj(&folder, OBJ), reason);
+        }
+        // A library of materials that cannot be read leaves surfaces white, as one that is not there.
+        let text = OBJ.replace("model.mtl", uri);
+        assert_eq!(quarters(&seen(&obj(&folder, &text))), [WHITE; 4]);
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(all.path().join("secret.png"), folder.join("link.png")).unwrap();
+        refused(&of("link.png"), "outside the model's folder");
+        refused(Path::new("/dev/null"), "no regular file");
+    }
+}
+
+#[test]
+fn a_small_picture_of_many_pixels_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    // Two lines of 2²⁵ pixels and one more, all black.
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, 1 << 14, (1 << 12) + 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![0; (1 << 11) * ((1 << 12) + 1)]).unwrap();
+    writer.finish().unwrap();
+    fs::write(folder.path().join("large.png"), png).unwrap();
+    let path = changed(folder.path(), |json| json["images"][0] = json!({"uri": "large.png"}));
+    refused(&path, "16384×4097 pixels; 67108864 in all are the most");
 }
 
 /// No file cut short and no file with a wrong byte makes it panic; each error is one line.
@@ -402,6 +465,15 @@ fn obj_with_its_materials_is_seen_upright() {
     refused(&obj(folder.path(), OBJ), "picture.png");
     fs::remove_file(folder.path().join("picture.png")).unwrap();
     assert_eq!(quarters(&seen(&obj(folder.path(), OBJ))), [plain; 4]);
+    for (kd, colour) in [
+        ("0.6", [0.6; 3]),
+        ("0.2 0.4", WHITE),
+        ("spectral light.rfl", WHITE),
+        ("", WHITE),
+    ] {
+        fs::write(folder.path().join("model.mtl"), format!("newmtl painted\nKd {kd}\n")).unwrap();
+        assert_eq!(quarters(&seen(&obj(folder.path(), OBJ))), [colour; 4], "{kd}");
+    }
     fs::remove_file(folder.path().join("model.mtl")).unwrap();
     assert_eq!(quarters(&seen(&obj(folder.path(), OBJ))), [WHITE; 4]);
 }

@@ -60,7 +60,7 @@ const BEGINNING: usize = 350;
 const END: usize = 200;
 
 /// A message on one line: control characters escaped, the middle left out where it is too long.
-struct Line<'a>(&'a str);
+pub struct Line<'a>(pub &'a str);
 
 impl Display for Line<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {

@@ -9,6 +9,10 @@ pub mod depth {
 pub mod encode {
     pub use crate::encode::*;
 }
+/// Messages on one line.
+pub mod error {
+    pub use crate::error::Line;
+}
 /// Camera images to amplitudes.
 pub mod frame {
     pub use crate::frame::*;

@@ -17,8 +17,8 @@
 
 use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
-use crate::files::write_atomically;
-use image::{DynamicImage, ImageReader};
+use crate::files::{open_image, write_atomically};
+use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::target::{Aberration, Illumination, PerPixel};
 use phasefront::unstable::wave::zernike::{Aberrations, Coefficients};
@@ -48,11 +48,7 @@ pub fn write_per_pixel(path: &Path, table: &PerPixel) -> Result<()> {
 /// # Errors
 /// A file that is missing, no RGB image, or a colour without light.
 pub fn read_laser(path: &Path) -> Result<Illumination> {
-    let image = ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?
-        .decode()
-        .map_err(|e| Error::file(path, format!("is not a whole PNG image: {e}")))?;
+    let image = open_image(path)?;
     if !matches!(image, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgb16(_)) {
         return Err(Error::file(
             path,

@@ -5,11 +5,12 @@ use std::path::Path;
 use std::sync::Arc;
 
 use gltf::accessor::{DataType, Dimensions};
-use gltf::image::{Format, Source};
+use gltf::image::Source;
 use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
 
+use super::beside::Beside;
 use super::model::{MAX_MODEL_TRIANGLES, Part, check_count};
 use super::{Texture, texture};
 
@@ -27,36 +28,46 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
     let unchecked = Gltf::from_slice_without_validation(&bytes).map_err(|e| one_line(&e))?;
     check_names(unchecked.as_json())?;
     let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|e| one_line(&e))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    for buffer in document.buffers() {
-        if let buffer::Source::Uri(uri) = buffer.source() {
-            check_uri(uri)?;
-        }
-    }
-    let buffers =
-        gltf::import_buffers(&document, Some(folder), blob).map_err(|e| format!("its buffers: {}", one_line(&e)))?;
+    let mut beside = Beside::new(path)?;
+    let buffers = read_buffers(&document, blob, &mut beside)?;
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next())
         .ok_or("no scene")?;
-    let nodes = document.nodes().len();
     let mut reader = Reader {
-        folder,
+        beside,
         buffers,
         textures: Vec::new(),
         triangles: 0,
         parts: Vec::new(),
     };
-    let identity = std::array::from_fn(|i| std::array::from_fn(|j| f32::from(u8::from(i == j))));
-    for node in scene.nodes() {
-        reader.node(&node, identity, nodes)?;
-    }
+    reader.nodes(scene.nodes(), document.nodes().len())?;
     Ok(reader.parts)
 }
 
-struct Reader<'a> {
-    folder: &'a Path,
-    buffers: Vec<buffer::Data>,
+/// The file's buffers, in the file or beside it.
+fn read_buffers(document: &gltf::Document, mut blob: Option<Vec<u8>>, beside: &mut Beside) -> Result<Vec<Vec<u8>>> {
+    let mut read = |buffer: gltf::Buffer| {
+        let bytes = match buffer.source() {
+            buffer::Source::Uri(uri) => resource(uri, beside)?,
+            buffer::Source::Bin => blob.take().ok_or("the file has no such part")?,
+        };
+        match bytes.len() < buffer.length() {
+            true => Err(format!("it has {} bytes, not {}", bytes.len(), buffer.length())),
+            false => Ok(bytes),
+        }
+    };
+    (document.buffers())
+        .map(|buffer| {
+            let index = buffer.index();
+            read(buffer).map_err(|e| format!("its buffers: {index}: {e}"))
+        })
+        .collect()
+}
+
+struct Reader {
+    beside: Beside,
+    buffers: Vec<Vec<u8>>,
     /// What has been made of images: their index, what was asked of them, the texture.
     textures: Vec<(TextureKey, Arc<Texture>)>,
     triangles: usize,
@@ -72,17 +83,31 @@ struct TextureKey {
     cut: Option<f32>,
 }
 
-impl Reader<'_> {
-    /// The node and those below it, `budget` generations at most: more than there are nodes would be a circle.
-    fn node(&mut self, node: &Node, parent: Matrix, budget: usize) -> Result<()> {
-        let budget = budget.checked_sub(1).ok_or("its nodes form a circle")?;
-        let matrix = product(parent, node.transform().matrix());
-        if let Some(mesh) = node.mesh() {
-            for primitive in mesh.primitives() {
-                self.primitive(&primitive, matrix)?;
+impl Reader {
+    /// The nodes and those below them, of `count` in the file. Each has one parent at most, so that none comes twice.
+    fn nodes<'a>(&mut self, roots: impl Iterator<Item = Node<'a>>, count: usize) -> Result<()> {
+        let identity = std::array::from_fn(|i| std::array::from_fn(|j| f32::from(u8::from(i == j))));
+        let mut seen = vec![false; count];
+        let mut waiting: Vec<(Node, Matrix)> = roots.map(|root| (root, identity)).collect();
+        waiting.reverse();
+        while let Some((node, parent)) = waiting.pop() {
+            if std::mem::replace(&mut seen[node.index()], true) {
+                return Err(format!(
+                    "node {} has two parents or is its own; one is right",
+                    node.index()
+                ));
             }
+            let matrix = product(parent, node.transform().matrix());
+            if let Some(mesh) = node.mesh() {
+                for primitive in mesh.primitives() {
+                    self.primitive(&primitive, matrix)?;
+                }
+            }
+            let first = waiting.len();
+            waiting.extend(node.children().map(|child| (child, matrix)));
+            waiting[first..].reverse();
         }
-        node.children().try_for_each(|child| self.node(&child, matrix, budget))
+        Ok(())
     }
 
     fn primitive(&mut self, primitive: &Primitive, matrix: Matrix) -> Result<()> {
@@ -219,49 +244,28 @@ impl Reader<'_> {
     }
 
     /// Width, height and RGBA texels of an image in the file or beside it.
-    fn image(&self, image: &gltf::Image) -> Result<(usize, usize, Vec<[u8; 4]>)> {
-        let source = image.source();
-        match &source {
-            Source::Uri { uri, .. } => check_uri(uri)?,
+    fn image(&mut self, image: &gltf::Image) -> Result<(usize, usize, Vec<[u8; 4]>)> {
+        let texels = match image.source() {
+            Source::Uri { uri, .. } => resource(uri, &mut self.beside).and_then(|bytes| self.beside.texels(&bytes)),
             Source::View { view, .. } => {
                 let end = view.offset().checked_add(view.length());
-                let held = self.buffers.get(view.buffer().index()).map_or(0, |data| data.len());
-                if end.is_none_or(|end| end > held) {
-                    return Err(format!("picture {} lies outside its buffer", image.index()));
-                }
-            }
-        }
-        let data = gltf::image::Data::from_source(source, Some(self.folder), &self.buffers)
-            .map_err(|e| format!("picture {}: {}", image.index(), one_line(&e)))?;
-        let (channels, bytes) = match data.format {
-            Format::R8 => (1, 1),
-            Format::R8G8 => (2, 1),
-            Format::R8G8B8 => (3, 1),
-            Format::R8G8B8A8 => (4, 1),
-            Format::R16 => (1, 2),
-            Format::R16G16 => (2, 2),
-            Format::R16G16B16 => (3, 2),
-            Format::R16G16B16A16 => (4, 2),
-            Format::R32G32B32FLOAT | Format::R32G32B32A32FLOAT => {
-                return Err(format!(
-                    "picture {} holds floats; 8 and 16 bits are read",
-                    image.index()
-                ));
+                let held = self.buffers.get(view.buffer().index());
+                let bytes = held.zip(end).and_then(|(data, end)| data.get(view.offset()..end));
+                (bytes.ok_or_else(|| "it lies outside its buffer".into())).and_then(|bytes| self.beside.texels(bytes))
             }
         };
-        // Of 16 bits, in this machine's order, the upper 8 are enough.
-        let upper = if cfg!(target_endian = "little") { bytes - 1 } else { 0 };
-        let texel = |pixel: &[u8]| {
-            let at = |c: usize| pixel[c * bytes + upper];
-            match channels {
-                1 => [at(0), at(0), at(0), 255],
-                2 => [at(0), at(0), at(0), at(1)],
-                3 => [at(0), at(1), at(2), 255],
-                _ => [at(0), at(1), at(2), at(3)],
-            }
-        };
-        let texels = data.pixels.chunks_exact(channels * bytes).map(texel).collect();
-        Ok((data.width as usize, data.height as usize, texels))
+        texels.map_err(|e| format!("picture {}: {e}", image.index()))
+    }
+}
+
+/// The bytes that a URI names: in itself, or a file beside the model.
+fn resource(uri: &str, beside: &mut Beside) -> Result<Vec<u8>> {
+    match uri.strip_prefix("data:") {
+        // The crate decodes what is in the file itself.
+        Some(_) => buffer::Data::from_source(buffer::Source::Uri(uri), None)
+            .map(|data| data.0)
+            .map_err(|e| one_line(&e)),
+        None => beside.read(&file_name(uri)?),
     }
 }
 
@@ -366,8 +370,8 @@ fn check(accessor: &Accessor, types: &[DataType], shapes: &[Dimensions]) -> Resu
     Ok(())
 }
 
-/// A name that, its percent signs decoded, is text.
-fn check_uri(uri: &str) -> Result<()> {
+/// The name of a file that a URI is, its percent signs decoded.
+fn file_name(uri: &str) -> Result<String> {
     let bytes = uri.as_bytes();
     let digit = |index: usize| bytes.get(index).and_then(|&b| char::from(b).to_digit(16));
     let mut decoded = Vec::with_capacity(bytes.len());
@@ -383,10 +387,7 @@ fn check_uri(uri: &str) -> Result<()> {
             index += 1;
         }
     }
-    if uri.starts_with("data:") || std::str::from_utf8(&decoded).is_ok() {
-        return Ok(());
-    }
-    Err(format!("{uri} is not the name of a file"))
+    String::from_utf8(decoded).map_err(|_| format!("{uri} is not the name of a file"))
 }
 
 /// The crate's message, on one line.

@@ -47,7 +47,11 @@ pub(super) struct Part {
 /// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
     let fail = |reason: String| Error::file(path, reason);
-    let size = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.len();
+    let about = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?;
+    if !about.is_file() {
+        return Err(fail("is no regular file".into()));
+    }
+    let size = about.len();
     if size > MAX_MODEL_BYTES {
         return Err(fail(format!(
             "{size} bytes; a model may have {MAX_MODEL_BYTES} at most"

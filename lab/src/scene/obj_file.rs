@@ -1,11 +1,15 @@
 //! Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
 
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
 
 use tobj::{LoadOptions, Material};
 
 use super::Texture;
+use super::beside::Beside;
 use super::model::{Part, check_count};
 
 type Result<T> = std::result::Result<T, String>;
@@ -17,7 +21,22 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         ignore_points: true,
         ignore_lines: true,
     };
-    let (models, materials) = tobj::load_obj(path, &options).map_err(|e| e.to_string())?;
+    let mut obj = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
+    let beside = RefCell::new(Beside::new(path)?);
+    let library = |name: &Path| {
+        let name = name.to_string_lossy().replace('\\', "/");
+        match beside.borrow_mut().read(name.trim()) {
+            Ok(text) => tobj::load_mtl_buf(&mut materials_of(&String::from_utf8_lossy(&text)).as_bytes()),
+            Err(e) => {
+                log::warn!(
+                    "{}: its materials are not read ({e}); its surfaces are white",
+                    path.display()
+                );
+                Ok(Default::default())
+            }
+        }
+    };
+    let (models, materials) = tobj::load_obj_buf(&mut obj, &options, library).map_err(|e| e.to_string())?;
     let materials = materials.unwrap_or_else(|e| {
         log::warn!(
             "{}: its materials are not read ({e}); its surfaces are white",
@@ -26,15 +45,32 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         Vec::new()
     });
     check_count(models.iter().map(|model| model.mesh.indices.len() / 3).sum())?;
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut beside = beside.into_inner();
     let textures = materials
         .iter()
-        .map(|material| texture(folder, material))
+        .map(|material| texture(&mut beside, material))
         .collect::<Result<Vec<_>>>()?;
     models
         .into_iter()
         .map(|model| part(model, &materials, &textures))
         .collect()
+}
+
+/// The lines of a material library that are of use: names, diffuse colours of three numbers, and their pictures. The
+/// crate that reads them panics at a colour of one number, which stands for grey.
+fn materials_of(library: &str) -> String {
+    let mut lines = String::new();
+    for line in library.lines() {
+        let words: Vec<_> = line.split_whitespace().collect();
+        match words[..] {
+            ["newmtl" | "map_Kd", _, ..] => lines += line,
+            ["Kd", grey] => lines += &format!("Kd {grey} {grey} {grey}"),
+            ["Kd", r, g, b, ..] => lines += &format!("Kd {r} {g} {b}"),
+            _ => continue,
+        }
+        lines.push('\n');
+    }
+    lines
 }
 
 /// A model's part; `textures` are those of `materials`.
@@ -90,26 +126,21 @@ fn clothe(part: &mut Part, material: &Material, texture: &Option<Arc<Texture>>, 
 }
 
 /// The picture of a material's diffuse colour, if it names one that is there.
-fn texture(folder: &Path, material: &Material) -> Result<Option<Arc<Texture>>> {
+fn texture(beside: &mut Beside, material: &Material) -> Result<Option<Arc<Texture>>> {
     let Some(name) = &material.diffuse_texture else {
         return Ok(None);
     };
     // Some programs write their own separators.
-    let path = folder.join(name.trim().replace('\\', "/"));
-    if !path.is_file() {
+    let name = name.trim().replace('\\', "/");
+    let Some(bytes) = beside.read_if_there(&name)? else {
         log::warn!(
-            "{}: no such picture; the plain colour of material {} is used",
-            path.display(),
+            "{name}: no such picture; the plain colour of material {} is used",
             material.name
         );
         return Ok(None);
-    }
-    let image = image::open(&path)
-        .map_err(|e| format!("picture {}: {e}", path.display()))?
-        .to_rgba8();
-    let (width, height) = image.dimensions();
-    let texels = image.pixels().map(|pixel| pixel.0).collect();
-    let texture = Texture::new(width as usize, height as usize, texels).map_err(|e| e.to_string())?;
+    };
+    let (width, height, texels) = (beside.texels(&bytes)).map_err(|e| format!("picture {name}: {e}"))?;
+    let texture = Texture::new(width, height, texels).map_err(|e| e.to_string())?;
     Ok(Some(Arc::new(texture)))
 }
 
