@@ -18,6 +18,7 @@ mod video;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
+use std::io::Write;
 use std::num::NonZeroUsize;
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
@@ -83,8 +84,18 @@ impl Phasefront {
 
 /// Prints a command's result: `json` in one line, or `text`.
 fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
-    match json {
-        true => println!("{value}"),
-        false => println!("{text}"),
+    let mut out = std::io::stdout().lock();
+    let printed = match json {
+        true => writeln!(out, "{value}"),
+        false => writeln!(out, "{text}"),
+    };
+    match printed.and_then(|()| out.flush()) {
+        Ok(()) => {}
+        // Whoever read has read enough: as other programs do, end without a word.
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => std::process::exit(0),
+        Err(e) => {
+            let _ = writeln!(std::io::stderr(), "error: the result cannot be printed: {e}");
+            std::process::exit(1);
+        }
     }
 }

@@ -280,6 +280,110 @@ fn pictures_that_cannot_be_used_are_named() {
 }
 
 #[test]
+fn a_depth_that_promises_more_than_there_is_is_named() {
+    let folder = Folder::new().with_frame();
+    let text = "{'descr': '<f4', 'fortran_order': False, 'shape': (1000000, 1000000), }";
+    let header = [b"\x93NUMPY\x01\x00", &[text.len() as u8, 0][..], text.as_bytes()].concat();
+    fs::write(folder.path("huge.npy"), &header).unwrap();
+    folder.refuses(
+        &hologram("rgb.png", "huge.npy"),
+        1,
+        &["huge.npy", "is not a whole .npy"],
+    );
+    fs::write(folder.path("huge.json"), "{}").unwrap();
+    folder.refuses(
+        &["refocus", "huge.npy", "-o", "seen.png"],
+        1,
+        &["huge.npy", "is not a whole"],
+    );
+    folder.refuses(&hologram("rgb.png", "/dev/zero.npy"), 1, &["/dev/zero.npy"]);
+}
+
+/// What the command does where it cannot print, and with names and rights of files.
+#[cfg(unix)]
+#[test]
+fn it_lives_with_the_system_around_it() {
+    use std::os::unix::ffi::OsStrExt;
+    use std::os::unix::fs::PermissionsExt;
+    use std::process::Stdio;
+    let folder = Folder::new().with_frame();
+    let arguments = with(&["-o", "out.png", "--json"]);
+    let command = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_phasefront"));
+        command
+            .args(&arguments)
+            .current_dir(folder.0.path())
+            .env_remove("RUST_LOG");
+        command
+    };
+    let ends = |mut command: Command, code: i32, words: &str| {
+        let output = command
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+            .wait_with_output()
+            .unwrap();
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{errors}");
+        assert!(errors.contains(words) && !errors.contains("panicked"), "{errors}");
+    };
+    // A reader that has gone: this end of the pipe is closed before anything is printed.
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut closed = command();
+    closed.stdout(writer);
+    ends(closed, 0, "");
+    if let Ok(full) = File::options().write(true).open("/dev/full") {
+        let mut disk = command();
+        disk.stdout(full);
+        ends(disk, 1, "the result cannot be printed");
+    }
+    let name = std::ffi::OsStr::from_bytes(b"out\xff.png");
+    let position = arguments.iter().position(|a| *a == "-o").unwrap();
+    let mut others = arguments.clone();
+    others.drain(position..position + 2);
+    let mut foreign = Command::new(env!("CARGO_BIN_EXE_phasefront"));
+    foreign
+        .args(&others)
+        .args([std::ffi::OsStr::new("-o"), name])
+        .current_dir(folder.0.path());
+    foreign.stdout(Stdio::null());
+    ends(foreign, 0, "");
+    assert!(folder.0.path().join(name).exists());
+    for (mask, mode) in [("077", 0o600), ("022", 0o644), ("002", 0o664)] {
+        let _ = fs::remove_file(folder.path("out.png"));
+        let mut masked = Command::new("sh");
+        let script = format!("umask {mask}; exec \"$0\" \"$@\"");
+        masked
+            .args(["-c", &script, env!("CARGO_BIN_EXE_phasefront")])
+            .args(&arguments);
+        masked.current_dir(folder.0.path()).stdout(Stdio::null());
+        ends(masked, 0, "");
+        let about = fs::metadata(folder.path("out.png")).unwrap();
+        assert_eq!(about.permissions().mode() & 0o777, mode, "umask {mask}");
+    }
+}
+
+#[test]
+fn what_a_killed_run_left_is_removed_and_what_is_being_written_is_not() {
+    let folder = Folder::new().with_frame();
+    let old = |name: &str| {
+        let file = File::create(folder.path(name)).unwrap();
+        let then = std::time::SystemTime::now() - std::time::Duration::from_secs(3600);
+        file.set_modified(then).unwrap();
+        file
+    };
+    drop(old(".phasefront-left"));
+    drop(old(".other-left"));
+    let held = old(".phasefront-held");
+    held.lock().unwrap();
+    File::create(folder.path(".phasefront-new")).unwrap();
+    folder.succeeds(&with(&["-o", "out.png"]));
+    let there = [".phasefront-left", ".other-left", ".phasefront-held", ".phasefront-new"];
+    assert_eq!(there.map(|name| folder.path(name).exists()), [false, true, true, true]);
+}
+
+#[test]
 fn depth_that_means_nothing_is_named() {
     let folder = Folder::new().with_frame();
     let mut depth = Array2::from_elem((32, 48), 0.5f32);

@@ -100,7 +100,7 @@ impl Lut {
         bar.finish_and_clear();
         super::print(
             json,
-            &json!({"patterns": PATTERNS, "folder": folder}),
+            &json!({"patterns": PATTERNS, "folder": folder.display().to_string()}),
             format!(
                 "{PATTERNS} patterns in {}; photograph each in red, green and blue light",
                 folder.display()
@@ -179,7 +179,7 @@ impl Lut {
         table::write_per_pixel(output, &per_pixel)?;
         super::print(
             json,
-            &json!({"output": output, "report": report}),
+            &json!({"output": output.display().to_string(), "report": report}),
             format!("{}\n{}", report.text(), output.display()),
         );
         Ok(())
@@ -263,7 +263,7 @@ impl Laser {
             .collect();
         super::print(
             json,
-            &json!({"output": self.output, "least_amplitude": least, "fit_residual": left}),
+            &json!({"output": self.output.display().to_string(), "least_amplitude": least, "fit_residual": left}),
             format!(
                 "{}: least amplitude {:.2}, {:.2}, {:.2} of the most in red, green, blue",
                 self.output.display(),
@@ -398,7 +398,7 @@ impl Aberration {
         write_state(&state, &now)?;
         super::print(
             json,
-            &json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": round, "best": now.search.best}),
+            &json!({"round": now.search.round, "rounds": spot::ROUNDS, "folder": round.display().to_string(), "best": now.search.best}),
             format!(
                 "round {} of {}: photograph trial_00.png to trial_{:02}.png of {} as capture_00.png …, then run this again",
                 now.search.round + 1,
@@ -471,7 +471,7 @@ impl Aberration {
         std::fs::remove_file(state).map_err(|e| Error::file(state, format!("cannot be removed: {e}")))?;
         super::print(
             json,
-            &json!({"output": self.output, "coefficients_rad": now.search.best}),
+            &json!({"output": self.output.display().to_string(), "coefficients_rad": now.search.best}),
             format!("{}: coefficients {:.3?} rad", self.output.display(), now.search.best),
         );
         Ok(())
@@ -504,7 +504,7 @@ impl Pack {
         files::write_atomically(&self.output, |file| file.write_all(&bytes))?;
         super::print(
             json,
-            &json!({"file": self.output, "bytes": bytes.len()}),
+            &json!({"file": self.output.display().to_string(), "bytes": bytes.len()}),
             format!("{}: {} bytes", self.output.display(), bytes.len()),
         );
         Ok(())

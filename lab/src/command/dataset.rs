@@ -92,7 +92,7 @@ impl Dataset {
         bar.finish_and_clear();
         super::print(
             json,
-            &json!({"folder": self.output, "pairs": mine, "scenes": self.scenes}),
+            &json!({"folder": self.output.display().to_string(), "pairs": mine, "scenes": self.scenes}),
             format!("{}: {mine} pairs", self.output.display()),
         );
         Ok(())

@@ -444,7 +444,7 @@ impl Hologram {
         super::print(
             json,
             &json!({
-                "output": self.output, "complex": self.complex, "width": width, "height": height,
+                "output": self.output.display().to_string(), "complex": self.complex, "width": width, "height": height,
                 "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
                 "stage_ms": stages, "total_ms": ms(&total), "shown": judged,

@@ -71,7 +71,7 @@ impl Refocus {
             }
         }
         let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
-        super::print(json, &json!({"z_mm": z_mm, "files": written}), names.join("\n"));
+        super::print(json, &json!({"z_mm": z_mm, "files": names}), names.join("\n"));
         Ok(())
     }
 }

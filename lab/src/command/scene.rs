@@ -54,7 +54,7 @@ impl Scene {
             .collect();
         super::print(
             json,
-            &json!({"folder": self.output, "meshes": scene.meshes.len(), "hits": hits}),
+            &json!({"folder": self.output.display().to_string(), "meshes": scene.meshes.len(), "hits": hits}),
             format!(
                 "{}: {} meshes, hits a layer {hits:?}",
                 self.output.display(),

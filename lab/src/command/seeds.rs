@@ -39,7 +39,7 @@ impl Seeds {
         bar.finish_and_clear();
         super::print(
             json,
-            &json!({"folder": self.output, "planes": sweep.planes, "taps": sweep.taps}),
+            &json!({"folder": self.output.display().to_string(), "planes": sweep.planes, "taps": sweep.taps}),
             format!(
                 "{}: seeds by {} planes of {} taps",
                 self.output.display(),

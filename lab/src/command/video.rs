@@ -441,7 +441,7 @@ impl Video {
         let change = scales.windows(2).map(|pair| f64::from(pair[1] / pair[0] - 1.0).powi(2));
         let change = (change.sum::<f64>() / (scales.len().max(2) - 1) as f64).sqrt();
         let result = json!({
-            "output": self.output, "submitted": s.submitted, "processed": s.processed, "failed": s.failed,
+            "output": self.output.as_ref().map(|path| path.display().to_string()), "submitted": s.submitted, "processed": s.processed, "failed": s.failed,
             "refused": s.refused,
             "dropped": {
                 "superseded": s.dropped.superseded, "above_target_rate": s.dropped.above_target_rate,
