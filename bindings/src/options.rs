@@ -164,8 +164,8 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with, at most 256; none for as many as the device has.
     pub threads: Option<u32>,
-    /// Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple of
-    /// them.
+    /// Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
+    /// of them.
     #[uniffi(default = 33554432)]
     pub most_pixels: u64,
     /// Where frames are computed.

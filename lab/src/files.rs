@@ -79,8 +79,8 @@ pub enum Hologram {
     Complex(Array3<Complex32>, HologramInfo),
 }
 
-/// Opens the file at a temporary place beside `path`, lets `write` fill it, waits until it is on the disk, and renames it
-/// to `path`.
+/// Opens the file at a temporary place beside `path`, lets `write` fill it, waits until it is on the disk, and renames
+/// it to `path`.
 ///
 /// # Errors
 /// Whatever goes wrong, naming `path`; what was there is left as it was.

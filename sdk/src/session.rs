@@ -181,8 +181,8 @@ enum Mode {
     Live(Live<LiveWork>),
 }
 
-/// Frames in, holograms out. Every method may be called from any thread, at any moment. A session belongs to the process
-/// that made it: in a fork of it, calls that need its threads are refused.
+/// Frames in, holograms out. Every method may be called from any thread, at any moment. A session belongs to the
+/// process that made it: in a fork of it, calls that need its threads are refused.
 ///
 /// ```no_run
 /// use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};

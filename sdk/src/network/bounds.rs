@@ -1,5 +1,5 @@
-//! What a file may make the library allocate, said before it is read: a message of two bytes becomes hundreds in memory,
-//! so that it is messages that are counted.
+//! What a file may make the library allocate, said before it is read: a message of two bytes becomes hundreds in
+//! memory, so that it is messages that are counted.
 
 use crate::{Error, Result};
 
