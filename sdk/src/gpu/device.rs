@@ -242,7 +242,8 @@ impl Device {
         // Scopes are popped last in, first out.
         let errors = [validation, internal, memory].map(|scope| pollster::block_on(scope.pop()));
         self.check()?;
-        let error = errors.into_iter().flatten().next();
+        // What there was no memory for is invalid wherever it is used next: the cause comes before its consequences.
+        let error = errors.into_iter().rev().flatten().next();
         if error.is_some() {
             // It may be a loss that was not told yet.
             self.ask()?;
@@ -372,6 +373,17 @@ mod tests {
             return;
         }
         assert!(matches!(taken, Err(GpuError::OutOfMemory(_))), "{taken:?}");
+        // Also where what was not given is used.
+        let used = device.guarded(|| {
+            let all = (0..64)
+                .map(|_| device.buffer("a frame", most))
+                .collect::<Result<Vec<_>>>()?;
+            let mut encoder = device.inner.create_command_encoder(&Default::default());
+            all.iter().for_each(|buffer| encoder.clear_buffer(buffer, 0, None));
+            device.queue.submit([encoder.finish()]);
+            Ok(())
+        });
+        assert!(matches!(used, Err(GpuError::OutOfMemory(_))), "{used:?}");
         // What does fit still works.
         let buffer = device.guarded(|| device.buffer("a frame", 64)).unwrap();
         assert_eq!(device.read(&buffer, 64).unwrap(), [0; 64]);
