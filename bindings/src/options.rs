@@ -88,7 +88,7 @@ pub enum Method {
     },
 }
 
-/// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
+/// One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is shown in its middle.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct Rung {
     /// What makes the hologram.
@@ -97,6 +97,12 @@ pub struct Rung {
     pub width: u32,
     /// Height of the hologram, pixels.
     pub height: u32,
+    /// Local steps of this rung; none for the session's.
+    #[uniffi(default = None)]
+    pub local_steps: Option<u32>,
+    /// Steps at the midpoint of this rung; none for the session's.
+    #[uniffi(default = None)]
+    pub midpoint_steps: Option<u32>,
 }
 
 /// Whether a session may change its quality.
@@ -158,6 +164,10 @@ pub struct SessionOptions {
     /// suits the encoding: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
+    /// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
+    /// video, where it goes on from the frame before.
+    #[uniffi(default = 0)]
+    pub midpoint_steps: u32,
     /// Which metres are shown at the ends of the volume.
     pub depth_range: DepthRange,
     /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
@@ -279,6 +289,8 @@ impl SessionOptions {
                     method: method(&rung.method),
                     width: rung.width as u32,
                     height: rung.height as u32,
+                    local_steps: None,
+                    midpoint_steps: None,
                 })
                 .collect(),
             quality: match core.quality {
@@ -304,6 +316,7 @@ impl SessionOptions {
             },
             dark: None,
             local_steps: None,
+            midpoint_steps: core.encoder.midpoint_steps as u32,
             depth_range: match core.depth.range {
                 input::DepthRange::Percentiles => DepthRange::Percentiles,
                 input::DepthRange::Fixed { near_m, far_m } => DepthRange::Fixed { near_m, far_m },
@@ -331,14 +344,6 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let target = options.target.core.clone();
         let method = |rung: &Rung| rung.method.core(&target.display);
         let mut to = session::SessionOptions::new(target.clone(), method(best));
-        to.ladder = (options.ladder.iter())
-            .map(|rung| session::Rung {
-                method: method(rung),
-                height: rung.height as usize,
-                width: rung.width as usize,
-                backend: None,
-            })
-            .collect();
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
         let usual = phasefront::EncoderOptions::from(match &options.encoding {
@@ -353,6 +358,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         to.encoder = phasefront::EncoderOptions {
             dark: options.dark.unwrap_or(usual.dark),
             local_steps: options.local_steps.map_or(usual.local_steps, |steps| steps as usize),
+            midpoint_steps: options.midpoint_steps as usize,
             ..usual
         };
         to.encoder.brightness = match options.brightness {
@@ -360,6 +366,20 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
             Brightness::FrameMax => phasefront::Brightness::FrameMax,
         };
+        let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
+        to.ladder = (options.ladder.iter())
+            .map(|rung| session::Rung {
+                method: method(rung),
+                height: rung.height as usize,
+                width: rung.width as usize,
+                backend: None,
+                encoder: Some(phasefront::EncoderOptions {
+                    local_steps: steps(rung.local_steps, to.encoder.local_steps),
+                    midpoint_steps: steps(rung.midpoint_steps, to.encoder.midpoint_steps),
+                    ..to.encoder.clone()
+                }),
+            })
+            .collect();
         to.depth.range = match options.depth_range {
             DepthRange::Percentiles => input::DepthRange::Percentiles,
             DepthRange::Fixed { near_m, far_m } => input::DepthRange::Fixed { near_m, far_m },

@@ -92,6 +92,7 @@ impl SessionOptions {
                 height,
                 width,
                 backend: None,
+                encoder: None,
             }],
             quality: Quality::Adaptive,
             target_rate_hz: None,

@@ -10,7 +10,7 @@ use phasefront::input::{
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{DropReason, Event, Quality, Rung, RunningMode, Submission, Thermal};
 use phasefront::target::Response;
-use phasefront::{Brightness, Display, Error, Method, Session, SessionOptions, Sweep, Target};
+use phasefront::{Brightness, Display, EncoderOptions, Error, Method, Session, SessionOptions, Sweep, Target};
 use std::sync::mpsc;
 
 const W: usize = 64;
@@ -496,6 +496,13 @@ fn options_that_cannot_be_meant_are_named() {
         });
     };
     refuse(&worse, "rung 1: sweep: 0 planes");
+    let worse = |o: &mut SessionOptions| {
+        o.ladder[0].encoder = Some(EncoderOptions {
+            local_steps: 9,
+            ..Default::default()
+        });
+    };
+    refuse(&worse, "at most 8");
     refuse(&|o| o.encoder.brightness = Brightness::Fixed(0.0), "full light");
     refuse(&|o| o.depth.least_confidence = 2.0, "confidence");
     let session = image_session();

@@ -361,6 +361,7 @@ def test_steps_and_dark_can_be_set(display):
     usual = levels()
     assert (levels(dark=0.4, local_steps=1) == usual).all()
     assert (levels(local_steps=0) != usual).any()
+    assert (levels(midpoint_steps=1) != usual).any()
     with pytest.raises(PhasefrontError, match="at most 8"):
         levels(local_steps=9)
     with pytest.raises(PhasefrontError, match="from 0 to 1"):

@@ -299,6 +299,13 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(try Session(options, mode: .image).process(still()).levels(), levels)
         options.localSteps = 0
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        options = usual
+        options.midpointSteps = 1
+        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        options.midpointSteps = 0
+        options.ladder[0].midpointSteps = 1
+        XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
+        options = usual
         options.localSteps = 9
         assertRefused("at most 8") { try Session(options, mode: .image) }
         (options.dark, options.localSteps) = (2, nil)

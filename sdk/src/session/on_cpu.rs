@@ -26,7 +26,7 @@ impl OnCpu {
     pub(super) fn new(options: &SessionOptions, rung: &Rung) -> Result<Self> {
         let (height, width) = (rung.height, rung.width);
         let method = rung.method.clone();
-        let pipeline = Pipeline::new((height, width), method, &options.target, &options.encoder)?;
+        let pipeline = Pipeline::new((height, width), method, &options.target, rung.encoder(options))?;
         let bits = options.target.display.bits();
         Ok(OnCpu {
             scratch: pipeline.scratch(),
@@ -49,7 +49,7 @@ impl OnCpu {
             (rung.height, rung.width),
             rung.method.clone(),
             &options.target,
-            &options.encoder,
+            rung.encoder(options),
         )
         .map(|_| ())
     }
@@ -62,7 +62,7 @@ impl OnCpu {
         })
     }
 
-    /// Makes the levels of `frame`, whose steady brightness comes from `past`.
+    /// Makes the levels of `frame`, which follows another where there is a `past`.
     pub(super) fn process(&mut self, frame: &RgbdFrame, past: Option<Past>, out: LevelsOut<'_>) -> Result<Encoded> {
         let OnCpu {
             pipeline,

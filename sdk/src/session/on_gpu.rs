@@ -53,7 +53,7 @@ impl OnGpu {
         }
         let shape = (rung.height, rung.width);
         let job = Job {
-            encoder: options.encoder.clone(),
+            encoder: rung.encoder(options).clone(),
             chain: options.gpu.chain,
             ..Job::new(shape, rung.method.clone(), options.target.clone())
         };

@@ -1,10 +1,12 @@
 //! The ladder of qualities, and when a session steps on it.
 
+use super::SessionOptions;
+use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
 use crate::method::Method;
 use std::time::Duration;
 
-/// One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
+/// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its middle.
 #[derive(Clone)]
 pub struct Rung {
     /// What makes the midpoint hologram.
@@ -15,6 +17,15 @@ pub struct Rung {
     pub width: usize,
     /// Where it is computed; None for where all of the session is.
     pub backend: Option<Backend>,
+    /// How its field becomes levels; None for what the session has. So a rung may have fewer steps of correction.
+    pub encoder: Option<EncoderOptions>,
+}
+
+impl Rung {
+    /// How its field becomes levels in a session of `options`.
+    pub(super) fn encoder<'a>(&'a self, options: &'a SessionOptions) -> &'a EncoderOptions {
+        self.encoder.as_ref().unwrap_or(&options.encoder)
+    }
 }
 
 /// Where frames are computed.

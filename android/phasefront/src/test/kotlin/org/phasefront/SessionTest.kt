@@ -306,6 +306,9 @@ class SessionTest {
         val usual = sessionOptions(display)
         assertContentEquals(levels(usual), levels(usual.copy(dark = 0.4f, localSteps = 1u)))
         assertTrue(!levels(usual).contentEquals(levels(usual.copy(localSteps = 0u))))
+        assertTrue(!levels(usual).contentEquals(levels(usual.copy(midpointSteps = 1u))))
+        val rung = usual.ladder[0].copy(midpointSteps = 1u)
+        assertTrue(!levels(usual).contentEquals(levels(usual.copy(ladder = listOf(rung)))))
         assertRefused<PhasefrontException>("at most 8") { Session(usual.copy(localSteps = 9u), RunningMode.IMAGE) }
         assertRefused<PhasefrontException>("from 0 to 1") { Session(usual.copy(dark = 2f), RunningMode.IMAGE) }
     }
