@@ -3,6 +3,7 @@
 import argparse
 import copy
 import itertools
+import shlex
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import torch
 
-from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, rounding, seeds, shards, statistics
+from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, recipe, rounding, seeds, shards, statistics
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -106,6 +107,17 @@ def parser():
     p.add_argument("figures", nargs="+", help="files that evaluate --json and evaluate-encoding --json wrote")
     p.add_argument("-o", "--output", required=True, help="the card, NAME.md beside NAME.onnx")
 
+    p = add("recipe", run_recipe, "Make data, train the networks that come along, round them, judge them and write their cards; called again it goes on. What follows -- goes to every training.")
+    p.add_argument("-o", "--output", required=True, help="folder of all of it")
+    p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
+    p.add_argument("--networks", nargs="+", default=list(recipe.NETWORKS), metavar="NAME", help=f"some of {', '.join(recipe.NETWORKS)} (default all)")
+    p.add_argument("--hours", type=float, default=8.0, help="of training, all networks together (default 8)")
+    p.add_argument("--scenes", type=int, default=2000, help="of each of two kinds (default 2000)")
+    p.add_argument("--size", type=int, default=384, help="pixels a side of a scene (default 384)")
+    p.add_argument("--scene-planes", type=int, default=200, help="planes of the true holograms (default 200)")
+    p.add_argument("--plan", action="store_true", help="print the commands and do nothing")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --device cuda --batch 16 --crop 256")
+
     p = add("plot", run_plot, "Plot the curves of trainings.")
     p.add_argument("folders", nargs="+", help="output folders of trainings")
     p.add_argument("-o", "--output", required=True, help="a .png or .svg file")
@@ -164,6 +176,19 @@ def run_seeds(args):
     seeds.make(data.Manifest.read(args.data), args.output, args.variants, passed_on(args), args.phasefront)
 
 
+def run_recipe(args):
+    settings = recipe.Settings(
+        Path(args.output), args.phasefront, tuple(args.networks), args.hours, args.scenes, args.size, args.scene_planes, tuple(passed_on(args))
+    )
+    recipe.check(settings)
+    if args.plan:
+        for step in recipe.steps(settings):
+            print(shlex.join(step.arguments))
+        return
+    taken = recipe.run(settings)
+    print(f"{args.output}: {taken} steps taken, networks and cards lie there", file=sys.stderr)
+
+
 def run_statistics(args):
     named = {str(folder): statistics.of_data(folder, args.split, args.scenes) for folder in args.data}
     if args.frames:
@@ -176,7 +201,7 @@ def run_statistics(args):
 
 
 def passed_on(args):
-    """What stands behind --, for `phasefront dataset`."""
+    """What stands behind --."""
     return args.arguments[1:] if args.arguments[:1] == ["--"] else args.arguments
 
 

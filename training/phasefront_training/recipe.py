@@ -1,0 +1,147 @@
+"""All shipped networks from nothing: data, trainings, int8, figures, cards. What is done is not done again."""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+KINDS = {"objects": 1, "photographs": 22}  # of scenes, and the data sets' seeds
+INT8_MINUTES = 10.0
+
+
+@dataclass(frozen=True)
+class Network:
+    """A network of stage 1, or a pair of stage 2, and its share of the training time."""
+
+    share: float
+    flags: tuple[str, ...]
+    after: str | None = None  # the network that a pair begins with
+
+    @property
+    def seeded(self):
+        return "seeded" in self.flags
+
+
+def _pair(offset_mm):
+    return Network(0.1, ("--offset-mm", str(offset_mm)), after="rgbd-8")
+
+
+NETWORKS = {
+    "rgbd-8": Network(0.15, ("--layers", "8")),
+    "rgbd-15": Network(0.2, ("--layers", "15")),
+    "rgbd-30": Network(0.25, ("--layers", "30")),
+    "seeded-6": Network(0.1, ("--layers", "6", "--input", "seeded")),
+    "ddpm-8": _pair(0),
+    "ddpm-8-6mm": _pair(6),
+    "ddpm-8-12mm": _pair(12),
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What may differ from machine to machine."""
+
+    output: Path
+    phasefront: str  # the lab's command
+    networks: tuple[str, ...]
+    hours: float  # of training, all networks together
+    scenes: int  # of each kind
+    size: int
+    planes: int
+    training: tuple[str, ...]  # more flags of every training, such as --device cuda
+
+
+@dataclass(frozen=True)
+class Step:
+    """A command of this package."""
+
+    name: str
+    arguments: tuple[str, ...]
+    resumed: Path | None = None  # where this file is, the command goes on with --resume
+
+
+def steps(settings: Settings) -> Iterator[Step]:
+    """All of it, in order."""
+    folder = settings.output
+    chosen = {name: NETWORKS[name] for name in NETWORKS if name in settings.networks}
+    for kind, seed in KINDS.items():
+        scenes = ("--scenes", settings.scenes, "--size", settings.size, "--planes", settings.planes, "--seed", seed, "--scenes-like", kind)
+        yield _step(f"data {kind}", "data", "--phasefront", settings.phasefront, "-o", folder / kind, "--", *scenes)
+        if any(network.seeded for network in chosen.values()):
+            more = ("--", "--refined", 3) if settings.size % 4 == 0 else ()
+            given = ("--data", folder / kind, "-o", folder / f"seeds-{kind}", "--phasefront", settings.phasefront)
+            yield _step(f"seeds {kind}", "seeds", *given, *more)
+    for name, network in chosen.items():
+        yield from _of_network(settings, name, network)
+
+
+def _of_network(settings, name, network):
+    folder = settings.output
+    checkpoint = folder / name / "checkpoint.pt"
+    sets = ("--data", *(folder / kind for kind in KINDS))
+    if network.seeded:
+        sets += ("--seeds", *(folder / f"seeds-{kind}" for kind in KINDS))
+    minutes = 60 * settings.hours * network.share / sum(NETWORKS[each].share for each in settings.networks)
+    begins = ("--init", folder / network.after / "checkpoint.pt") if network.after else ("--dimmed", 0.25)
+    training = ("stage2" if network.after else "stage1", *sets, "-o", folder / name, *network.flags, *begins)
+    training += ("--degraded", 0.5, "--minutes", round(minutes, 3), *settings.training)
+    yield _step(f"train {name}", *training, resumed=checkpoint)
+    for part in ("hologram", "prefilter") if network.after else ("hologram",):
+        stem = name if part == "hologram" else f"{name}-prefilter"
+        yield _step(f"export {stem}", "export", checkpoint, "--network", part, "-o", folder / f"{stem}.onnx")
+        rounded = ("quantize", checkpoint, "--network", part, *sets, "-o", folder / f"{stem}-int8.onnx")
+        yield _step(f"int8 {stem}", *rounded, "--minutes", min(INT8_MINUTES, minutes), *settings.training)
+    figures = []
+    for kind in KINDS:
+        figures.append(folder / f"{name}-{kind}.json")
+        judged = ("--data", folder / kind, "--json", figures[-1])
+        if network.after:
+            yield _step(f"judge {name} {kind}", "evaluate-encoding", checkpoint, *judged)
+        else:
+            judged += ("--seeds", folder / f"seeds-{kind}") if network.seeded else ()
+            files = (folder / f"{name}.onnx", folder / f"{name}-int8.onnx")
+            yield _step(f"judge {name} {kind}", "evaluate", *files, *judged)
+    yield _step(f"card {name}", "card", checkpoint, *figures, "-o", folder / f"{name}.md")
+
+
+def _step(name, *arguments, resumed=None):
+    return Step(name, tuple(str(argument) for argument in arguments), resumed)
+
+
+def check(settings: Settings):
+    """Raises ValueError where the settings ask for what there is not."""
+    if unknown := [name for name in settings.networks if name not in NETWORKS]:
+        raise ValueError(f"no network is called {', '.join(unknown)}; there are {', '.join(NETWORKS)}")
+    for name in settings.networks:
+        if (before := NETWORKS[name].after) and before not in settings.networks:
+            raise ValueError(f"{name} begins with {before}: name both")
+    if not settings.hours > 0:
+        raise ValueError(f"{settings.hours} hours train nothing; --hours must be above 0")
+
+
+def run(settings: Settings, call: Callable[[tuple[str, ...]], int] | None = None) -> int:
+    """Takes every step that is not done yet; gives how many were. A step counts as done with the arguments it had.
+
+    `call` takes a command's arguments and gives its exit status.
+    """
+    done = settings.output / "done.json"
+    known = json.loads(done.read_text()) if done.exists() else {}
+    todo = [step for step in steps(settings) if known.get(step.name) != list(step.arguments)]
+    settings.output.mkdir(parents=True, exist_ok=True)
+    for number, step in enumerate(todo, 1):
+        print(f"{time.strftime('%H:%M')} {number} of {len(todo)}: {step.name}", file=sys.stderr, flush=True)
+        more = ("--resume",) if step.resumed and step.resumed.exists() and step.name not in known else ()
+        if status := (call or _called)((*step.arguments, *more)):
+            raise ValueError(f"'{step.name}' failed with status {status}; mend what it says and call the same command again, which goes on there")
+        known[step.name] = list(step.arguments)
+        written = done.with_suffix(".new")
+        written.write_text(json.dumps(known, indent=1))
+        written.replace(done)
+    return len(todo)
+
+
+def _called(arguments):
+    return subprocess.run([sys.executable, "-m", __package__, *arguments], check=False).returncode
