@@ -15,6 +15,7 @@ mod metadata;
 mod onnx;
 #[cfg(feature = "tract")]
 mod operator;
+mod proto;
 pub mod reference;
 mod rgbd;
 #[cfg(feature = "tract")]
@@ -38,7 +39,6 @@ pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
 use prost::Message;
 #[cfg(feature = "tract")]
 use stock::StockPlan;
-use tract_onnx::pb::ModelProto;
 
 /// Most pixels of a frame on tract, which holds several layers at once: some 500 bytes a pixel.
 #[cfg(feature = "tract")]
@@ -61,7 +61,7 @@ pub struct Network {
     display: TrainedDisplay,
     seed_planes: Option<usize>,
     #[cfg(feature = "tract")]
-    proto: ModelProto,
+    onnx: Box<[u8]>,
 }
 
 impl std::fmt::Debug for Network {
@@ -81,9 +81,9 @@ impl Network {
     /// 2²⁸ bytes or 2¹⁷ parts. What is allocated is at most 4 times the file and 200 MB.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
         bounds::check(bytes)?;
-        let proto = ModelProto::decode(bytes)
+        let model = proto::Model::decode(bytes)
             .map_err(|why| Error::Network(format!("not an ONNX file, or a truncated one: {why}")))?;
-        let graph = proto
+        let graph = model
             .graph
             .as_ref()
             .ok_or_else(|| Error::Network("not an ONNX file: it holds no graph".into()))?;
@@ -93,7 +93,7 @@ impl Network {
             head,
             display,
             seed_planes,
-        } = metadata::read(&proto.metadata_props)?;
+        } = metadata::read(&model.metadata_props)?;
         if chain.inputs != input.channels() {
             return Err(Error::Network(format!(
                 "phasefront.input is '{input}' with {} channels, but the graph's input has {}",
@@ -127,7 +127,7 @@ impl Network {
             display,
             seed_planes,
             #[cfg(feature = "tract")]
-            proto,
+            onnx: bytes.into(),
         })
     }
 
@@ -280,7 +280,7 @@ impl Network {
     #[cfg(feature = "tract")]
     pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
         let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
-        operator::model(&self.proto, chain, self.chain.inputs)
+        operator::model(&self.onnx, chain, self.chain.inputs)
     }
 
     /// Prepares the network on stock tract whatever the fast path could do: the independent check of that path.
@@ -290,7 +290,7 @@ impl Network {
     #[cfg(feature = "tract")]
     pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         check_size(height, width, MAX_STOCK_PIXELS)?;
-        let plan = StockPlan::new(&self.proto, [1, self.chain.inputs, height, width])?;
+        let plan = StockPlan::new(&self.onnx, [1, self.chain.inputs, height, width])?;
         Ok(NetworkPlan {
             input: self.input,
             head: self.head,

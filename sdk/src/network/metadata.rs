@@ -1,10 +1,10 @@
 //! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
 
 use super::Head;
+use super::proto::Entry;
 use crate::display::Display;
 use crate::sweep::MAX_PLANES;
 use crate::{Error, Result};
-use tract_onnx::pb::StringStringEntryProto;
 
 /// What a network's input planes are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -174,7 +174,7 @@ pub(super) struct Description {
 }
 
 /// Reads all that the metadata must say, and what it may.
-pub(super) fn read(metadata: &[StringStringEntryProto]) -> Result<Description> {
+pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
     let input = text(metadata, "input", INPUTS)?;
     let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;
     let heads = "'amplitude-phase' or 'real-imaginary'";
@@ -212,24 +212,24 @@ pub(super) fn read(metadata: &[StringStringEntryProto]) -> Result<Description> {
     })
 }
 
-fn found<'a>(metadata: &'a [StringStringEntryProto], key: &str) -> Option<&'a str> {
+fn found<'a>(metadata: &'a [Entry], key: &str) -> Option<&'a str> {
     metadata
         .iter()
         .find(|entry| entry.key.strip_prefix("phasefront.") == Some(key))
         .map(|entry| entry.value.trim())
 }
 
-fn text<'a>(metadata: &'a [StringStringEntryProto], key: &str, right: &str) -> Result<&'a str> {
+fn text<'a>(metadata: &'a [Entry], key: &str, right: &str) -> Result<&'a str> {
     found(metadata, key)
         .ok_or_else(|| Error::Network(format!("metadata 'phasefront.{key}' is missing; {right} is right")))
 }
 
-fn number(metadata: &[StringStringEntryProto], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
+fn number(metadata: &[Entry], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
     numbers::<1>(metadata, key, right, valid).map(|[one]| one)
 }
 
 fn numbers<const N: usize>(
-    metadata: &[StringStringEntryProto],
+    metadata: &[Entry],
     key: &str,
     right: &str,
     valid: impl Fn(&f64) -> bool,

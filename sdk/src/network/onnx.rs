@@ -5,10 +5,10 @@
 //! be right.
 
 use super::chain::{Chain, InputQuantisation, Layer, Precision, Quantisation, Weights};
+use super::proto::{Graph, Node, ValueInfo, data_type};
 use super::tensor::Constant;
 use crate::{Error, Result};
 use std::collections::HashMap;
-use tract_onnx::pb::{GraphProto, NodeProto, ValueInfoProto, tensor_shape_proto::dimension::Value as Dimension};
 
 /// Most layers, and most channels of one layer, that are taken for a hologram network.
 const MAX_LAYERS: usize = 256;
@@ -62,7 +62,7 @@ enum Value<'a> {
 }
 
 /// Reads `graph` as a residual chain.
-pub(super) fn chain(graph: &GraphProto) -> Result<Chain> {
+pub(super) fn chain(graph: &Graph) -> Result<Chain> {
     let constants = constants(graph)?;
     let mut reader = Reader::new(graph, &constants)?;
     for node in &graph.node {
@@ -74,7 +74,7 @@ pub(super) fn chain(graph: &GraphProto) -> Result<Chain> {
 }
 
 /// How messages call a node.
-fn describe(node: &NodeProto) -> String {
+fn describe(node: &Node) -> String {
     let name = if node.name.is_empty() {
         node.output.first().map_or("", String::as_str)
     } else {
@@ -84,7 +84,7 @@ fn describe(node: &NodeProto) -> String {
 }
 
 /// Initializers and Constant nodes by name.
-fn constants(graph: &GraphProto) -> Result<HashMap<&str, Constant>> {
+fn constants(graph: &Graph) -> Result<HashMap<&str, Constant>> {
     let mut all = HashMap::new();
     for tensor in &graph.initializer {
         all.insert(tensor.name.as_str(), Constant::new(tensor).map_err(Error::Network)?);
@@ -117,7 +117,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn new(graph: &'a GraphProto, constants: &'a HashMap<&str, Constant>) -> Result<Self> {
+    fn new(graph: &'a Graph, constants: &'a HashMap<&str, Constant>) -> Result<Self> {
         let layer_count = graph.node.iter().filter(|node| node.op_type == "Conv").count();
         if !(2..=MAX_LAYERS).contains(&layer_count) {
             return Err(Error::Network(format!(
@@ -166,7 +166,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn read(&mut self, node: &'a NodeProto) -> Read<()> {
+    fn read(&mut self, node: &'a Node) -> Read<()> {
         if !matches!(node.domain.as_str(), "" | "ai.onnx") {
             return Err(format!(
                 "domain '{}' is unknown; only standard ONNX operators serve",
@@ -208,21 +208,21 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn input(&self, node: &NodeProto, k: usize) -> Read<&Value<'a>> {
+    fn input(&self, node: &Node, k: usize) -> Read<&Value<'a>> {
         let name = node.input.get(k).ok_or_else(|| format!("has no input {k}"))?;
         self.values
             .get(name.as_str())
             .ok_or_else(|| format!("reads '{name}', which no earlier node writes"))
     }
 
-    fn activation(&self, node: &NodeProto, k: usize) -> Read<(Step, Option<Quantisation>)> {
+    fn activation(&self, node: &Node, k: usize) -> Read<(Step, Option<Quantisation>)> {
         match self.input(node, k)? {
             Value::Activation { step, rounding } => Ok((*step, *rounding)),
             _ => Err(format!("input '{}' is not an activation in f32", node.input[k])),
         }
     }
 
-    fn constant(&self, node: &NodeProto, k: usize) -> Read<&'a Constant> {
+    fn constant(&self, node: &Node, k: usize) -> Read<&'a Constant> {
         match self.input(node, k)? {
             Value::Constant(constant) => Ok(constant),
             _ => Err(format!("input '{}' must be a constant", node.input[k])),
@@ -230,7 +230,7 @@ impl<'a> Reader<'a> {
     }
 
     /// The scales of a Quantize- or DequantizeLinear, each finite and positive.
-    fn scales(&self, node: &NodeProto) -> Read<&'a [f32]> {
+    fn scales(&self, node: &Node) -> Read<&'a [f32]> {
         let scale = self.constant(node, 1)?.f32s()?;
         if scale.len() > MAX_CHANNELS {
             return Err(format!(
@@ -248,7 +248,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Scale and zero point of an activation's u8 values.
-    fn activation_quantisation(&self, node: &NodeProto) -> Read<Quantisation> {
+    fn activation_quantisation(&self, node: &Node) -> Read<Quantisation> {
         let &[scale] = self.scales(node)? else {
             return Err("activations are quantised per tensor: one scale".into());
         };
@@ -265,7 +265,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn quantize(&self, node: &NodeProto) -> Read<Value<'a>> {
+    fn quantize(&self, node: &Node) -> Read<Value<'a>> {
         let (step, rounding) = self.activation(node, 0)?;
         if rounding.is_some() {
             return Err(format!("rounds {step} a second time; once is right"));
@@ -287,7 +287,7 @@ impl<'a> Reader<'a> {
         Ok(Value::Quantised { step, quantisation })
     }
 
-    fn dequantize(&self, node: &NodeProto) -> Read<Value<'a>> {
+    fn dequantize(&self, node: &Node) -> Read<Value<'a>> {
         match *self.input(node, 0)? {
             Value::Quantised { step, quantisation } => {
                 if self.activation_quantisation(node)? != quantisation {
@@ -317,7 +317,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn convolution(&mut self, node: &NodeProto) -> Read<Value<'a>> {
+    fn convolution(&mut self, node: &Node) -> Read<Value<'a>> {
         let i = self.layers.len();
         check_convolution(node)?;
         let (step, rounding) = self.activation(node, 0)?;
@@ -429,7 +429,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn weights(&self, node: &NodeProto, inputs: usize, rounding: Option<Quantisation>) -> Read<Weights> {
+    fn weights(&self, node: &Node, inputs: usize, rounding: Option<Quantisation>) -> Read<Weights> {
         let (weights, weight_scale) = match self.input(node, 1)? {
             Value::Constant(constant) => (*constant, None),
             Value::Dequantised { constant, scale } => (*constant, Some(scale)),
@@ -489,7 +489,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn relu(&self, node: &NodeProto) -> Read<Value<'a>> {
+    fn relu(&self, node: &Node) -> Read<Value<'a>> {
         match self.activation(node, 0)? {
             (Step::Convolution(i), None) if i < self.last() => Ok(Value::Activation {
                 step: Step::Relu(i),
@@ -499,7 +499,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn sum(&mut self, node: &NodeProto) -> Read<Value<'a>> {
+    fn sum(&mut self, node: &Node) -> Read<Value<'a>> {
         let i = self.layers.len();
         let right = || match Chain::has_skip(i) {
             true => format!("input[{i}] = output[{}] + input[{}] is right", i - 1, i - 2),
@@ -529,7 +529,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn concatenation(&mut self, node: &NodeProto) -> Read<Value<'a>> {
+    fn concatenation(&mut self, node: &Node) -> Read<Value<'a>> {
         let i = self.layers.len();
         let features = self.features(i);
         if i != self.last() || i == 0 {
@@ -555,7 +555,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn tanh(&self, node: &NodeProto) -> Read<Value<'a>> {
+    fn tanh(&self, node: &Node) -> Read<Value<'a>> {
         match self.activation(node, 0)? {
             (Step::Convolution(i), None) if i == self.last() => Ok(Value::Activation {
                 step: Step::Tanh,
@@ -565,7 +565,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn finish(self, graph: &GraphProto) -> Result<Chain> {
+    fn finish(self, graph: &Graph) -> Result<Chain> {
         let [output] = &graph.output[..] else {
             return Err(Error::Network(format!(
                 "{} outputs; a hologram network has one",
@@ -604,13 +604,12 @@ impl<'a> Reader<'a> {
 }
 
 /// The channel count of the graph's input, `(1, C, H, W)` in f32.
-fn input_channels(input: &ValueInfoProto) -> Result<usize> {
-    use tract_onnx::pb::{tensor_proto::DataType, type_proto::Value as Type};
+fn input_channels(input: &ValueInfo) -> Result<usize> {
     let wrong = |what: String| Error::Network(format!("input '{}' {what}; f32 (1, C, H, W) is right", input.name));
-    let Some(Type::TensorType(tensor)) = input.r#type.as_ref().and_then(|t| t.value.as_ref()) else {
+    let Some(tensor) = input.r#type.as_ref().and_then(|t| t.tensor.as_ref()) else {
         return Err(wrong("is no tensor".into()));
     };
-    if tensor.elem_type != DataType::Float as i32 {
+    if tensor.elem_type != data_type::FLOAT {
         return Err(wrong("is not f32".into()));
     }
     let dims = tensor.shape.as_ref().map_or(&[][..], |shape| &shape.dim[..]);
@@ -620,18 +619,18 @@ fn input_channels(input: &ValueInfoProto) -> Result<usize> {
     if dims.len() != 4 {
         return Err(wrong(format!("has {} dimensions", dims.len())));
     }
-    if matches!(batch.value, Some(Dimension::DimValue(n)) if n != 1) {
+    if batch.value.is_some_and(|n| n != 1) {
         return Err(wrong("has a batch that is not 1".into()));
     }
     match channels.value {
-        Some(Dimension::DimValue(c)) if (1..=MAX_CHANNELS as i64).contains(&c) => Ok(c as usize),
-        Some(Dimension::DimValue(c)) => Err(wrong(format!("has {c} channels, not 1 to {MAX_CHANNELS}"))),
+        Some(c) if (1..=MAX_CHANNELS as i64).contains(&c) => Ok(c as usize),
+        Some(c) => Err(wrong(format!("has {c} channels, not 1 to {MAX_CHANNELS}"))),
         _ => Err(wrong("states no channel count".into())),
     }
 }
 
 /// A convolution's attributes: 3×3, stride 1, dilation 1, one group, padding 1 on each side.
-fn check_convolution(node: &NodeProto) -> Read<()> {
+fn check_convolution(node: &Node) -> Read<()> {
     for attribute in &node.attribute {
         let ints = &attribute.ints[..];
         let right = match attribute.name.as_str() {
@@ -722,6 +721,6 @@ fn spread(scale: &[f32], outputs: usize) -> Option<Vec<f32>> {
     }
 }
 
-fn int_attribute(node: &NodeProto, name: &str) -> Option<i64> {
+fn int_attribute(node: &Node, name: &str) -> Option<i64> {
     node.attribute.iter().find(|a| a.name == name).map(|a| a.i)
 }

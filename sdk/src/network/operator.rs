@@ -3,19 +3,18 @@
 use super::fused::{FusedChain, FusedScratch};
 use crate::{Error, Result};
 use std::sync::Arc;
-use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::*;
 
 /// Loads the network's graph and puts one operator in place of all between its input and its output. Height and width
 /// stay symbols.
-pub(super) fn model(proto: &ModelProto, chain: FusedChain, channels: usize) -> Result<TypedModel> {
+pub(super) fn model(file: &[u8], chain: FusedChain, channels: usize) -> Result<TypedModel> {
     let build = || -> TractResult<TypedModel> {
         let symbols = SymbolScope::default();
         let (height, width) = (symbols.sym("H"), symbols.sym("W"));
         let shape = [1.to_dim(), channels.to_dim(), height.to_dim(), width.to_dim()];
         let mut model = tract_onnx::onnx()
-            .model_for_proto_model_with_model_template(proto, template(symbols))?
+            .model_for_proto_model_with_model_template(&super::stock::proto(file)?, template(symbols))?
             .with_input_fact(0, f32::fact(shape).into())?
             .into_typed()?
             .into_decluttered()?;

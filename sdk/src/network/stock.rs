@@ -2,7 +2,6 @@
 
 use crate::{Error, Result};
 use std::sync::Arc;
-use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 
 /// The graph optimised for one frame size.
@@ -12,10 +11,10 @@ pub(super) struct StockPlan {
 }
 
 impl StockPlan {
-    pub(super) fn new(proto: &ModelProto, shape: [usize; 4]) -> Result<StockPlan> {
+    pub(super) fn new(file: &[u8], shape: [usize; 4]) -> Result<StockPlan> {
         let model = || -> TractResult<_> {
             tract_onnx::onnx()
-                .model_for_proto_model(proto)?
+                .model_for_proto_model(&proto(file)?)?
                 .with_input_fact(0, f32::fact(shape).into())?
                 .into_optimized()?
                 .into_runnable()
@@ -37,6 +36,11 @@ impl StockPlan {
         };
         run().map_err(|why| Error::Network(one_line(&why)))
     }
+}
+
+/// The file as tract reads it.
+pub(super) fn proto(file: &[u8]) -> TractResult<tract_onnx::pb::ModelProto> {
+    Ok(prost::Message::decode(file)?)
 }
 
 pub(super) fn one_line(why: &TractError) -> String {

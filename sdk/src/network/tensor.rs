@@ -1,6 +1,6 @@
 //! Constant tensors of an ONNX file, checked once: as many values as the shape says, real values finite.
 
-use tract_onnx::pb::{TensorProto, tensor_proto::DataType};
+use super::proto::{Tensor, data_type};
 
 /// A constant and its values. Types that a chain has no use for are kept by name, for the message of whoever reads
 /// them.
@@ -21,7 +21,7 @@ enum Values {
 }
 
 impl Constant {
-    pub(super) fn new(tensor: &TensorProto) -> Result<Constant, String> {
+    pub(super) fn new(tensor: &Tensor) -> Result<Constant, String> {
         let name = tensor.name.clone();
         if !tensor.external_data.is_empty() || tensor.data_location == Some(1) {
             return Err(format!(
@@ -31,17 +31,16 @@ impl Constant {
         let shape: Option<Vec<usize>> = tensor.dims.iter().map(|&d| usize::try_from(d).ok()).collect();
         let shape = shape.ok_or_else(|| format!("tensor '{name}' has a negative dimension"))?;
         let raw = &tensor.raw_data[..];
-        let values = match DataType::try_from(tensor.data_type) {
-            Ok(DataType::Float) if raw.is_empty() => Values::F32(tensor.float_data.clone()),
-            Ok(DataType::Float) => Values::F32(words(raw).map(f32::from_le_bytes).collect()),
-            Ok(DataType::Int32) if raw.is_empty() => Values::I32(tensor.int32_data.clone()),
-            Ok(DataType::Int32) => Values::I32(words(raw).map(i32::from_le_bytes).collect()),
-            Ok(DataType::Uint8) if raw.is_empty() => Values::U8(tensor.int32_data.iter().map(|&v| v as u8).collect()),
-            Ok(DataType::Uint8) => Values::U8(raw.to_vec()),
-            Ok(DataType::Int8) if raw.is_empty() => Values::I8(tensor.int32_data.iter().map(|&v| v as i8).collect()),
-            Ok(DataType::Int8) => Values::I8(raw.iter().map(|&v| v as i8).collect()),
-            Ok(other) => Values::Other(other.as_str_name()),
-            Err(_) => Values::Other("of an unknown type"),
+        let values = match tensor.data_type {
+            data_type::FLOAT if raw.is_empty() => Values::F32(tensor.float_data.clone()),
+            data_type::FLOAT => Values::F32(words(raw).map(f32::from_le_bytes).collect()),
+            data_type::INT32 if raw.is_empty() => Values::I32(tensor.int32_data.clone()),
+            data_type::INT32 => Values::I32(words(raw).map(i32::from_le_bytes).collect()),
+            data_type::UINT8 if raw.is_empty() => Values::U8(tensor.int32_data.iter().map(|&v| v as u8).collect()),
+            data_type::UINT8 => Values::U8(raw.to_vec()),
+            data_type::INT8 if raw.is_empty() => Values::I8(tensor.int32_data.iter().map(|&v| v as i8).collect()),
+            data_type::INT8 => Values::I8(raw.iter().map(|&v| v as i8).collect()),
+            other => Values::Other(data_type::name(other)),
         };
         let count = match &values {
             Values::F32(v) => Some(v.len()),

@@ -17,7 +17,10 @@ unsafe fn run(taps: &Taps, run: Run<'_>) {
     unsafe { super::filter::<__m256, 2>(taps, run) }
 }
 
-// SAFETY of all below: they run inside `run` alone, which has the instructions.
+#[expect(
+    clippy::undocumented_unsafe_blocks,
+    reason = "all run inside `run` alone, which has the instructions"
+)]
 impl Lanes for __m256 {
     const LANES: usize = 8;
 

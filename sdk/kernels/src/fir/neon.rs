@@ -13,7 +13,7 @@ pub(super) unsafe fn kernel(taps: &Taps, run: Run<'_>) {
     unsafe { super::filter::<float32x4_t, 4>(taps, run) }
 }
 
-// SAFETY of all below: NEON is always there.
+#[expect(clippy::undocumented_unsafe_blocks, reason = "NEON is always there")]
 impl Lanes for float32x4_t {
     const LANES: usize = 4;
 
