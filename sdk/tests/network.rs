@@ -463,6 +463,36 @@ fn what_is_no_onnx_file_is_refused() {
     }
 }
 
+/// What a small file could make of itself in memory.
+#[test]
+fn files_that_would_grow_in_memory_are_refused() {
+    // Scales that are read again and again.
+    let many = |proto: &mut ModelProto| {
+        let graph = proto.graph.as_mut().unwrap();
+        let scale = graph.initializer.iter_mut().find(|t| t.name == "w0_scale").unwrap();
+        scale.dims = vec![250_000];
+        scale.raw_data = 1f32.to_le_bytes().repeat(250_000);
+    };
+    check(&Model::int8(5, 8), many, &["250000 scales", "1024 are the most"]);
+    let attributes = |proto: &mut ModelProto| {
+        node(proto, "conv0").attribute = vec![Default::default(); 1 << 17];
+    };
+    check(&Model::new(5, 8), attributes, &["over 131072 parts"]);
+    // A name of megabytes, with what controls a terminal.
+    let mut proto = Model::new(5, 8).proto();
+    let name = "\u{1b}[2J\n".repeat(1 << 20);
+    let conv = node(&mut proto, "conv1");
+    conv.name = name.clone();
+    conv.op_type = name;
+    let message = refusal(&proto);
+    assert!(
+        message.len() < 3000 && !message.contains(char::is_control),
+        "{}",
+        message.len()
+    );
+    assert!(message.contains("not an operator of the residual chain"), "{message}");
+}
+
 #[test]
 fn every_truncation_is_refused_or_read_without_panic() {
     let whole = Model::int8(2, 1).bytes();

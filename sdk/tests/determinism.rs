@@ -1,0 +1,92 @@
+//! The same frames give the same levels, on every run and on any number of threads, by every method and encoding.
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+mod network_models;
+
+use camera::{Scene, frame};
+use network_models::Model;
+use phasefront::input::DepthFormat;
+use phasefront::session::RunningMode;
+use phasefront::{Display, EncoderOptions, Encoding, Method, Network, Session, SessionOptions, Sweep};
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+/// Odd, and more than one tile, so that parts meet where no power of two does.
+const W: usize = 291;
+const H: usize = 67;
+
+fn network(model: &Model) -> Arc<Network> {
+    Arc::new(Network::from_onnx(&model.bytes()).unwrap())
+}
+
+fn display() -> Display {
+    Display::default().with_size(H, W).unwrap().with_offset_m(2e-3).unwrap()
+}
+
+/// The levels of three frames of a video in which something moves.
+fn video(options: SessionOptions) -> Vec<u8> {
+    let session = Session::new(options, RunningMode::Video).unwrap();
+    let mut levels = Vec::new();
+    for time in 0..3 {
+        let scene = Scene::new(H, W, 40 + 9 * time);
+        let metres = scene.depth_bytes(DepthFormat::MetresF32);
+        let hologram = session
+            .process(&frame(1 + 33_000_000 * time as u64, &scene, &metres))
+            .unwrap();
+        levels.extend_from_slice(hologram.levels());
+    }
+    levels
+}
+
+fn check(name: &str, options: &SessionOptions) {
+    let mut first = None;
+    for threads in [1, 2, 3, 7, 2] {
+        let mut options = options.clone();
+        options.threads = NonZeroUsize::new(threads);
+        let levels = video(options);
+        let first = first.get_or_insert_with(|| levels.clone());
+        assert!(*first == levels, "{name} on {threads} threads");
+    }
+}
+
+#[test]
+fn every_method_gives_the_same_levels_on_any_number_of_threads() {
+    let int8 = network(&Model::int8(8, 8));
+    let sweep = Sweep::for_display(&display());
+    let seeded = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(4, 8)
+    };
+    for (name, method) in [
+        ("int8", Method::Network(int8.clone())),
+        ("f32", Method::Network(network(&Model::new(6, 12)))),
+        ("on tract", Method::Network(network(&Model::new(3, 5)))),
+        ("sweep", Method::Sweep(sweep)),
+        ("seeded", Method::Seeded(network(&seeded))),
+        ("by sharpness", Method::BySharpness(sweep, int8)),
+    ] {
+        check(name, &SessionOptions::new(display(), method));
+    }
+}
+
+#[test]
+fn every_encoding_gives_the_same_levels_on_any_number_of_threads() {
+    let method = Method::Network(network(&Model::int8(5, 8)));
+    let midpoint = EncoderOptions {
+        midpoint_steps: 2,
+        ..EncoderOptions::default()
+    };
+    for (name, encoder) in [
+        ("double phase", Encoding::DoublePhase.into()),
+        ("anti-alias", Encoding::ANTI_ALIAS.into()),
+        ("band limit", Encoding::BAND_LIMIT.into()),
+        ("pre-filter", Encoding::Deep(network(&Model::prefilter("2"))).into()),
+        ("midpoint steps", midpoint),
+    ] {
+        let mut options = SessionOptions::new(display(), method.clone());
+        options.encoder = encoder;
+        check(name, &options);
+    }
+}

@@ -1,0 +1,196 @@
+//! A live session under load and faults: every frame is told of once, and neither memory nor threads nor handles grow.
+//! `PHASEFRONT_SOAK=100000 cargo test --release --workspace --test soak -- --nocapture` is the long run.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+
+use camera::{Scene, depth, frame, options};
+use phasefront::input::{CameraFrame, DepthFormat};
+use phasefront::session::{Event, Quality, Rung, RunningMode, Thermal};
+use phasefront::{Session, SessionOptions, Sweep};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+const W: usize = 32;
+const H: usize = 24;
+
+/// What the process holds: bytes of memory, threads, open files.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    bytes: usize,
+    threads: usize,
+    handles: usize,
+}
+
+impl Held {
+    fn now() -> Self {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let number = |key: &str| -> usize {
+            let line = status.lines().find_map(|line| line.strip_prefix(key)).unwrap();
+            line.split_whitespace().next().unwrap().parse().unwrap()
+        };
+        Held {
+            bytes: 1024 * number("VmRSS:"),
+            threads: number("Threads:"),
+            handles: std::fs::read_dir("/proc/self/fd").unwrap().count(),
+        }
+    }
+}
+
+/// What the listener heard.
+#[derive(Default)]
+struct Heard {
+    made: AtomicU64,
+    dropped: AtomicU64,
+    failed: AtomicU64,
+}
+
+/// A ladder of a network and a sweep, so that both are worked with.
+fn ladder() -> SessionOptions {
+    let mut options = options(W, H);
+    let sweep = Sweep::for_display(&options.target.display);
+    options.ladder.push(Rung {
+        method: phasefront::Method::Sweep(sweep),
+        height: H / 2,
+        width: W / 2,
+        backend: None,
+    });
+    options.target_rate_hz = Some(1000.0);
+    options.threads = NonZeroUsize::new(2);
+    options
+}
+
+/// One frame, or a fault; the clock after it.
+fn submit(session: &Session, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<u8>)], now: u64) -> u64 {
+    let (scene, metres) = &scenes[random.random_range(0..scenes.len())];
+    let later = now + random.random_range(1..3_000_000);
+    let submitted = match random.random_range(0..100) {
+        // Nothing is seen, and the frame fails.
+        0 => {
+            let nothing = vec![0; metres.len()];
+            let nothing = depth(&nothing, DepthFormat::MetresF32, W, H);
+            session.submit(&CameraFrame::new(later, scene.colour(), nothing))
+        }
+        // The clock goes back.
+        1 => session.submit(&frame(now / 2, scene, metres)),
+        2 => {
+            session.set_thermal([Thermal::Nominal, Thermal::Critical][random.random_range(0..2)]);
+            session.submit(&frame(later, scene, metres))
+        }
+        3 => {
+            let quality = [Quality::Fixed(0), Quality::Fixed(1), Quality::Adaptive];
+            session.set_quality(quality[random.random_range(0..3)]).unwrap();
+            session.submit(&frame(later, scene, metres))
+        }
+        4 => {
+            session.pause();
+            let told = session.submit(&frame(later, scene, metres));
+            session.resume();
+            told
+        }
+        5 if random.random_bool(0.1) => {
+            session.reset();
+            return 0;
+        }
+        // The camera is slow.
+        6 => {
+            std::thread::sleep(Duration::from_millis(1));
+            session.submit(&frame(later, scene, metres))
+        }
+        _ => session.submit(&frame(later, scene, metres)),
+    };
+    match submitted {
+        Ok(_) => later,
+        Err(_) => now,
+    }
+}
+
+/// `frames` frames with faults through one session; its statistics agree with what was heard.
+fn run(frames: u64, seed: u64) -> Heard {
+    let random = &mut ChaCha8Rng::seed_from_u64(seed);
+    let scenes: Vec<_> = (0..4)
+        .map(|i| {
+            let scene = Scene::new(H, W, 5 * i);
+            let metres = scene.depth_bytes(DepthFormat::MetresF32);
+            (scene, metres)
+        })
+        .collect();
+    let heard = Arc::new(Heard::default());
+    let listener = {
+        let heard = heard.clone();
+        let mut random = ChaCha8Rng::seed_from_u64(seed + 1);
+        let mut kept = Vec::new();
+        move |event| {
+            match event {
+                Event::Hologram(hologram) => {
+                    heard.made.fetch_add(1, Ordering::Relaxed);
+                    // An app holds on to some, in no order.
+                    kept.push(hologram);
+                    if kept.len() > 6 {
+                        kept.swap_remove(random.random_range(0..6));
+                    }
+                }
+                Event::Dropped { .. } => _ = heard.dropped.fetch_add(1, Ordering::Relaxed),
+                Event::Failed { .. } => _ = heard.failed.fetch_add(1, Ordering::Relaxed),
+                _ => {}
+            }
+            if random.random_bool(0.02) {
+                // Without the hook's message on stderr.
+                std::panic::resume_unwind(Box::new("the listener"));
+            }
+        }
+    };
+    let session = Session::new(ladder(), RunningMode::Live(Box::new(listener))).unwrap();
+    let mut now = 1;
+    for sent in 0..frames {
+        now = submit(&session, random, &scenes, now);
+        // At times the camera waits for what it sent, so that some frames are made.
+        while sent % 4 == 0 && session.statistics().pending > 0 {
+            std::thread::yield_now();
+        }
+    }
+    session.close();
+    let s = session.statistics();
+    assert_eq!(s.submitted, s.processed + s.failed + s.refused + s.dropped.total());
+    let told = [&heard.made, &heard.dropped, &heard.failed].map(|count| count.load(Ordering::Relaxed));
+    assert_eq!(told, [s.processed, s.dropped.total(), s.failed]);
+    assert!(
+        s.listener_panics > 0 && s.refused > 0 && s.failed > 0,
+        "no fault was met: {s:?}"
+    );
+    drop(session);
+    Arc::into_inner(heard).unwrap_or_default()
+}
+
+#[test]
+fn nothing_grows_and_nothing_is_lost_under_load_and_faults() {
+    let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(4000, |n| n.parse().unwrap());
+    // Two short runs first, so that all that is made once is there.
+    (0..2).for_each(|seed| _ = run(1000, seed));
+    let before = Held::now();
+    let heard = run(frames, 2);
+    let mut after = Held::now();
+    // Threads end a moment after their pool.
+    for _ in 0..100 {
+        if after.threads <= before.threads {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+        after = Held::now();
+    }
+    println!(
+        "{frames} frames: {:?} made, {:?} dropped, {:?} failed; {before:?}, then {after:?}",
+        heard.made, heard.dropped, heard.failed
+    );
+    assert!(
+        after.threads <= before.threads && after.handles <= before.handles,
+        "{before:?}, then {after:?}"
+    );
+    // A frame's levels and depth are 4 kB; kept, 4000 would be 15 MB.
+    assert!(after.bytes < before.bytes + (8 << 20), "{before:?}, then {after:?}");
+}
