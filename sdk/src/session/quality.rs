@@ -325,7 +325,7 @@ mod tests {
         ladder.rung = 1;
         assert_eq!(ladder.refuse(down).to, 0);
         assert_eq!(ladder.rung(), 0);
-        let slow = steps(&mut ladder, &[90, 0, 12]);
+        let slow = steps(&mut ladder, &[90, 0, 28]);
         assert_eq!((slow.len(), slow[0].1.to), (1, 2));
         assert_eq!(steps(&mut ladder, &[10, 0, 10])[0].1.to, 0);
         let asked =

@@ -70,7 +70,7 @@ pub(super) fn once(radius: usize, target: impl Fn(f64) -> Complex64) -> Coeffici
 /// [`once`] by sums of cosines: the products of two coefficients' bases over all frequencies depend on the sum and the
 /// difference of their numbers alone, and are real.
 fn once_wide(radius: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
-    let samples = 4 * radius + 1;
+    let samples = SAMPLES.max(4 * radius + 1);
     let weights = weights(samples);
     // cos(πkf) of the kth cosine at the ith frequency, which is i/(samples − 1).
     let circle: Vec<f64> = (0..2 * (samples - 1))
