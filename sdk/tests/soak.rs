@@ -59,6 +59,7 @@ fn ladder() -> SessionOptions {
         height: H / 2,
         width: W / 2,
         backend: None,
+        encoder: None,
     });
     options.target_rate_hz = Some(1000.0);
     options.threads = NonZeroUsize::new(2);
