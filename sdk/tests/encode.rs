@@ -198,13 +198,14 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
     }
 }
 
-/// What a colour of (H, W) = `shape` becomes over `distance_m`, the carrier left out, through an aperture of radius 1.
+/// What a colour of (H, W) = `shape` becomes over `distance_m`, the carrier left out, through an aperture of `radius`.
 fn through_aperture(
     plane: &[Complex64],
     (h, w): (usize, usize),
     padded: (usize, usize),
     wavelength_m: f64,
     distance_m: f64,
+    radius: f64,
 ) -> Vec<Complex64> {
     let mut all = Array2::from_elem(padded, Complex64::ZERO);
     for (i, value) in plane.iter().enumerate() {
@@ -218,7 +219,7 @@ fn through_aperture(
         let f2 = square / pitch_m.powi(2);
         let root = (1.0 - wavelength_m.powi(2) * f2).sqrt();
         let phase = -2.0 * std::f64::consts::PI * distance_m * wavelength_m * f2 / (1.0 + root);
-        *value *= if square <= 0.25 {
+        *value *= if square <= 0.25 * radius * radius {
             Complex64::from_polar(1.0, phase)
         } else {
             Complex64::ZERO
@@ -233,13 +234,15 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
     const SCALE: f32 = 1.3;
     let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
     let laser = Illumination::new(beam.view()).unwrap();
-    for (shape @ (h, w), offset_m, light, steps) in [
-        ((61, 47), 0.0, None, 1),
-        ((40, 66), 2e-3, Some(&laser), 2),
-        ((1, 9), -1e-3, None, 3),
-        ((1, 1), 0.0, None, 1),
+    for (shape @ (h, w), offset_m, radius, light, steps) in [
+        ((61, 47), 0.0, 1.0, None, 1),
+        ((40, 66), 2e-3, 0.9, Some(&laser), 2),
+        ((33, 20), 1e-3, 0.3, None, 2),
+        ((1, 9), -1e-3, 1.2, None, 3),
+        ((1, 1), 0.0, 1.0, None, 1),
     ] {
-        let display = Display::default().with_offset_m(offset_m).unwrap();
+        let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+        let display = display.with_offset_m(offset_m).unwrap();
         let target = Target {
             illumination: light.cloned(),
             ..display.clone().with_size(h, w).unwrap().into()
@@ -274,8 +277,9 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
             let start = start
                 .map(|(phase, light)| Complex64::from_polar(*light, f64::from(*phase)))
                 .collect();
-            let to =
-                |distance_m: f64| move |u: &[Complex64]| through_aperture(u, shape, padded, colours[c], distance_m);
+            let to = |distance_m: f64| {
+                move |u: &[Complex64]| through_aperture(u, shape, padded, colours[c], distance_m, radius)
+            };
             let expected = midpoint::reference(to(-offset_m), to(offset_m), &wanted, start, &light, steps);
             let apart =
                 |(e, phase): (&Complex64, &f32)| (e / e.norm() - Complex64::from_polar(1.0, f64::from(*phase))).norm();

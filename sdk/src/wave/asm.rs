@@ -392,7 +392,8 @@ impl Propagator {
             // Rows pass up to one frequency.
             let passing = (0..=height / 2).take_while(|y| passes(fx, *y as f64 / height as f64, radius));
             let passing = passing.count();
-            column[passing..(height + 1 - passing).max(passing)].fill(Complex32::ZERO);
+            let negative = (height + 1 - passing).clamp(passing, height);
+            column[passing..negative].fill(Complex32::ZERO);
             self.transfer.apply(x, column);
         };
         self.fft.convolve(plane, filter, scratch);
