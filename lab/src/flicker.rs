@@ -7,7 +7,7 @@ use crate::ldi::Ldi;
 use crate::scene;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::session::RunningMode;
-use phasefront::{Brightness, Display, Method, Session, SessionOptions};
+use phasefront::{Brightness, Display, EncoderOptions, Method, Session, SessionOptions};
 use serde::Serialize;
 
 /// Noise and missing readings, new in each frame.
@@ -22,8 +22,8 @@ const RANGE_M: (f32, f32) = (0.5, 2.5);
 /// Frames of a second.
 const RATE_HZ: u64 = 30;
 
-/// What steadies a session's frames.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+/// What steadies a session's frames, and how what is shown is corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Its name in tables.
     pub name: &'static str,
@@ -31,29 +31,57 @@ pub struct Setting {
     pub video: bool,
     /// Whether brightness is [`Brightness::Steady`]; if not, it is [`Brightness::FrameMax`].
     pub steady: bool,
+    /// As in [`EncoderOptions`].
+    pub dark: f32,
+    /// As in [`EncoderOptions`].
+    pub local_steps: usize,
+    /// As in [`EncoderOptions`].
+    pub midpoint_steps: usize,
 }
 
-/// Nothing, each, and both.
-pub const SETTINGS: [Setting; 4] = [
-    Setting {
-        name: "each frame by itself",
-        video: false,
-        steady: false,
-    },
+/// All frames by themselves, as usual.
+const ALONE: Setting = Setting {
+    name: "each frame by itself",
+    video: false,
+    steady: false,
+    dark: EncoderOptions::DARK,
+    local_steps: 1,
+    midpoint_steps: 0,
+};
+
+/// Depth and brightness steadied.
+const BOTH: Setting = Setting {
+    name: "both",
+    video: true,
+    steady: true,
+    ..ALONE
+};
+
+/// Nothing steadied, each, and both; then both without correction, and with one step at the midpoint that goes on from
+/// the frame before.
+pub const SETTINGS: [Setting; 6] = [
+    ALONE,
     Setting {
         name: "depth steadied",
         video: true,
-        steady: false,
+        ..ALONE
     },
     Setting {
         name: "brightness steady",
-        video: false,
         steady: true,
+        ..ALONE
+    },
+    BOTH,
+    Setting {
+        name: "both, AA-DPM as published",
+        dark: 0.0,
+        local_steps: 0,
+        ..BOTH
     },
     Setting {
-        name: "both",
-        video: true,
-        steady: true,
+        name: "both, 1 midpoint step",
+        midpoint_steps: 1,
+        ..BOTH
     },
 ];
 
@@ -94,9 +122,15 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
     (SETTINGS.iter())
         .map(|setting| {
             let mut options = SessionOptions::new(display, method.clone());
-            options.encoder.brightness = match setting.steady {
-                true => Brightness::Steady,
-                false => Brightness::FrameMax,
+            options.encoder = EncoderOptions {
+                dark: setting.dark,
+                local_steps: setting.local_steps,
+                midpoint_steps: setting.midpoint_steps,
+                brightness: match setting.steady {
+                    true => Brightness::Steady,
+                    false => Brightness::FrameMax,
+                },
+                ..options.encoder
             };
             let mode = match setting.video {
                 true => RunningMode::Video,
