@@ -118,7 +118,6 @@ impl<'a> Method<'a> {
     }
 
     fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
-        network.check_display(display)?;
         let plan = SeededPlan::new(size, size, network, display)?;
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((3, size, size));
@@ -145,8 +144,7 @@ impl<'a> Method<'a> {
             ))
             .into());
         }
-        network.check_display(display)?;
-        let plan = network.plan(size, size)?;
+        let plan = network.plan_for(size, size, display)?;
         Ok(Self::new(name, move |ldi| {
             let mut field = Array3::zeros((3, size, size));
             let values = field.as_slice_mut().expect("standard layout");

@@ -1,9 +1,10 @@
 //! The networks that come along: they load, and the fast path gives what tract gives.
 #![allow(clippy::unwrap_used)]
 
-use phasefront::Display;
+use phasefront::unstable::method::MethodPlan;
 use phasefront::unstable::network::{self, InputKind};
-use phasefront_lab::scene;
+use phasefront::{Display, Method, RgbdFrame};
+use phasefront_lab::{metrics, scene, sm_lbm};
 use phasefront_models::{DeepPair, NETWORKS, PAIRS, Precision, pair_for};
 
 const PRECISIONS: [Precision; 2] = [Precision::Int8, Precision::Float32];
@@ -82,4 +83,65 @@ fn the_fast_path_agrees_with_tract() {
             assert!(decibels > least, "{model:?}: {decibels} dB");
         }
     }
+}
+
+/// To the paraxial order a hologram depends on λ·z/p² alone: a display of the same or a smaller λ·V/p² is served as well
+/// as the one a network was trained for, by its own exact hologram.
+#[test]
+fn other_displays_are_served_by_physics() {
+    let (height, width) = (128, 160);
+    let scene = scene::random_scene(7, height, width);
+    let ldi = scene::render_ldi_reference(&scene, height, width, 6)
+        .unwrap()
+        .quantized();
+    let front = &ldi.layers[0];
+    let depth = front.depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
+    let frame = RgbdFrame::new(front.rgb.clone(), depth).unwrap();
+    let network = NETWORKS[0].network(Precision::Float32).unwrap();
+    let psnr = |toml: &str| {
+        let display = Display::from_toml(toml).unwrap();
+        let truth = sm_lbm::hologram(&ldi, &display, 100, &|_, _| {}).unwrap();
+        let plan = MethodPlan::new(height, width, Method::trained(network.clone()), &display).unwrap();
+        let mut field = truth.clone();
+        let values = field.as_slice_mut().unwrap();
+        plan.field(&frame, values, &mut plan.scratch()).unwrap();
+        let figures = metrics::compare(field.mapv(|u| u.norm()).view(), truth.mapv(|u| u.norm()).view());
+        figures.unwrap().psnr_overall
+    };
+    let trained = psnr("");
+    for toml in [
+        "pitch_um = 3.74\nvolume_depth_mm = 1.311",
+        "pitch_um = 6.4\nvolume_depth_mm = 3.84",
+        "wavelengths_nm = [660, 532, 440]\nvolume_depth_mm = 5.9",
+        "volume_depth_mm = 3",
+        "pitch_um = 12.5\nvolume_depth_mm = 9",
+    ] {
+        let other = psnr(toml);
+        assert!(other > trained - 0.5, "{toml}: {other} dB for {trained} dB");
+    }
+}
+
+#[test]
+fn displays_beyond_what_was_trained_are_refused() {
+    let network = NETWORKS[0].network(Precision::Float32).unwrap();
+    for (toml, what) in [
+        ("pitch_um = 3.74", "need 4.58 times the range"),
+        ("volume_depth_mm = 6.2", "need 1.03 times the range"),
+        (
+            "wavelengths_nm = [638, 520, 405]",
+            "trained for wavelengths of 638, 520, 450 nm",
+        ),
+    ] {
+        let display = Display::from_toml(toml).unwrap();
+        let why = network.check_display(&display).unwrap_err().to_string();
+        assert!(why.contains(what) && !why.contains('\n'), "{why}");
+    }
+    // A pre-filter too serves the displays of one λ·offset/p².
+    let pair = pair_for(&Display::default().with_offset_m(6e-3).unwrap(), Precision::Int8).unwrap();
+    let fine = Display::from_toml("pitch_um = 4\nvolume_depth_mm = 1.5").unwrap();
+    pair.prefilter
+        .check_prefilter(&fine.clone().with_offset_m(1.5e-3).unwrap())
+        .unwrap();
+    let why = pair.prefilter.check_prefilter(&fine.with_offset_m(6e-3).unwrap());
+    assert!(why.unwrap_err().to_string().contains("1.500 mm on this display"));
 }

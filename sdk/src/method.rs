@@ -96,7 +96,7 @@ impl MethodPlan {
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
         let way = match method {
-            Method::Network(network) => Way::Network(Box::new(network.plan(height, width)?)),
+            Method::Network(network) => Way::Network(Box::new(network.plan_for(height, width, display)?)),
             Method::Seeded(network) => {
                 let plan = SeededPlan::new(height, width, &network, display)?;
                 Way::Seeded(Box::new(plan))

@@ -53,6 +53,23 @@ pub trait Source: Sync {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]);
 }
 
+/// What a network reads of another display: depth, which comes minus ½, times a scale.
+struct Stretched<'a, S: ?Sized> {
+    source: &'a S,
+    input: InputKind,
+    depth_scale: f32,
+}
+
+impl<S: Source + ?Sized> Source for Stretched<'_, S> {
+    #[inline(always)]
+    fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
+        self.source.read(plane, row, from, into);
+        if self.depth_scale != 1.0 && self.input.is_depth(plane) {
+            into.iter_mut().for_each(|d| *d *= self.depth_scale);
+        }
+    }
+}
+
 /// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
 pub struct Network {
     chain: Chain,
@@ -166,18 +183,28 @@ impl Network {
         &self.display
     }
 
-    /// Checks that it was trained for a display like `display`: on another it gives wrong depths.
+    /// What depths of frames for `display` are stretched by about the middle of the volume for this network to give their
+    /// hologram, from 0 to 1: (λ·V/p²) over that of the display it was trained for. To the paraxial order a hologram
+    /// without its carrier depends on λ·z/p² alone.
     ///
     /// # Errors
-    /// A pitch, wavelength or volume that differs by over 2 %.
-    pub fn check_display(&self, display: &Display) -> Result<()> {
-        self.display.check(display)
+    /// [`Error::Network`] for a display of a larger λ·V/p², or one whose lasers differ by over 5 % from one stretch.
+    pub fn depth_scale(&self, display: &Display) -> Result<f32> {
+        Ok(self.display.depth_scale(display)?.min(1.0) as f32)
     }
 
-    /// Checks that this pre-filter was trained for a display like `display`, its offset included.
+    /// Checks that it serves `display`.
     ///
     /// # Errors
-    /// As [`Self::check_display`], or an offset that differs by over 20 µm.
+    /// As [`Self::depth_scale`].
+    pub fn check_display(&self, display: &Display) -> Result<()> {
+        self.depth_scale(display).map(|_| ())
+    }
+
+    /// Checks that this pre-filter serves `display`, its offset included: λ·offset/p² is the one it was trained for.
+    ///
+    /// # Errors
+    /// As [`Self::depth_scale`], or an offset that differs by over 20 µm at the pitch it was trained for.
     pub fn check_prefilter(&self, display: &Display) -> Result<()> {
         self.display.check_offset(display)
     }
@@ -187,7 +214,19 @@ impl Network {
         self.seed_planes
     }
 
-    /// Prepares the network for frames of `height` × `width` pixels, on the fastest path that runs it.
+    /// [`Self::plan`] for frames whose depth is for `display`.
+    ///
+    /// # Errors
+    /// As [`Self::plan`] and [`Self::depth_scale`].
+    pub fn plan_for(&self, height: usize, width: usize, display: &Display) -> Result<NetworkPlan> {
+        Ok(NetworkPlan {
+            depth_scale: self.depth_scale(display)?,
+            ..self.plan(height, width)?
+        })
+    }
+
+    /// Prepares the network for frames of `height` × `width` pixels, whose depth is for the display it was trained for, on
+    /// the fastest path that runs it.
     ///
     /// # Errors
     /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
@@ -226,6 +265,7 @@ impl Network {
         Ok(NetworkPlan {
             input: self.input,
             head: self.head,
+            depth_scale: 1.0,
             height,
             width,
             path: Path::Fused(chain),
@@ -294,6 +334,7 @@ impl Network {
         Ok(NetworkPlan {
             input: self.input,
             head: self.head,
+            depth_scale: 1.0,
             height,
             width,
             path: Path::Stock(plan),
@@ -339,6 +380,8 @@ enum Path {
 pub struct NetworkPlan {
     input: InputKind,
     head: Head,
+    /// What depths are stretched by about the middle.
+    depth_scale: f32,
     height: usize,
     width: usize,
     path: Path,
@@ -423,6 +466,11 @@ impl NetworkPlan {
     ) -> Result<()> {
         self.check("field", field.len(), 3)?;
         let size = self.size();
+        let source = &Stretched {
+            source,
+            input: self.input,
+            depth_scale: self.depth_scale,
+        };
         match &self.path {
             Path::Fused(chain) => {
                 chain.field(source, (self.input, self.head), field, size, &scratch.fused);

@@ -44,7 +44,7 @@ impl SeededPlan {
         let sweep = seed(network, display);
         Ok(SeededPlan {
             sweep: SweepPlan::new(height, width, display, sweep, 0.0)?,
-            network: network.plan(height, width)?,
+            network: network.plan_for(height, width, display)?,
         })
     }
 

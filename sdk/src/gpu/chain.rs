@@ -597,7 +597,7 @@ impl GpuNetworkPlan {
         device.guarded(|| {
             let chain = network.chain();
             let numbers = Numbers::of(device, chain, options.float)?;
-            let packer = Packer::new(device, Form::Chain(chain, numbers), size, Source::Planes, None)?;
+            let packer = Packer::new(device, Form::Chain(chain, numbers, 1.0), size, Source::Planes, None)?;
             let (input, fusion) = (&packer.input, options.fusion);
             let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
             Ok(GpuNetworkPlan {

@@ -18,8 +18,8 @@ use source::{Frames, Reader};
 /// What a [`Packer`] writes.
 #[derive(Clone, Copy)]
 pub(super) enum Form<'a> {
-    /// The input of a chain in its numbers.
-    Chain(&'a Chain, Numbers),
+    /// The input of a chain in its numbers, depth stretched by so much about the middle.
+    Chain(&'a Chain, Numbers, f32),
     /// Red, green, blue and depth of each pixel, f32, as they are: what the plane sweep reads.
     Surfaces,
 }
@@ -27,14 +27,14 @@ pub(super) enum Form<'a> {
 impl Form<'_> {
     fn channels(&self) -> usize {
         match self {
-            Form::Chain(chain, _) => chain.inputs,
+            Form::Chain(chain, ..) => chain.inputs,
             Form::Surfaces => GROUP,
         }
     }
 
     fn numbers(&self) -> Numbers {
         match self {
-            Form::Chain(_, numbers) => *numbers,
+            Form::Chain(_, numbers, _) => *numbers,
             Form::Surfaces => Numbers::F32,
         }
     }
@@ -48,14 +48,14 @@ impl Form<'_> {
             Numbers::F32 => ("", include_str!("input/float.wgsl")),
         };
         let channels = self.channels();
+        let (middle, scale) = match self {
+            Form::Chain(.., scale) => (0.5, *scale),
+            Form::Surfaces => (0.0, 1.0),
+        };
         let header = format!(
-            "{enable}alias Value = {};\nconst CHANNELS: u32 = {channels}u;\nconst GROUPS: u32 = {}u;\nconst MIDDLE: f32 = {:?};\n",
+            "{enable}alias Value = {};\nconst CHANNELS: u32 = {channels}u;\nconst GROUPS: u32 = {}u;\nconst MIDDLE: f32 = {middle:?};\nconst DEPTH_SCALE: f32 = {scale:?};\n",
             numbers.value(),
             channels.div_ceil(GROUP),
-            match self {
-                Form::Chain(..) => 0.5,
-                Form::Surfaces => 0.0,
-            },
         );
         header + &reader.header + include_str!("input/pack.wgsl") + &reader.text + store
     }
@@ -130,7 +130,7 @@ impl Packer {
             arguments.push((2, second.as_entire_binding()));
         }
         let steps = match form {
-            Form::Chain(chain, Numbers::Int8) => Some(rounding::steps(device, chain)?),
+            Form::Chain(chain, Numbers::Int8, _) => Some(rounding::steps(device, chain)?),
             _ => None,
         };
         if let Some(steps) = &steps {
@@ -217,7 +217,7 @@ mod tests {
                 }
                 let source = Source::Frame(colour, Depth::U16);
                 let size = (height, width);
-                let form = Form::Chain(network.chain(), numbers);
+                let form = Form::Chain(network.chain(), numbers, 1.0);
                 let packer = device
                     .guarded(|| Packer::new(&device, form, size, source, None))
                     .unwrap();

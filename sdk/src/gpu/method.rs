@@ -31,15 +31,16 @@ enum Way {
 struct Trained {
     network: Arc<Network>,
     numbers: Numbers,
+    depth_scale: f32,
     chain: ChainPlan,
 }
 
 impl Trained {
-    /// Plans `network` on what `packer` writes.
+    /// Plans `network`, in numbers and with its depth stretched, on what `packer` writes.
     fn new(
         device: &Device,
         network: &Arc<Network>,
-        numbers: Numbers,
+        (numbers, depth_scale): (Numbers, f32),
         size: (usize, usize),
         packer: &Packer,
         options: ChainOptions,
@@ -49,6 +50,7 @@ impl Trained {
         Ok(Trained {
             network: network.clone(),
             numbers,
+            depth_scale,
             chain: ChainPlan::new(device, chain, numbers, size, &packer.input, end, fusion)?,
         })
     }
@@ -65,7 +67,10 @@ impl MethodPlan {
         options: ChainOptions,
     ) -> Result<Self> {
         let source = Source::Frame(formats.0, formats.1);
-        let numbers = |network: &Network| Numbers::of(device, network.chain(), options.float);
+        let how = |network: &Network| {
+            let numbers = Numbers::of(device, network.chain(), options.float)?;
+            Ok::<_, GpuError>((numbers, network.depth_scale(display)?))
+        };
         let swept = |plan: SweepPlan| {
             let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
             let sweep = Sweeper::new(device, &plan, display, &packer.input.first)?;
@@ -74,10 +79,10 @@ impl MethodPlan {
         let (height, width) = size;
         let (packer, way) = match method {
             Method::Network(network) => {
-                let numbers = numbers(network)?;
-                let form = Form::Chain(network.chain(), numbers);
+                let how = how(network)?;
+                let form = Form::Chain(network.chain(), how.0, how.1);
                 let packer = Packer::new(device, form, size, source, None)?;
-                let trained = Trained::new(device, network, numbers, size, &packer, options)?;
+                let trained = Trained::new(device, network, how, size, &packer, options)?;
                 (packer, Way::Network(trained))
             }
             Method::Sweep(sweep) => {
@@ -88,11 +93,11 @@ impl MethodPlan {
                 let sweep = seed(network, display);
                 let plan = SweepPlan::new(height, width, display, sweep, 0.0)?;
                 let (packer, sweep) = swept(plan)?;
-                let numbers = numbers(network)?;
-                let form = Form::Chain(network.chain(), numbers);
+                let how = how(network)?;
+                let form = Form::Chain(network.chain(), how.0, how.1);
                 let source = Source::Seeded(&packer.input.first, &sweep.field);
                 let seeded = Packer::new(device, form, size, source, None)?;
-                let trained = Trained::new(device, network, numbers, size, &seeded, options)?;
+                let trained = Trained::new(device, network, how, size, &seeded, options)?;
                 (packer, Way::Seeded(sweep, Box::new(seeded), trained))
             }
             Method::BySharpness(..) => {
@@ -111,7 +116,7 @@ impl MethodPlan {
             return Ok(());
         }
         let form = match &self.way {
-            Way::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers),
+            Way::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
             Way::Sweep(_) | Way::Seeded(..) => Form::Surfaces,
         };
         let source = Source::Frame(formats.0, formats.1);

@@ -57,6 +57,15 @@ impl InputKind {
         }
     }
 
+    /// Whether a plane of it holds depth.
+    pub(super) fn is_depth(self, plane: usize) -> bool {
+        match self {
+            InputKind::Rgbd | InputKind::RgbdXy | InputKind::Seeded => plane == 3,
+            InputKind::Ldi { .. } => plane % 4 == 3,
+            InputKind::Field | InputKind::BlurredField | InputKind::SplitBlurredField => false,
+        }
+    }
+
     /// Whether a network for it is a pre-filter.
     pub fn is_field(self) -> bool {
         self == InputKind::Field || self.is_blurred()
@@ -100,11 +109,14 @@ impl std::fmt::Display for InputKind {
 /// What `phasefront.input` may be.
 const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
 
-/// How far the modulator may stand from where a pre-filter was trained for: what light spreads over it stays below a
-/// tenth of a pixel of 8 µm.
+/// How far the modulator may stand from where a pre-filter was trained for, as at the display it was trained for: what
+/// light spreads over it stays below a tenth of a pixel of 8 µm.
 const OFFSET_TOLERANCE_M: f64 = 20e-6;
-/// How far a display may lie from what a network was trained for, relative.
-const DISPLAY_TOLERANCE: f64 = 0.02;
+/// How far λ·V/p² may lie over what a network was trained for, relative.
+const RANGE_TOLERANCE: f64 = 0.02;
+/// How far a colour's own λ·V/p² may lie from the mean over the colours, relative: 35 dB from its exact hologram, which
+/// is more than networks have.
+const COLOUR_TOLERANCE: f64 = 0.05;
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,43 +132,55 @@ pub struct TrainedDisplay {
 }
 
 impl TrainedDisplay {
-    /// Checks that a network for this display is one for `display`: on another it gives wrong depths.
+    /// What depths d of frames for `display` are stretched by about the middle of the volume, d' = ½ + s·(d − ½), for a
+    /// network for this display to give their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over the colours.
+    ///
+    /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display of
+    /// another pitch, volume or laser is one for this display with its depth stretched.
     ///
     /// # Errors
-    /// A pitch, wavelength or volume that differs by over 2 %.
-    pub(super) fn check(&self, display: &Display) -> Result<()> {
-        let pairs = [
-            ("pitch", "µm", 1e6, self.pitch_m, display.pitch_m()),
-            ("volume depth", "mm", 1e3, self.volume_depth_m, display.volume_depth_m()),
-        ];
-        let colours = self
-            .wavelengths_m
-            .into_iter()
-            .zip(display.wavelengths_m())
-            .map(|(trained, given)| ("wavelength", "nm", 1e9, trained, given));
-        for (what, unit, scale, trained, given) in pairs.into_iter().chain(colours) {
-            if (trained - given).abs() > DISPLAY_TOLERANCE * trained {
-                return Err(Error::Network(format!(
-                    "it was trained for a {what} of {:.3} {unit}, the display has {:.3}; train one for this display, or use a method without a network",
-                    trained * scale,
-                    given * scale
-                )));
-            }
+    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch.
+    pub(super) fn depth_scale(&self, display: &Display) -> Result<f64> {
+        let trained = self.pitch_m.powi(2) / self.volume_depth_m;
+        let given = display.volume_depth_m() / display.pitch_m().powi(2);
+        let of_colour = |(trained_m, given_m): (f64, f64)| given_m / trained_m * given * trained;
+        let lasers = self.wavelengths_m.into_iter().zip(display.wavelengths_m());
+        let each: Vec<f64> = lasers.map(of_colour).collect();
+        let scale = each.iter().sum::<f64>() / 3.0;
+        if each.iter().any(|own| (own - scale).abs() > COLOUR_TOLERANCE * scale) {
+            let nm = |all: [f64; 3]| all.map(|m| format!("{:.0}", m * 1e9)).join(", ");
+            return Err(Error::Network(format!(
+                "it was trained for wavelengths of {} nm, the display has {}; train one for this display, or use a method without a network",
+                nm(self.wavelengths_m),
+                nm(display.wavelengths_m())
+            )));
         }
-        Ok(())
+        if scale > 1.0 + RANGE_TOLERANCE {
+            return Err(Error::Network(format!(
+                "it was trained for depths of {:.3} mm at a pitch of {:.3} µm, the display's {:.3} mm at {:.3} µm need {scale:.2} times the range; train one for this display, or use a method without a network",
+                self.volume_depth_m * 1e3,
+                self.pitch_m * 1e6,
+                display.volume_depth_m() * 1e3,
+                display.pitch_m() * 1e6
+            )));
+        }
+        Ok(scale)
     }
 
-    /// [`Self::check`], and that a pre-filter for this display is one for `display`'s offset.
+    /// Checks that a pre-filter for this display is one for `display`: that λ·offset/p² is the same.
     ///
     /// # Errors
-    /// As that, or an offset that differs by over 20 µm.
+    /// As [`Self::depth_scale`], or an offset that differs by over 20 µm at the pitch it was trained for.
     pub(super) fn check_offset(&self, display: &Display) -> Result<()> {
-        self.check(display)?;
+        self.depth_scale(display)?;
+        let mean = |all: [f64; 3]| all.iter().sum::<f64>() / 3.0;
+        let finer = (self.pitch_m / display.pitch_m()).powi(2);
+        let longer = mean(display.wavelengths_m()) / mean(self.wavelengths_m);
         let (trained, given) = (self.offset_m, display.offset_m());
-        if (trained - given).abs() > OFFSET_TOLERANCE_M {
+        if (trained - given * finer * longer).abs() > OFFSET_TOLERANCE_M {
             return Err(Error::Network(format!(
-                "the pre-filter was trained for an offset of {:.3} mm, the display has {:.3} mm; take one for this offset, or another encoder",
-                trained * 1e3,
+                "the pre-filter was trained for an offset that is {:.3} mm on this display, which has {:.3} mm; take one for this offset, or another encoder",
+                trained / (finer * longer) * 1e3,
                 given * 1e3
             )));
         }

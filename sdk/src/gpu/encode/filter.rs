@@ -130,7 +130,7 @@ impl Prefilter {
         };
         let chain = network.chain();
         let numbers = Numbers::of(device, chain, job.chain.float)?;
-        let (form, source) = (Form::Chain(chain, numbers), Source::Field(job.field, kind));
+        let (form, source) = (Form::Chain(chain, numbers, 1.0), Source::Field(job.field, kind));
         let packer = Packer::new(device, form, size, source, None)?;
         let end = End::Field(network.head(), kind);
         let (input, fusion) = (&packer.input, job.chain.fusion);

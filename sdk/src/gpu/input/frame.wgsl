@@ -1,4 +1,5 @@
-// Channels from colour and depth, each minus the MIDDLE of what the form holds, and of a second group the place in the
+// Channels from colour and depth, each minus the MIDDLE of what the form holds, depth
+// stretched about it, and of a second group the place in the
 // frame. Goes behind pack.wgsl and planar.wgsl or camera.wgsl, which know what `colour` holds.
 
 @group(0) @binding(2) var<storage, read> depth: array<u32>;
@@ -25,5 +26,6 @@ fn channels(group: u32, x: u32, y: u32) -> vec4f {
         let place = (vec2f(vec2u(x, y)) + 0.5) / vec2f(vec2u(frame.width, frame.height)) - 0.5;
         return vec4f(place, 0.0, 0.0);
     }
-    return vec4f(rgb(x, y), distance_at(y * frame.width + x)) - MIDDLE;
+    let value = vec4f(rgb(x, y), distance_at(y * frame.width + x)) - MIDDLE;
+    return vec4f(value.rgb, value.a * DEPTH_SCALE);
 }

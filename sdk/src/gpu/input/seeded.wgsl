@@ -1,4 +1,4 @@
-// Channels of a seeded network: colour and depth, each minus a half, and the sweep's field u as ½(Re u − ½) and ½ Im u
+// Channels of a seeded network: colour and depth, each minus a half, depth stretched, and the sweep's field u as ½(Re u − ½) and ½ Im u
 // of the three colours; see seeded.rs. Goes behind pack.wgsl.
 
 // Red, green, blue, depth.
@@ -7,7 +7,7 @@
 
 fn channels(group: u32, x: u32, y: u32) -> vec4f {
     let at = y * frame.width + x;
-    if (group == 0u) { return surfaces[at] - MIDDLE; }
+    if (group == 0u) { return (surfaces[at] - MIDDLE) * vec4f(1, 1, 1, DEPTH_SCALE); }
     let red = seed[at];
     let green = seed[frame.plane + at];
     let blue = seed[2u * frame.plane + at];
