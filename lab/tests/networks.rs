@@ -3,7 +3,7 @@
 
 use phasefront::unstable::method::MethodPlan;
 use phasefront::unstable::network::{self, InputKind};
-use phasefront::{Display, Method, RgbdFrame};
+use phasefront::{Display, Method, Network, RgbdFrame};
 use phasefront_lab::{metrics, scene, sm_lbm};
 use phasefront_models::{DeepPair, NETWORKS, PAIRS, Precision, pair_for};
 
@@ -136,6 +136,10 @@ fn displays_beyond_what_was_trained_are_refused() {
         let why = network.check_display(&display).unwrap_err().to_string();
         assert!(why.contains(what) && !why.contains('\n'), "{why}");
     }
+    let cylinder = Network::from_onnx(include_bytes!("../../models/rgbd-15-cylinder.onnx")).unwrap();
+    cylinder.check_display(&Display::default()).unwrap();
+    let why = cylinder.check_display(&Display::from_toml("volume_depth_mm = 3").unwrap());
+    assert!(why.unwrap_err().to_string().contains("of one display"));
     // A pre-filter too serves the displays of one λ·offset/p².
     let pair = pair_for(&Display::default().with_offset_m(6e-3).unwrap(), Precision::Int8).unwrap();
     let fine = Display::from_toml("pitch_um = 4\nvolume_depth_mm = 1.5").unwrap();

@@ -73,7 +73,7 @@ class Manifest:
 
     @property
     def display(self):
-        return Display.from_manifest(self.table["display"])
+        return Display.from_manifest(self.table["display"], bool(self.table.get("aberration")))
 
     @property
     def like(self):

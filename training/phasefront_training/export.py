@@ -47,6 +47,7 @@ def metadata(architecture, display, offset_m=0.0, seed_planes=None):
         "phasefront.volume_depth_mm": _number(display.volume_depth_m * 1e3),
         "phasefront.offset_mm": _number(offset_m * 1e3),
     }
+    found |= {"phasefront.corrected": "true"} if display.corrected else {}
     return found | ({"phasefront.seed_planes": str(seed_planes)} if architecture.input == "seeded" and seed_planes else {})
 
 
@@ -153,5 +154,6 @@ def read_onnx(path):
         pitch_m=float(found["pitch_um"]) * 1e-6,
         wavelengths_m=tuple(float(w) * 1e-9 for w in found["wavelengths_nm"].split(",")),
         volume_depth_m=float(found["volume_depth_mm"]) * 1e-3,
+        corrected=found.get("corrected") == "true",
     )
     return network, display

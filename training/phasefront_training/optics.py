@@ -20,6 +20,7 @@ class Display:
     pitch_m: float = 8e-6
     wavelengths_m: tuple = (638e-9, 520e-9, 450e-9)
     volume_depth_m: float = 6e-3
+    corrected: bool = False  # whether holograms correct an aberration of its optics: then they are for it alone
 
     def __post_init__(self):
         if len(self.wavelengths_m) != 3:
@@ -28,12 +29,13 @@ class Display:
             raise ValueError("pitch and wavelengths must be positive and the volume's depth not negative")
 
     @classmethod
-    def from_manifest(cls, table):
+    def from_manifest(cls, table, corrected=False):
         """From the `display` table of a data set's manifest (units at the edge: µm, nm, mm)."""
         return cls(
             pitch_m=table["pitch_um"] * 1e-6,
             wavelengths_m=tuple(nm * 1e-9 for nm in table["wavelengths_nm"]),
             volume_depth_m=table["volume_depth_mm"] * 1e-3,
+            corrected=corrected,
         )
 
     def z_m(self, depth):

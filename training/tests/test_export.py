@@ -46,6 +46,13 @@ def test_names_and_metadata_are_the_contract(tmp_path):
     }
 
 
+def test_a_network_for_corrected_optics_says_so(tmp_path):
+    display = Display(corrected=True)
+    write(float_model(Chain(Architecture(4)), display), tmp_path / "n.onnx")
+    assert read_description(tmp_path / "n.onnx")["corrected"] == "true"
+    assert read_onnx(tmp_path / "n.onnx")[1].corrected
+
+
 def test_a_file_of_another_kind_is_refused(tmp_path):
     (tmp_path / "x.onnx").write_bytes(b"nothing")
     with pytest.raises(ExportError, match="x.onnx"):

@@ -129,6 +129,8 @@ pub struct TrainedDisplay {
     pub volume_depth_m: f64,
     /// Distance of the hologram plane from the volume's middle, metres; 0 for a midpoint hologram.
     pub offset_m: f64,
+    /// Whether its holograms correct an aberration of the display's optics, so that they are for it alone.
+    pub corrected: bool,
 }
 
 impl TrainedDisplay {
@@ -139,7 +141,8 @@ impl TrainedDisplay {
     /// another pitch, volume or laser is one for this display with its depth stretched.
     ///
     /// # Errors
-    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch.
+    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch; any
+    /// other display where an aberration is corrected.
     pub(super) fn depth_scale(&self, display: &Display) -> Result<f64> {
         let trained = self.pitch_m.powi(2) / self.volume_depth_m;
         let given = display.volume_depth_m() / display.pitch_m().powi(2);
@@ -147,6 +150,14 @@ impl TrainedDisplay {
         let lasers = self.wavelengths_m.into_iter().zip(display.wavelengths_m());
         let each: Vec<f64> = lasers.map(of_colour).collect();
         let scale = each.iter().sum::<f64>() / 3.0;
+        let same = |trained: f64, given: f64| (trained - given).abs() <= RANGE_TOLERANCE * trained;
+        if self.corrected && !(same(self.pitch_m, display.pitch_m()) && each.iter().all(|own| same(1.0, *own))) {
+            return Err(Error::Network(format!(
+                "it corrects the optics of one display, of {:.3} µm and {:.3} mm, and serves no other; train one for this display",
+                self.pitch_m * 1e6,
+                self.volume_depth_m * 1e3
+            )));
+        }
         if each.iter().any(|own| (own - scale).abs() > COLOUR_TOLERANCE * scale) {
             let nm = |all: [f64; 3]| all.map(|m| format!("{:.0}", m * 1e9)).join(", ");
             return Err(Error::Network(format!(
@@ -219,6 +230,7 @@ pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
         wavelengths_m: wavelengths.map(|nm: f64| nm * 1e-9),
         volume_depth_m: number(metadata, "volume_depth_mm", "a number in mm such as '6.0'", positive)? * 1e-3,
         offset_m: number(metadata, "offset_mm", "a number in mm such as '0'", |v| v.is_finite())? * 1e-3,
+        corrected: found(metadata, "corrected") == Some("true"),
     };
     let seed_planes = match found(metadata, "seed_planes") {
         Some(planes) if input == InputKind::Seeded => {
