@@ -292,7 +292,7 @@ fn a_depth_that_promises_more_than_there_is_is_named() {
     );
     fs::write(folder.path("huge.json"), "{}").unwrap();
     folder.refuses(
-        &["refocus", "huge.npy", "-o", "seen.png"],
+        &["refocus", "huge.npy", "--z-mm", "0", "-o", "seen.png"],
         1,
         &["huge.npy", "is not a whole"],
     );

@@ -184,18 +184,20 @@ class SessionTest {
 
     @Test
     fun whatAListenerThrowsIsCountedAndTheStreamGoesOn() {
-        val heard = LinkedBlockingQueue<SessionEvent>()
-        val session = Session(options(), RunningMode.LIVE_STREAM) {
-            heard.add(it)
-            throw IllegalStateException("no thanks")
-        }
-        session.use {
-            for (i in 1L..3L) {
-                it.submit(still(i))
-                assertIs<SessionEvent.Made>(heard.poll(60, TimeUnit.SECONDS))
+        for (thrown in listOf(IllegalStateException("no thanks"), PhasefrontException.Frame("no thanks"))) {
+            val heard = LinkedBlockingQueue<SessionEvent>()
+            val session = Session(options(), RunningMode.LIVE_STREAM) {
+                heard.add(it)
+                throw thrown
             }
+            session.use {
+                for (i in 1L..3L) {
+                    it.submit(still(i))
+                    assertIs<SessionEvent.Made>(heard.poll(60, TimeUnit.SECONDS))
+                }
+            }
+            assertEquals(3UL, session.statistics().listenerFailures)
         }
-        assertEquals(3UL, session.statistics().listenerFailures)
     }
 
     @Test

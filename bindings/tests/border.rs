@@ -1,0 +1,44 @@
+//! No panic leaves a call: each that the other languages see is inside `guard`, or gives a field.
+#![allow(clippy::unwrap_used)]
+
+use std::path::Path;
+
+/// The exported functions of a file, each from its name to its end.
+fn exported(source: &str) -> Vec<&str> {
+    let mut found = Vec::new();
+    let mut exports = source.match_indices("#[uniffi::export").peekable();
+    while let Some((at, _)) = exports.next() {
+        // To the end of what is exported, a function or an `impl`, which stands at the margin.
+        let block = &source[at..][..source[at..].find("\n}\n").unwrap()];
+        if block.contains("pub trait ") {
+            continue;
+        }
+        let mut functions = block.split("pub fn ");
+        functions.next();
+        found.extend(functions);
+    }
+    found
+}
+
+#[test]
+fn every_exported_call_is_guarded() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut calls = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let source = std::fs::read_to_string(&path).unwrap();
+        for function in exported(&source) {
+            calls += 1;
+            let name = function.split('(').next().unwrap();
+            let body = function.split_once("{\n").unwrap().1;
+            let first = body.lines().find(|line| !line.trim().is_empty()).unwrap().trim();
+            let reads = ["Ok(self", "Ok(env!"].iter().any(|plain| first.starts_with(plain));
+            assert!(
+                first.starts_with("guard(|| ") || reads,
+                "{}: {name} is not inside guard: {first}",
+                path.display()
+            );
+        }
+    }
+    assert!(calls > 30, "{calls} calls were found");
+}
