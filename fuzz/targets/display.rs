@@ -1,0 +1,26 @@
+//! Displays' TOML, and what is planned for a small one.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use phasefront::session::RunningMode;
+use phasefront::{Display, Method, Session, SessionOptions, Sweep};
+
+fuzz_target!(|text: &str| {
+    match Display::from_toml(text) {
+        Err(why) => {
+            let why = why.to_string();
+            assert!(why.chars().count() < 700 && !why.contains(char::is_control), "{why}");
+        }
+        Ok(display) => {
+            let Ok(display) = display.with_size(6, 8) else { return };
+            // Wide volumes take seconds to plan, and are refused beyond what takes many.
+            if display.volume_depth_m() / display.pitch_m() > 2000.0 {
+                return;
+            }
+            let method = Method::Sweep(Sweep::for_display(&display));
+            let mut options = SessionOptions::new(display, method);
+            options.threads = std::num::NonZeroUsize::new(1);
+            let _ = Session::new(options, RunningMode::Image);
+        }
+    }
+});

@@ -1,0 +1,133 @@
+//! Frames of every format, size, stride and orientation through a session in video.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use phasefront::input::{
+    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
+    Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
+};
+use phasefront::session::RunningMode;
+use phasefront::{Display, Method, Result, Session, SessionOptions, Sweep};
+use std::num::NonZeroUsize;
+use std::sync::OnceLock;
+
+/// Numbers from the front of the input, 0 behind its end; what is left is the planes' memory.
+struct Numbers<'a>(&'a [u8]);
+
+impl Numbers<'_> {
+    fn byte(&mut self) -> usize {
+        match self.0.split_first() {
+            Some((first, rest)) => {
+                self.0 = rest;
+                usize::from(*first)
+            }
+            None => 0,
+        }
+    }
+
+    /// Mostly small, at times any.
+    fn size(&mut self) -> usize {
+        match self.byte() {
+            255 => usize::MAX - self.byte(),
+            254 => self.byte() << (self.byte() % 56),
+            small => small % 40,
+        }
+    }
+
+    /// Any float, often a usual one.
+    fn float(&mut self) -> f64 {
+        match self.byte() % 4 {
+            0 => f64::from_bits(std::array::from_fn::<u64, 8, _>(|_| self.byte() as u64).iter().fold(0, |a, b| a << 8 | b)),
+            _ => self.byte() as f64 / 4.0,
+        }
+    }
+
+    fn of<T: Copy>(&mut self, all: &[T]) -> T {
+        all[self.byte() % all.len()]
+    }
+}
+
+fn session() -> &'static Session {
+    static SESSION: OnceLock<Session> = OnceLock::new();
+    SESSION.get_or_init(|| {
+        let display = Display::default().with_size(12, 16).expect("a display");
+        let method = Method::Sweep(Sweep::for_display(&display));
+        let mut options = SessionOptions::new(display, method);
+        options.threads = NonZeroUsize::new(1);
+        Session::new(options, RunningMode::Video).expect("a session")
+    })
+}
+
+fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
+    let yuv = YuvEncoding {
+        matrix: numbers.of(&[YuvMatrix::Bt601, YuvMatrix::Bt709]),
+        video_range: numbers.of(&[false, true]),
+    };
+    let format = numbers.of(&[
+        ColourFormat::Rgba,
+        ColourFormat::Bgra,
+        ColourFormat::Rgb,
+        ColourFormat::Nv12(yuv),
+        ColourFormat::Yuv420(yuv),
+    ]);
+    let (width, height) = (numbers.size(), numbers.size());
+    let strides: Vec<_> = (0..numbers.byte() % 4).map(|_| (4 * numbers.size(), numbers.size())).collect();
+    let depth_format = numbers.of(&[
+        DepthFormat::MetresF32,
+        DepthFormat::MetresF16,
+        DepthFormat::DisparityF32,
+        DepthFormat::DisparityF16,
+        DepthFormat::MillimetresU16,
+        DepthFormat::AndroidDepth16,
+        DepthFormat::NormalizedU8,
+        DepthFormat::NormalizedU16,
+    ]);
+    let (depth_width, depth_height) = (numbers.size(), numbers.size());
+    let depth_strides = (4 * numbers.size(), numbers.size());
+    let confidence = numbers.byte();
+    let orientation = Orientation {
+        rotation: numbers.of(&[Rotation::None, Rotation::Clockwise90, Rotation::Half, Rotation::Clockwise270]),
+        mirrored: numbers.of(&[false, true]),
+    };
+    let cameras = (numbers.byte() % 3 == 0).then(|| {
+        let mut camera = || Intrinsics {
+            fx: numbers.float(),
+            fy: numbers.float(),
+            cx: numbers.float(),
+            cy: numbers.float(),
+        };
+        let mut cameras = Cameras::concentric(camera(), camera());
+        cameras.translation_m = [numbers.float(), numbers.float(), numbers.float()];
+        cameras
+    });
+    let memory = numbers.0;
+    let planes: Vec<_> = strides.iter().map(|(row, pixel)| Plane::new(memory, *row, *pixel)).collect();
+    let colour = ColourImage::new(format, width, height, &planes)?;
+    let plane = Plane::new(memory, depth_strides.0, depth_strides.1);
+    let mut depth = DepthImage::new(depth_format, depth_width, depth_height, plane)?;
+    if confidence % 2 == 1 {
+        let format = [ConfidenceFormat::U8, ConfidenceFormat::LowMediumHigh][confidence / 2 % 2];
+        depth = depth.with_confidence(format, depth_width, depth_height, Plane::new(memory, depth_width, 1))?;
+    }
+    let mut frame = CameraFrame::new(1, colour, depth);
+    frame.orientation = orientation;
+    if let Some(cameras) = cameras {
+        frame.alignment = Alignment::Cameras(cameras);
+    }
+    Ok(frame)
+}
+
+fuzz_target!(|data: &[u8]| {
+    let mut numbers = Numbers(data);
+    let session = session();
+    let made = frame(&mut numbers).and_then(|mut frame| {
+        session.reset();
+        session.process(&frame)?;
+        frame.timestamp_ns = 33_000_000;
+        session.process(&frame)
+    });
+    match made {
+        Ok(hologram) => assert_eq!(hologram.levels().len(), 3 * 12 * 16),
+        Err(why) => assert!(!matches!(why, phasefront::Error::Internal(_)), "{why}"),
+    }
+});

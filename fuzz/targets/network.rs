@@ -1,0 +1,34 @@
+//! ONNX files: read, planned on the kernels and run on a small frame.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use num_complex::Complex32;
+use phasefront::Network;
+use phasefront::unstable::network::Source;
+
+/// Planes of one value.
+struct Flat;
+
+impl Source for Flat {
+    fn read(&self, plane: usize, _: usize, _: usize, into: &mut [f32]) {
+        into.fill(plane as f32 / 16.0 - 0.4);
+    }
+}
+
+fuzz_target!(|file: &[u8]| {
+    match Network::from_onnx(file) {
+        Err(why) => {
+            let why = why.to_string();
+            assert!(why.chars().count() < 700 && !why.contains(char::is_control), "{why}");
+        }
+        // Wide chains are right, and slow.
+        Ok(network) if network.chain().macs_per_pixel() > 200_000 => {}
+        Ok(network) => {
+            let (height, width) = (5, 7);
+            if let Ok(plan) = network.plan(height, width) {
+                let mut field = vec![Complex32::ZERO; 3 * height * width];
+                let _ = plan.field(&Flat, &mut field, &mut plan.scratch());
+            }
+        }
+    }
+});

@@ -1,0 +1,42 @@
+//! What the laboratory reads: the first byte says as what, the rest is the file.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use phasefront_lab::{files, ldi, scene};
+use std::path::Path;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((kind, file)) = data.split_first() else { return };
+    let folder = std::env::temp_dir().join(format!("phasefront-fuzz-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let write = |name: &str| {
+        let path = folder.join(name);
+        std::fs::write(&path, file).expect("a file");
+        path
+    };
+    let told = |result: phasefront_lab::Result<()>| {
+        if let Err(why) = result {
+            assert!(!why.to_string().contains(char::is_control), "{why}");
+        }
+    };
+    let model = |path: &Path| scene::read_model(path, 8, 8, None).map(|_| ());
+    match kind % 8 {
+        0 => told(files::read_rgb(&write("a.png")).map(|_| ())),
+        1 => told(files::read_depth(&write("a.npy"), false).map(|_| ())),
+        2 => told(files::read_hologram(&write("a.png")).map(|_| ())),
+        3 => told(files::read_display(&write("a.toml")).map(|_| ())),
+        4 => told(model(&write("a.glb"))),
+        5 => told(model(&write("a.gltf"))),
+        6 => {
+            write("a.mtl");
+            let obj = folder.join("a.obj");
+            std::fs::write(&obj, [b"mtllib a.mtl\n", file].concat()).expect("a file");
+            told(model(&obj));
+        }
+        _ => {
+            write("layer_0.png");
+            write("depth_0.png");
+            told(ldi::Ldi::read(&folder).map(|_| ()));
+        }
+    }
+});
