@@ -7,14 +7,18 @@ mod compare;
 mod dataset;
 mod evaluate;
 mod flags;
+mod frame;
 mod hologram;
+mod judge;
 mod method;
+mod networks;
 mod occlusion;
 mod refocus;
 mod scene;
 mod seeds;
 mod study;
 mod video;
+mod view;
 
 use clap::{Parser, Subcommand};
 use phasefront_lab::Result;
@@ -37,12 +41,15 @@ pub(crate) struct Phasefront {
 
 #[derive(Subcommand)]
 enum Command {
-    Hologram(hologram::Hologram),
+    Hologram(Box<hologram::Hologram>),
     Refocus(refocus::Refocus),
+    View(Box<view::View>),
     Compare(compare::Compare),
+    Judge(judge::Judge),
     Scene(scene::Scene),
     Dataset(dataset::Dataset),
     Seeds(seeds::Seeds),
+    Networks(networks::Networks),
     Bench(bench::Bench),
     Occlusion(occlusion::Occlusion),
     Evaluate(evaluate::Evaluate),
@@ -65,10 +72,13 @@ impl Phasefront {
         pool.install(|| match self.command {
             Command::Hologram(command) => command.run(json),
             Command::Refocus(command) => command.run(json),
+            Command::View(command) => command.run(json),
             Command::Compare(command) => command.run(json),
+            Command::Judge(command) => command.run(json),
             Command::Scene(command) => command.run(json),
             Command::Dataset(command) => command.run(json),
             Command::Seeds(command) => command.run(json),
+            Command::Networks(command) => command.run(json),
             Command::Bench(command) => command.run(self.threads.map(usize::from), json),
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),

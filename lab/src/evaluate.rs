@@ -195,7 +195,10 @@ pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
 }
 
 /// The front layer as a frame: black and farthest where nothing is.
-fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
+///
+/// # Errors
+/// Numbers that are no frame's.
+pub fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
     let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     Ok(RgbdFrame::new(visible_rgb(ldi), depth)?)
 }

@@ -6,7 +6,7 @@
 use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
 use crate::npy;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
@@ -95,6 +95,12 @@ pub fn write_atomically(
     let refuse = |e: std::io::Error| Error::file(path, format!("cannot be written: {e}"));
     if path.is_dir() {
         return Err(Error::file(path, "is a folder; a file's name is needed"));
+    }
+    if !folder.is_dir() {
+        return Err(Error::file(
+            path,
+            format!("cannot be written: there is no folder {}", folder.display()),
+        ));
     }
     remove_left_over(folder);
     let mut builder = tempfile::Builder::new();
@@ -301,6 +307,15 @@ pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
 fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
     let pixels = stack.permuted_axes([1, 2, 0]);
     pixels.iter().map(|v| byte(*v)).collect()
+}
+
+/// Writes an 8-bit RGB PNG.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
+    let (width, height) = picture.dimensions();
+    write_png(path, width as usize, height as usize, picture.as_raw(), None)
 }
 
 /// Writes an 8-bit RGBA PNG of rows of `rgba`.

@@ -25,6 +25,77 @@ impl VideoFrame {
         self.colour_shape
     }
 
+    /// Rows of RGB bytes, (H, W) = `colour_shape`, and of big-endian 16-bit numbers of `unit`, (h, w) = `depth_shape`.
+    pub fn of_big_endian(
+        colour_shape: (usize, usize),
+        colour: Vec<u8>,
+        depth_shape: (usize, usize),
+        depth: &[u8],
+        unit: DepthUnit,
+    ) -> Self {
+        let little = depth.as_chunks::<2>().0.iter().flat_map(|[high, low]| [*low, *high]);
+        let (format, depth) = of_numbers(little.collect(), unit);
+        VideoFrame {
+            colour,
+            colour_shape,
+            depth,
+            depth_shape,
+            format,
+        }
+    }
+
+    /// Colour in the left half of a picture, rows of RGB bytes, (H, W) = `shape`, and normalized depth in the right one.
+    ///
+    /// # Errors
+    /// A picture that has no two halves.
+    pub fn of_halves((height, width): (usize, usize), picture: &[u8]) -> Result<Self> {
+        let half = width / 2;
+        if half == 0 || width % 2 == 1 {
+            return Err(Error::Input(format!(
+                "a picture of {width}×{height} has no two halves for colour and depth beside it"
+            )));
+        }
+        let rows = || picture.chunks_exact(3 * width);
+        let colour = rows().flat_map(|row| &row[..3 * half]).copied().collect();
+        let depth = rows().flat_map(|row| row[3 * half..].as_chunks::<3>().0).map(|pixel| {
+            let sum: u32 = pixel.iter().map(|v| u32::from(*v)).sum();
+            (sum * 65535 / (3 * 255)) as u16
+        });
+        Ok(VideoFrame {
+            colour,
+            colour_shape: (height, half),
+            depth: depth.flat_map(u16::to_le_bytes).collect(),
+            depth_shape: (height, half),
+            format: DepthFormat::NormalizedU16,
+        })
+    }
+
+    /// Rows of RGB bytes, (H, W) = `colour_shape`, and normalized depth, (h, w).
+    pub fn normalized(colour_shape: (usize, usize), colour: Vec<u8>, depth: &Array2<f32>) -> Self {
+        let (format, bytes) = depth_bytes(depth, DepthUnit::Normalized);
+        VideoFrame {
+            colour,
+            colour_shape,
+            depth: bytes,
+            depth_shape: depth.dim(),
+            format,
+        }
+    }
+
+    /// Takes near for far.
+    ///
+    /// # Errors
+    /// Depth that is not normalized.
+    pub fn invert(&mut self) -> Result<()> {
+        if self.format != DepthFormat::NormalizedU16 {
+            return Err(Error::Input(
+                "--invert is for normalized depth; distances and disparities say which is near by --depth-unit".into(),
+            ));
+        }
+        self.depth.iter_mut().for_each(|byte| *byte = 255 - *byte);
+        Ok(())
+    }
+
     /// What a session takes.
     ///
     /// # Errors
@@ -121,6 +192,23 @@ fn depth_bytes(readings: &Array2<f32>, unit: DepthUnit) -> (DepthFormat, Vec<u8>
     }
 }
 
+/// Little-endian 16-bit numbers of `unit` as a session takes them.
+fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
+    match unit {
+        DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
+        DepthUnit::Normalized => (DepthFormat::NormalizedU16, depth),
+        unit => {
+            let numbers = depth
+                .as_chunks::<2>()
+                .0
+                .iter()
+                .map(|n| f32::from(u16::from_le_bytes(*n)));
+            let metres = numbers.flat_map(|n| unit.metres(n).unwrap_or(f32::NAN).to_le_bytes());
+            (DepthFormat::MetresF32, metres.collect())
+        }
+    }
+}
+
 /// How raw frames follow each other in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RawVideo {
@@ -156,17 +244,7 @@ impl RawVideo {
                 colour.len() + depth.len()
             )));
         }
-        let (format, depth) = match self.unit {
-            DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
-            DepthUnit::Normalized => (DepthFormat::NormalizedU16, depth),
-            unit => {
-                let numbers = depth.as_chunks::<2>().0;
-                let readings = numbers.iter().map(|n| f32::from(u16::from_le_bytes(*n)));
-                let readings =
-                    Array2::from_shape_vec(self.depth, readings.collect()).map_err(|e| Error::Input(e.to_string()))?;
-                depth_bytes(&readings, unit)
-            }
-        };
+        let (format, depth) = of_numbers(depth, self.unit);
         Ok(Some(VideoFrame {
             colour,
             colour_shape: self.colour,

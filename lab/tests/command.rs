@@ -139,8 +139,104 @@ fn scenes_and_stacks_are_written_and_read_back() {
     folder.succeeds(&["hologram", "--ldi", "a", "--planes", "20", "-o", "h.png"]);
     folder.succeeds(&["refocus", "h.png", "--stack", "3", "-o", "stack"]);
     assert_eq!(fs::read_dir(folder.path("stack")).unwrap().count(), 3);
-    folder.succeeds(&["refocus", "h.png", "--stack", "3", "--gif", "-o", "stack.gif"]);
-    assert!(fs::read(folder.path("stack.gif")).unwrap().starts_with(b"GIF89a"));
+}
+
+#[test]
+fn pictures_are_what_their_names_say() {
+    let folder = Folder::new().with_frame();
+    folder.succeeds(&made(&[]));
+    let kinds: [(&str, &[u8]); 4] = [
+        ("v.png", b"\x89PNG"),
+        ("v.jpg", &[0xFF, 0xD8, 0xFF]),
+        ("v.JPEG", &[0xFF, 0xD8, 0xFF]),
+        ("v.webp", b"RIFF"),
+    ];
+    for (name, magic) in kinds {
+        folder.succeeds(&["refocus", "h.png", "--z-mm", "0", "-o", name]);
+        assert!(fs::read(folder.path(name)).unwrap().starts_with(magic), "{name}");
+    }
+    for (name, magic) in [("s.gif", &b"GIF89a"[..]), ("s.webp", b"RIFF")] {
+        folder.succeeds(&["refocus", "h.png", "--stack", "3", "--width", "24", "-o", name]);
+        let bytes = fs::read(folder.path(name)).unwrap();
+        assert!(bytes.starts_with(magic), "{name}");
+    }
+    let gif = fs::File::open(folder.path("s.gif")).unwrap();
+    let decoder = image::codecs::gif::GifDecoder::new(std::io::BufReader::new(gif)).unwrap();
+    let frames = image::AnimationDecoder::into_frames(decoder).collect_frames().unwrap();
+    // There and back again.
+    assert_eq!(frames.len(), 4);
+    assert_eq!(frames[0].buffer().dimensions(), (24, 16));
+    let moving = fs::read(folder.path("s.webp")).unwrap();
+    let moving = webp::AnimDecoder::new(&moving).decode().unwrap();
+    assert!(moving.has_animation() && moving.len() == 4);
+    assert_eq!(
+        (
+            moving.get_frame(0).unwrap().width(),
+            moving.get_frame(0).unwrap().height()
+        ),
+        (24, 16)
+    );
+    let view = ["refocus", "h.png", "--z-mm", "0", "-o"];
+    let stack = ["refocus", "h.png", "--stack", "3", "-o"];
+    for (call, name, word) in [
+        (&view, "v.gif", ".png, .jpg or .webp"),
+        (&view, "v.tif", ".png, .jpg or .webp"),
+        (&stack, "v2.png", "a folder"),
+        (&stack, "v2.jpg", ".gif or .webp"),
+    ] {
+        folder.refuses(&[&call[..], &[name]].concat(), 1, &[name, word]);
+    }
+}
+
+#[test]
+fn an_image_is_fitted_to_the_modulator() {
+    let folder = Folder::new().with_frame();
+    fs::write(folder.path("display.toml"), "width = 96\nheight = 96").unwrap();
+    let call = made(&["--display", "display.toml"]);
+    let warned = folder.run(&call);
+    assert!(String::from_utf8(warned.stderr).unwrap().contains("--fit"));
+    assert_eq!(files::read_hologram(&folder.path("h.png")).unwrap().shape(), (32, 48));
+    for fit in ["contain", "cover", "centre"] {
+        let output = folder.run(&[&call[..], &["--fit", fit]].concat());
+        assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+        assert_eq!(files::read_hologram(&folder.path("h.png")).unwrap().shape(), (96, 96));
+        folder.succeeds(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"]);
+        let view = files::read_rgb(&folder.path("v.png")).unwrap();
+        let light = |y: usize, x: usize| view.slice(s![.., y..y + 6, x..x + 6]).mean().unwrap();
+        // Black above what is shown, or the image.
+        assert_eq!(light(2, 46) > 0.1, fit == "cover", "{fit}");
+        assert!(light(46, 46) > 0.15, "{fit}");
+        assert_eq!(light(46, 4) > 0.1, fit != "centre", "{fit}");
+    }
+}
+
+#[test]
+fn depth_is_turned_round() {
+    let folder = Folder::new().with_frame();
+    let turned = image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 225 } else { 35 }]));
+    turned.save(folder.path("turned.png")).unwrap();
+    folder.succeeds(&made(&[]));
+    let straight = files::read_hologram(&folder.path("h.png")).unwrap();
+    folder.succeeds(&[&hologram("rgb.png", "turned.png")[..], &["--invert"]].concat());
+    assert_eq!(files::read_hologram(&folder.path("h.png")).unwrap(), straight);
+    folder.succeeds(&hologram("rgb.png", "turned.png"));
+    assert_ne!(files::read_hologram(&folder.path("h.png")).unwrap(), straight);
+}
+
+#[test]
+fn names_of_networks_are_listed_and_a_deep_field_is_told() {
+    let folder = Folder::new().with_frame();
+    let list = folder.succeeds(&["networks"]);
+    for name in ["ddpm-8", "rgbd-8", "rgbd-15", "seeded-6"] {
+        assert!(list.contains(name), "{list}");
+    }
+    let warned = |network| {
+        let output = folder.run(&made(&["--network", network, "--complex", "f.npy"]));
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    assert!(warned("ddpm-8").contains("pre-filter"));
+    assert!(!warned("8").contains("pre-filter"));
 }
 
 #[test]
@@ -438,7 +534,13 @@ fn options_that_cannot_be_meant_are_named() {
         (
             "a folder that is not there",
             with(&["-o", "missing/h.png"]),
-            &["missing/h.png", "written"],
+            &["missing/h.png", "no folder missing"],
+        ),
+        ("no frame", vec!["hologram", "-o", "h.png"], &["--rgb", "--photo"]),
+        (
+            "colour alone",
+            vec!["hologram", "--rgb", "rgb.png", "-o", "h.png"],
+            &["--depth", "--depth-network"],
         ),
         (
             "a picture that loses levels",
@@ -449,9 +551,9 @@ fn options_that_cannot_be_meant_are_named() {
     // What the arguments alone tell is code 2.
     let raw = made(&["--depth-unit", "raw"]);
     let cases: [(&str, &[&str], &str); 5] = [
+        ("a scene of nothing", &["scene", "-o", "s"], "--model"),
         ("raw depth without a scale", &raw, "--depth-scale"),
         ("an unknown option", &with(&["--nonsense"]), "--nonsense"),
-        ("no frame", &["hologram", "-o", "h.png"], "--rgb"),
         ("no distance", &["refocus", "rgb.png", "-o", "v.png"], "--z-mm"),
         (
             "an empty size",

@@ -204,3 +204,226 @@ fn a_captured_sequence_runs_as_video_and_live() {
     );
     sums_agree(&report);
 }
+
+/// All files of a folder and what they hold, but for the statistics.
+fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files: Vec<_> = std::fs::read_dir(dir)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|e| e == "png"))
+        .map(|path| {
+            (
+                path.file_name().unwrap().to_string_lossy().into_owned(),
+                std::fs::read(&path).unwrap(),
+            )
+        })
+        .collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
+    let (dir, input) = folder(9);
+    let input = input.to_str().unwrap();
+    for method in ["network", "auto"] {
+        let (whole, cut) = (
+            dir.path().join(format!("whole-{method}")),
+            dir.path().join(format!("cut-{method}")),
+        );
+        let flags = [
+            "video",
+            input,
+            "--depth-unit",
+            "mm",
+            "--preview-mm",
+            "1",
+            "--method",
+            method,
+            "-o",
+        ];
+        json(&[&flags[..], &[whole.to_str().unwrap()]].concat());
+        let call = [&flags[..], &[cut.to_str().unwrap()]].concat();
+        let mut child = phasefront(&call).stdout(Stdio::null()).spawn().unwrap();
+        while !cut.join("phase_000003.png").exists() && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // However far it came, it has to be less than all.
+        for index in 5..9 {
+            let _ = std::fs::remove_file(cut.join(format!("phase_{index:06}.png")));
+        }
+        assert!(refusal(&call).contains("--resume"), "nothing is overwritten in silence");
+        let other = [&call[..], &["--resume", "--offset-mm", "2"]].concat();
+        assert!(refusal(&other).contains("another display"));
+        let before = std::fs::metadata(cut.join("phase_000001.png"))
+            .unwrap()
+            .modified()
+            .unwrap();
+        json(&[&call[..], &["--resume"]].concat());
+        assert_eq!(contents(&whole), contents(&cut), "{method}");
+        let after = std::fs::metadata(cut.join("phase_000001.png"))
+            .unwrap()
+            .modified()
+            .unwrap();
+        assert_eq!(before, after, "what is there is not made again");
+        json(&[&call[..], &["--overwrite"]].concat());
+        assert_eq!(contents(&whole), contents(&cut), "{method}");
+    }
+}
+
+fn has_ffmpeg() -> bool {
+    let found = Command::new("ffmpeg")
+        .arg("-version")
+        .stdout(Stdio::null())
+        .status()
+        .is_ok_and(|s| s.success());
+    if !found {
+        eprintln!("skipped: ffmpeg is not installed");
+    }
+    found
+}
+
+/// Makes `path` of the pictures `pattern`.
+fn film(pattern: &Path, path: &Path, codec: &[&str]) {
+    let made = Command::new("ffmpeg")
+        .args(["-v", "error", "-y", "-framerate", "10", "-i"])
+        .arg(pattern)
+        .args(codec)
+        .arg(path)
+        .status();
+    assert!(made.unwrap().success());
+}
+
+#[test]
+fn films_go_in_and_come_out() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let (dir, input) = folder(5);
+    let at = |name: &str| dir.path().join(name);
+    let text = |path: &Path| path.to_str().unwrap().to_owned();
+    let lossless = ["-c:v", "ffv1"];
+    film(
+        &input.join("color_%d.png"),
+        &at("colour.mkv"),
+        &[&lossless[..], &["-pix_fmt", "gbrp"]].concat(),
+    );
+    film(
+        &input.join("depth_%d.png"),
+        &at("depth.mkv"),
+        &[&lossless[..], &["-pix_fmt", "gray16le"]].concat(),
+    );
+    let (colour, depth) = (text(&at("colour.mkv")), text(&at("depth.mkv")));
+    let call = ["video", &colour, "--depth-video", &depth, "--depth-unit", "mm", "-o"];
+    // Without loss a film is what its pictures are.
+    let films = text(&at("films"));
+    json(&[&call[..], &[&films]].concat());
+    let files = text(&at("files"));
+    json(&[
+        "video",
+        input.to_str().unwrap(),
+        "--depth-unit",
+        "mm",
+        "--rate",
+        "10",
+        "-o",
+        &files,
+    ]);
+    assert_eq!(contents(&at("films")), contents(&at("files")));
+    // Out: as it is seen, and its phases without loss.
+    let out = text(&at("out.mp4"));
+    json(&[&call[..], &[&out]].concat());
+    assert!(refusal(&[&call[..], &[&out]].concat()).contains("--overwrite"));
+    let about = phasefront_lab::film::about(&at("out.mp4")).unwrap();
+    assert_eq!((about.frames, about.rate_hz), (5, 10.0));
+    let phases = at("out-phases.mp4");
+    let back = at("back");
+    std::fs::create_dir(&back).unwrap();
+    film(&phases, &back.join("phase_%06d.png"), &["-start_number", "0"]);
+    for index in 0..5 {
+        let levels = |dir: &Path| {
+            image::open(dir.join(format!("phase_{index:06}.png")))
+                .unwrap()
+                .into_rgb8()
+        };
+        assert_eq!(levels(&at("out")), levels(&back), "{index}");
+    }
+    // Depth beside colour, in one picture.
+    let half = Command::new("ffmpeg")
+        .args(["-v", "error", "-y", "-i", &colour, "-i", &depth, "-filter_complex"])
+        .args(["[1]format=gray,format=gbrp[d];[0][d]hstack", "-c:v", "ffv1"])
+        .arg(at("beside.mkv"))
+        .status();
+    assert!(half.unwrap().success());
+    let report = json(&[
+        "video",
+        &text(&at("beside.mkv")),
+        "--depth-beside",
+        "--invert",
+        "-o",
+        &text(&at("b")),
+    ]);
+    assert_eq!(report["processed"], 5);
+    let first = files::read_hologram(&at("b").join("phase_000000.png")).unwrap();
+    assert_eq!(first.shape(), (HEIGHT as usize, WIDTH as usize));
+    assert!(refusal(&["video", &colour]).contains("--depth-network"));
+    std::fs::write(at("no.mp4"), "no film").unwrap();
+    let no = refusal(&["video", &text(&at("no.mp4")), "--depth-beside"]);
+    assert!(no.contains("no.mp4") && no.contains("ffmpeg"), "{no}");
+}
+
+#[test]
+fn folders_are_read_as_data_sets_lay_them() {
+    let (dir, input) = folder(3);
+    let at = |name: &str| dir.path().join(name);
+    for name in ["redwood/rgb", "redwood/depth", "tum/rgb", "tum/depth"] {
+        std::fs::create_dir_all(at(name)).unwrap();
+    }
+    let (mut colours, mut depths) = (String::new(), String::new());
+    for index in 0..3 {
+        let (colour, depth) = (
+            input.join(format!("color_{index}.png")),
+            input.join(format!("depth_{index}.png")),
+        );
+        std::fs::copy(
+            &colour,
+            at(&format!("redwood/rgb/000000{index}-00000000{index}000.png")),
+        )
+        .unwrap();
+        std::fs::copy(
+            &depth,
+            at(&format!("redwood/depth/000000{index}-00000000{index}017.png")),
+        )
+        .unwrap();
+        std::fs::copy(&colour, at(&format!("tum/rgb/{index}.png"))).unwrap();
+        // TUM's depth has five units a millimetre.
+        let mut raw = image::open(&depth).unwrap().into_luma16();
+        raw.iter_mut().for_each(|v| *v *= 5);
+        raw.save(at(&format!("tum/depth/{index}.png"))).unwrap();
+        colours += &format!("{index}.00 rgb/{index}.png\n");
+        depths += &format!("{index}.01 depth/{index}.png\n");
+    }
+    std::fs::write(at("tum/rgb.txt"), format!("# colour\n{colours}")).unwrap();
+    std::fs::write(at("tum/depth.txt"), format!("# depth\n{depths}")).unwrap();
+    let made = |input: &Path, name: &str, more: &[&str]| {
+        let out = at(name);
+        json(&[&["video", input.to_str().unwrap(), "-o", out.to_str().unwrap()], more].concat());
+        contents(&out)
+    };
+    let plain = made(&input, "a", &["--depth-unit", "mm"]);
+    assert_eq!(plain.len(), 3);
+    assert_eq!(made(&at("redwood"), "b", &[]), plain);
+    assert_eq!(made(&at("tum"), "c", &[]), plain);
+    let pairs = [
+        "--pairs",
+        "rgb/*.png,depth/*.png",
+        "--depth-unit",
+        "raw",
+        "--depth-scale",
+        "5000",
+    ];
+    assert_eq!(made(&at("tum"), "d", &pairs), plain);
+    assert!(refusal(&["video", input.to_str().unwrap(), "--pairs", "rgb_*"]).contains("comma"));
+}

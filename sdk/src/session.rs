@@ -347,6 +347,39 @@ impl Session {
         }
     }
 
+    /// Takes up a video where it was left: does for `frame` what the frames after it need, without making its hologram,
+    /// which got `scale` ([`Hologram::scale`]). Frames that follow become what they would have become after
+    /// [`Self::process`] of it, but for what remembers more: a method chosen by sharpness, and steps at the midpoint.
+    ///
+    /// # Errors
+    /// As [`Self::process`]; a session that is not for video.
+    pub fn replay(&self, frame: &CameraFrame<'_>, scale: f32) -> Result<()> {
+        let Mode::Video(gate) = &self.mode else {
+            return Err(Error::Session("only a video session can be taken up again".into()));
+        };
+        self.shared.home.check()?;
+        let mut stages = lock(&self.shared.stages);
+        let fresh = {
+            let mut gate = lock(gate);
+            gate.admit(frame.timestamp_ns, true)?;
+            std::mem::take(&mut gate.fresh)
+        };
+        let stages = stages.as_mut().ok_or_else(queue::closed)?;
+        let (result, panicked) = guarded(|| {
+            frame.check()?;
+            stages.replay(frame, !fresh, scale)
+        });
+        if panicked {
+            stages.recover();
+        }
+        let counts = &mut lock(gate).counts;
+        match result {
+            Ok(()) => counts.processed += 1,
+            Err(_) => counts.failed += 1,
+        }
+        result
+    }
+
     /// Hands `frame` to a live session, which copies it and goes on by itself. Never waits for a frame to be processed.
     ///
     /// # Errors

@@ -5,16 +5,16 @@ use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use phasefront::unstable::depth::DepthUnit;
 use phasefront::unstable::gpu::DeviceOptions;
-use phasefront::{Display, EncoderOptions, Encoding, Network, RgbdFrame};
+use phasefront::{Display, EncoderOptions, Encoding, Network};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::models::Precision;
-use phasefront_lab::rgbd::{self, DepthOptions};
+use phasefront_lab::rgbd::DepthOptions;
 use phasefront_lab::{Error, Result, gpu, models};
 use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 
 /// The display that a hologram is for.
-#[derive(Args)]
+#[derive(Clone, Args)]
 pub(crate) struct DisplayFlags {
     /// TOML file of the display [default: 1920×1080, 8 µm, 638/520/450 nm, 6 mm]
     #[arg(long, value_name = "FILE")]
@@ -38,7 +38,7 @@ impl DisplayFlags {
 }
 
 /// How the field becomes phases.
-#[derive(Args)]
+#[derive(Default, Args)]
 pub(crate) struct EncoderFlags {
     /// How the field becomes phases [default: anti-alias; deep with --network ddpm-8]
     #[arg(long, value_enum)]
@@ -83,6 +83,16 @@ impl Encoder {
 }
 
 impl EncoderFlags {
+    pub(crate) fn of(encoder: EncoderName, dark: f32, local_steps: usize, midpoint_steps: usize) -> Self {
+        EncoderFlags {
+            encoder: Some(encoder),
+            prefilter: None,
+            dark: Some(dark),
+            local_steps: Some(local_steps),
+            midpoint_steps,
+        }
+    }
+
     /// For fields that no network of a pair makes.
     pub(crate) fn read(&self) -> Result<Encoder> {
         let prefilter = match &self.prefilter {
@@ -193,21 +203,8 @@ impl EncoderName {
     }
 }
 
-/// An RGB-D image and what its depth means.
-#[derive(Args)]
-pub(crate) struct FrameFlags {
-    /// Colour image, PNG or JPEG
-    #[arg(long, value_name = "FILE", requires = "depth", required_unless_present = "ldi")]
-    rgb: Option<PathBuf>,
-    /// Depth image: grey PNG of 8 or 16 bits, or .npy
-    #[arg(long, value_name = "FILE", requires = "rgb")]
-    depth: Option<PathBuf>,
-    #[command(flatten)]
-    depth_numbers: DepthFlags,
-}
-
 /// What the numbers of a depth image mean, and which are shown where.
-#[derive(Args)]
+#[derive(Default, Args)]
 pub(crate) struct DepthFlags {
     /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth
     #[arg(long, value_enum, default_value_t = UnitName::Normalized)]
@@ -223,8 +220,9 @@ pub(crate) struct DepthFlags {
     far: Option<f32>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 enum UnitName {
+    #[default]
     /// 0 nearest to the largest number farthest
     Normalized,
     /// Metres
@@ -235,15 +233,6 @@ enum UnitName {
     Disparity,
     /// --depth-scale units a metre
     Raw,
-}
-
-impl FrameFlags {
-    pub(crate) fn read(&self) -> Result<RgbdFrame> {
-        let (Some(rgb), Some(depth)) = (&self.rgb, &self.depth) else {
-            return Err(Error::Input("this method needs --rgb and --depth".into()));
-        };
-        rgbd::read(rgb, depth, self.depth_numbers.options())
-    }
 }
 
 impl DepthFlags {
@@ -266,7 +255,7 @@ impl DepthFlags {
 }
 
 /// Where frames are made.
-#[derive(Args)]
+#[derive(Default, Args)]
 pub(crate) struct BackendFlags {
     /// Where frames are made
     #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
@@ -276,9 +265,10 @@ pub(crate) struct BackendFlags {
     gpu: Option<String>,
 }
 
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 enum BackendName {
     /// The processor
+    #[default]
     Cpu,
     /// The graphics processor, by Vulkan, Metal or DirectX 12
     Gpu,
@@ -304,6 +294,12 @@ pub(crate) fn parse_size(text: &str) -> std::result::Result<(usize, usize), Stri
         Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) => Ok((w, h)),
         _ => Err("a size is written WxH, as 1920x1080, each up to 16384".into()),
     }
+}
+
+/// A count on stderr of what has no known end.
+pub(crate) fn progress_count(what: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {pos} {elapsed}, {per_sec}").expect("a well-formed template");
+    ProgressBar::no_length().with_style(style).with_message(what.to_owned())
 }
 
 /// A progress bar on stderr, with the time left, where stderr is a terminal.

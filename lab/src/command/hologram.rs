@@ -1,6 +1,7 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, FrameFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, progress_bar};
+use super::frame::FrameFlags;
 use super::method::{CoreMethod, Parts};
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
@@ -10,7 +11,7 @@ use phasefront::unstable::depth::sharpness;
 use phasefront::unstable::gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::network::{Engine, InputKind};
-use phasefront::{Brightness, EncoderOptions, Pipeline, RgbdFrame, Sweep};
+use phasefront::{Brightness, EncoderOptions, Encoding, Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
 use phasefront_lab::corrected::{self, Correction};
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
@@ -21,7 +22,7 @@ use phasefront_lab::{Error, Result, evaluate, gpu, models, sm_lbm};
 use phasefront_models::usual_network;
 use serde::Serialize;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 use std::time::{Duration, Instant};
 
@@ -29,18 +30,34 @@ use std::time::{Duration, Instant};
 #[derive(Args)]
 pub(crate) struct Hologram {
     #[command(flatten)]
+    making: Making,
+    /// Write the complex field at the modulator there too, with a .json beside it
+    #[arg(long, value_name = "FILE.npy")]
+    complex: Option<PathBuf>,
+    /// Say how near to its own wave is what the hologram shows: at the midpoint, and over a stack of depths
+    #[arg(long)]
+    judge: bool,
+    /// The hologram: a PNG of modulator levels
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+/// What a hologram is made of, and how.
+#[derive(Args)]
+pub(crate) struct Making {
+    #[command(flatten)]
     frame: FrameFlags,
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth", "photo", "depth_network", "fit"])]
     ldi: Option<PathBuf>,
     /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
     /// and no
     /// --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along, or an ONNX file [default: 8; seeded-6 with --method
+    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method
     /// seeded]
-    #[arg(long, value_name = "ddpm-8|8|15|seeded-6|FILE")]
+    #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -63,19 +80,13 @@ pub(crate) struct Hologram {
     backend: BackendFlags,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Write the complex field at the modulator there too, with a .json beside it
-    #[arg(long, value_name = "FILE.npy")]
-    complex: Option<PathBuf>,
-    /// Say how near to its own wave is what the hologram shows: at the midpoint, and over a stack of depths
-    #[arg(long)]
-    judge: bool,
-    /// The hologram: a PNG of modulator levels
-    #[arg(short, value_name = "OUT.png")]
-    output: PathBuf,
+    /// Whether the field is asked for too.
+    #[arg(skip)]
+    pub(crate) keeps_field: bool,
 }
 
 #[derive(Clone, Copy, PartialEq)]
-enum Method {
+pub(crate) enum Method {
     Core(CoreMethod),
     Layers,
     Points,
@@ -153,18 +164,19 @@ pub(super) fn sweep_for(display: &phasefront::Display, planes: Option<usize>, ta
 }
 
 /// A field at the modulator, its levels, and how long each stage took.
-struct Made {
-    method: &'static str,
-    field: Option<Array3<Complex32>>,
-    levels: Array3<u8>,
-    encoder: Encoder,
+pub(crate) struct Made {
+    pub(crate) method: &'static str,
+    pub(crate) field: Option<Array3<Complex32>>,
+    pub(crate) levels: Array3<u8>,
+    pub(crate) encoder: Encoder,
     scale: f32,
-    stages: Vec<(&'static str, Duration)>,
+    /// The last is the encoder's.
+    pub(crate) stages: Vec<(&'static str, Duration)>,
     engine: Option<String>,
 }
 
 impl Hologram {
-    pub(crate) fn run(self, json: bool) -> Result<()> {
+    pub(crate) fn run(mut self, json: bool) -> Result<()> {
         for (path, extension) in [(Some(&self.output), "png"), (self.complex.as_ref(), "npy")] {
             if let Some(path) = path
                 && !files::has_extension(path, extension)
@@ -172,19 +184,121 @@ impl Hologram {
                 return Err(Error::file(path, format!("the name must end in .{extension}")));
             }
         }
-        let display = self.display.read()?;
-        let made = self.make(&display)?;
+        let display = self.making.display()?;
+        self.making.keeps_field = self.complex.is_some() || self.judge;
+        let made = self.making.make(&display, &self.making.image(&display)?)?;
         self.write(&display, &made)?;
         let judged = self.judge.then(|| judge(&display, &made)).transpose()?;
         self.report(json, &made, judged.as_ref());
         Ok(())
     }
 
-    fn keeps_field(&self) -> bool {
-        self.complex.is_some() || self.judge
+    fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
+        let (levels, field) = infos(display, made);
+        if let (Some(path), Some(values)) = (&self.complex, &made.field) {
+            if matches!(made.encoder.options.encoding, Encoding::Deep(_)) {
+                log::warn!(
+                    "{}: a field of --encoder deep is what its pre-filter was trained to take, not the wave that is shown; for that one take another --network",
+                    path.display()
+                );
+            }
+            files::write_complex(path, values.view(), &field)?;
+        }
+        files::write_phase_only(&self.output, made.levels.view(), &levels)
     }
 
-    fn make(&self, display: &DisplayFile) -> Result<Made> {
+    fn report(&self, json: bool, made: &Made, judged: Option<&Judged>) {
+        let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        let stages: serde_json::Map<_, _> = (made.stages.iter())
+            .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
+            .collect();
+        let total: Duration = made.stages.iter().map(|(_, time)| *time).sum();
+        let (_, height, width) = made.levels.dim();
+        let list: Vec<_> = (made.stages.iter())
+            .map(|(stage, time)| format!("{stage} {:.1} ms", ms(time)))
+            .collect();
+        super::print(
+            json,
+            &json!({
+                "output": self.output.display().to_string(), "complex": self.complex, "width": width, "height": height,
+                "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
+                "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
+                "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
+            }),
+            format!(
+                "{}: {width}×{height} by {}; {}: {}{}",
+                self.output.display(),
+                made.method,
+                made.encoder.describe(),
+                list.join(", "),
+                judged.map_or(String::new(), Judged::describe)
+            ),
+        );
+    }
+}
+
+/// What a hologram is made of.
+pub(crate) enum Image {
+    /// An RGB-D image.
+    Rgbd(RgbdFrame),
+    /// A layered depth image.
+    Layers(Ldi),
+}
+
+impl Making {
+    /// Of images that are read already, for `display`.
+    pub(crate) fn of(display: DisplayFlags) -> Self {
+        Making {
+            frame: FrameFlags::default(),
+            ldi: None,
+            method: None,
+            network: None,
+            precision: PrecisionName::Int8,
+            planes: None,
+            taps: None,
+            occlusion: OcclusionName::Geometric,
+            encoder: EncoderFlags::default(),
+            scale: None,
+            backend: BackendFlags::default(),
+            display,
+            keeps_field: false,
+        }
+    }
+
+    /// The same image another way.
+    pub(crate) fn way(&mut self, method: Method, network: Option<String>, encoder: EncoderFlags) {
+        (self.method, self.network, self.encoder) = (Some(method), network, encoder);
+        (self.planes, self.precision) = (None, PrecisionName::Int8);
+    }
+
+    /// With so many planes.
+    pub(crate) fn with_planes(&mut self, planes: usize) {
+        self.planes = Some(planes);
+    }
+
+    /// By a network in floating point.
+    pub(crate) fn in_float32(&mut self) {
+        self.precision = PrecisionName::F32;
+    }
+
+    pub(crate) fn display(&self) -> Result<DisplayFile> {
+        self.display.read()
+    }
+
+    /// The file that the image is from.
+    pub(crate) fn source(&self) -> Option<&Path> {
+        self.ldi.as_deref().or(self.frame.source())
+    }
+
+    /// The image for `display`.
+    pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
+        match &self.ldi {
+            Some(dir) => Ok(Image::Layers(Ldi::read(dir)?)),
+            None => Ok(Image::Rgbd(self.frame.read(&display.target.display)?)),
+        }
+    }
+
+    pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<Made> {
         let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
             (Some(_), None) => Method::Layers,
             (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
@@ -192,17 +306,17 @@ impl Hologram {
         });
         let device = self.backend.device()?;
         if device.is_some()
-            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field() || self.ldi.is_some())
+            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())
         {
             return Err(Error::Input(
                 "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
                     .into(),
             ));
         }
-        match (method, &self.ldi) {
-            (Method::Core(method), None) => {
+        match (method, image) {
+            (Method::Core(method), Image::Rgbd(frame)) => {
                 let method = match method {
-                    CoreMethod::Auto => self.by_sharpness(&display.target.display)?,
+                    CoreMethod::Auto => self.by_sharpness(frame, &display.target.display)?,
                     method => method,
                 };
                 let (core, encoder) = method.of(&Parts {
@@ -212,37 +326,26 @@ impl Hologram {
                     sweep: sweep_for(&display.target.display, self.planes, self.taps),
                     encoder: &self.encoder,
                 })?;
-                self.by_core(method.name(), core, display, encoder, device.as_ref())
+                self.by_core(method.name(), core, frame, display, encoder, device.as_ref())
             }
-            (Method::Core(method), Some(_)) if method != CoreMethod::Network => Err(Error::Input(
+            (Method::Core(method), Image::Layers(_)) if method != CoreMethod::Network => Err(Error::Input(
                 "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
                     .into(),
             )),
-            (method, source) => {
-                let ldi = match source {
-                    None => single_layer(&self.frame.read()?)?,
-                    Some(dir) => Ldi::read(dir)?,
-                };
-                self.by_layers(method, &ldi, display, self.encoder.read()?)
+            (method, Image::Rgbd(frame)) => {
+                self.by_layers(method, &single_layer(frame)?, display, self.encoder.read()?)
             }
+            (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
         }
     }
 
     /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
-    fn by_sharpness(&self, display: &phasefront::Display) -> Result<CoreMethod> {
+    fn by_sharpness(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || usual_network(display).is_some();
-        Ok(match trained && !sharpness::measure(&self.frame.read()?).is_sharp() {
+        Ok(match trained && !sharpness::measure(frame).is_sharp() {
             true => CoreMethod::Network,
             false => CoreMethod::Sweep,
         })
-    }
-
-    fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
-        let (levels, field) = infos(display, made);
-        if let (Some(path), Some(values)) = (&self.complex, &made.field) {
-            files::write_complex(path, values.view(), &field)?;
-        }
-        files::write_phase_only(&self.output, made.levels.view(), &levels)
     }
 
     /// The methods of the core, on the RGB-D image; their `stage` is called as they are.
@@ -250,13 +353,14 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
+        frame: &RgbdFrame,
         display: &DisplayFile,
         encoder: Encoder,
         device: Option<&DeviceOptions>,
     ) -> Result<Made> {
         match device {
-            Some(options) => self.on_gpu(stage, method, display, encoder, options),
-            None => self.on_cpu(stage, method, display, encoder),
+            Some(options) => self.on_gpu(stage, method, frame, display, encoder, options),
+            None => self.on_cpu(stage, method, frame, display, encoder),
         }
     }
 
@@ -264,10 +368,10 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
+        frame: &RgbdFrame,
         display: &DisplayFile,
         encoder: Encoder,
     ) -> Result<Made> {
-        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let target = display.corrected()?;
         let options = self.encoder_options(&encoder.options);
@@ -278,7 +382,7 @@ impl Hologram {
         let (values, bytes) = slices(&mut field, &mut levels);
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field that it is given, so a copy is kept where it is asked for.
-        let kept = self.keeps_field().then(|| values.to_vec());
+        let kept = self.keeps_field.then(|| values.to_vec());
         let modulation = pipeline.modulate(values, bytes, &mut scratch);
         let engine = pipeline.method().engine();
         Ok(Made {
@@ -301,11 +405,11 @@ impl Hologram {
         &self,
         stage: &'static str,
         method: phasefront::Method,
+        frame: &RgbdFrame,
         display: &DisplayFile,
         encoder: Encoder,
         options: &DeviceOptions,
     ) -> Result<Made> {
-        let frame = &self.frame.read()?;
         let (height, width) = frame.shape();
         let mut job = Job::new((height, width), method, display.corrected()?);
         job.encoder = self.encoder_options(&encoder.options);
@@ -391,7 +495,7 @@ impl Hologram {
         let (values, bytes) = slices(&mut field, &mut levels);
         modulator.propagate(values, &mut scratch);
         let propagate = waved.elapsed();
-        let kept = self.keeps_field().then(|| values.to_vec());
+        let kept = self.keeps_field.then(|| values.to_vec());
         let modulation = modulator.modulate(values, bytes, &mut scratch);
         Ok(Made {
             method: stage,
@@ -430,39 +534,10 @@ impl Hologram {
             ..usual.clone()
         }
     }
-
-    fn report(&self, json: bool, made: &Made, judged: Option<&Judged>) {
-        let ms = |time: &Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
-        let stages: serde_json::Map<_, _> = (made.stages.iter())
-            .map(|(stage, time)| ((*stage).to_owned(), json!(ms(time))))
-            .collect();
-        let total: Duration = made.stages.iter().map(|(_, time)| *time).sum();
-        let (_, height, width) = made.levels.dim();
-        let list: Vec<_> = (made.stages.iter())
-            .map(|(stage, time)| format!("{stage} {:.1} ms", ms(time)))
-            .collect();
-        super::print(
-            json,
-            &json!({
-                "output": self.output.display().to_string(), "complex": self.complex, "width": width, "height": height,
-                "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
-                "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
-                "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
-            }),
-            format!(
-                "{}: {width}×{height} by {}; {}: {}{}",
-                self.output.display(),
-                made.method,
-                made.encoder.describe(),
-                list.join(", "),
-                judged.map_or(String::new(), Judged::describe)
-            ),
-        );
-    }
 }
 
 /// What files of the levels and of the field say.
-fn infos(display: &DisplayFile, made: &Made) -> (HologramInfo, HologramInfo) {
+pub(crate) fn infos(display: &DisplayFile, made: &Made) -> (HologramInfo, HologramInfo) {
     let levels = HologramInfo {
         calibrated: display.calibrated(true),
         display: display.target.display.clone(),
@@ -482,13 +557,13 @@ fn infos(display: &DisplayFile, made: &Made) -> (HologramInfo, HologramInfo) {
 
 /// How near what a hologram shows is to its own wave.
 #[derive(Serialize)]
-struct Judged {
-    psnr_db: f64,
-    ssim: f64,
-    stack_psnr_db: f64,
-    stack_ssim: f64,
+pub(crate) struct Judged {
+    pub(crate) psnr_db: f64,
+    pub(crate) ssim: f64,
+    pub(crate) stack_psnr_db: f64,
+    pub(crate) stack_ssim: f64,
     /// Mean amplitude over the wave's.
-    brightness: f64,
+    pub(crate) brightness: f64,
 }
 
 impl Judged {
@@ -503,7 +578,7 @@ impl Judged {
 /// Depths of the stack that a hologram is judged by, beside the midpoint.
 const STACK: usize = 4;
 
-fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
+pub(crate) fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
     let (levels, field) = infos(display, made);
     let wave = made.field.clone().expect("kept for this");
     let depths = (0..STACK).map(|i| (i as f64 + 0.5) / STACK as f64);

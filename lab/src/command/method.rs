@@ -8,7 +8,7 @@ use phasefront_lab::models::{self, Precision};
 
 /// A method on RGB-D images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
-pub(super) enum CoreMethod {
+pub(crate) enum CoreMethod {
     /// A trained network on the RGB-D image
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, any display

@@ -1,12 +1,9 @@
 //! `phasefront refocus`: what an eye focused at z would see of a hologram file.
 
 use clap::Args;
-use image::codecs::gif::{GifEncoder, Repeat};
-use image::{Delay, Frame, RgbImage};
-use ndarray::Array3;
-use phasefront_lab::{Error, Result, files};
+use phasefront_lab::{Error, Result, files, pictures};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Look at a hologram with the eye focused at z
 #[derive(Args)]
@@ -28,10 +25,10 @@ pub(crate) struct Refocus {
     /// TOML file of a calibrated display, whose tables the hologram was made for
     #[arg(long, value_name = "FILE")]
     display: Option<PathBuf>,
-    /// Write the stack as one moving GIF
-    #[arg(long, requires = "stack")]
-    gif: bool,
-    /// A PNG for one z, a folder for a stack, a .gif with --gif
+    /// Width of the pictures, pixels; their sides keep their proportion [default: the hologram's]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384))]
+    width: Option<u32>,
+    /// For one z a .png, .jpg or .webp; for a stack a folder, or a .gif or .webp that moves
     #[arg(short, value_name = "OUT")]
     output: PathBuf,
 }
@@ -54,19 +51,32 @@ impl Refocus {
             Some(path) => hologram.views_on(&files::read_display(path)?, &z_m),
         }
         .map_err(|e| Error::file(&self.hologram, e))?;
+        let views: Vec<_> = (views.iter())
+            .map(|view| pictures::of_amplitude(view.view()))
+            .map(|view| pictures::at_width(view, self.width.unwrap_or(u32::MAX)))
+            .collect();
         let mut written = Vec::new();
-        if self.gif {
-            write_gif(&self.output, &views)?;
+        if self.stack.is_none() {
+            pictures::write(&self.output, &views[0])?;
             written.push(self.output.clone());
-        } else if self.stack.is_none() {
-            files::write_amplitude(&self.output, views[0].view())?;
+        } else if pictures::moves(&self.output) {
+            pictures::write_moving(&self.output, &views)?;
             written.push(self.output.clone());
         } else {
+            if ["png", "jpg", "jpeg"]
+                .iter()
+                .any(|e| files::has_extension(&self.output, e))
+            {
+                return Err(Error::file(
+                    &self.output,
+                    "a stack is written into a folder, or moves as .gif or .webp",
+                ));
+            }
             std::fs::create_dir_all(&self.output)
                 .map_err(|e| Error::file(&self.output, format!("cannot be made: {e}")))?;
             for (i, (view, z)) in views.iter().zip(&z_mm).enumerate() {
                 let path = self.output.join(format!("view_{i:03}_{z:+.3}mm.png"));
-                files::write_amplitude(&path, view.view())?;
+                pictures::write(&path, view)?;
                 written.push(path);
             }
         }
@@ -74,25 +84,4 @@ impl Refocus {
         super::print(json, &json!({"z_mm": z_mm, "files": names}), names.join("\n"));
         Ok(())
     }
-}
-
-/// The views there and back again, ten a second.
-fn write_gif(path: &Path, views: &[Array3<f32>]) -> Result<()> {
-    files::write_atomically(path, |file| {
-        let mut encoder = GifEncoder::new_with_speed(file, 10);
-        let other = std::io::Error::other;
-        encoder.set_repeat(Repeat::Infinite).map_err(other)?;
-        let back = views.iter().skip(1).rev().skip(1);
-        for view in views.iter().chain(back) {
-            let (_, height, width) = view.dim();
-            let image = RgbImage::from_raw(width as u32, height as u32, files::amplitude_bytes(view.view()))
-                .expect("three bytes a pixel");
-            let image = image::DynamicImage::ImageRgb8(image).into_rgba8();
-            let delay = Delay::from_numer_denom_ms(100, 1);
-            encoder
-                .encode_frame(Frame::from_parts(image, 0, 0, delay))
-                .map_err(other)?;
-        }
-        Ok(())
-    })
 }

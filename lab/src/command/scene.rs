@@ -9,12 +9,13 @@ use std::path::PathBuf;
 
 /// Render a random scene, or a glTF, GLB or OBJ model, as a layered depth image
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("what").args(["model", "seed"]).required(true))]
 pub(crate) struct Scene {
     /// A random scene; the same seed gives the same one
-    #[arg(long, value_name = "N", required_unless_present = "model")]
+    #[arg(long, value_name = "N")]
     seed: Option<u64>,
     /// A .gltf, .glb or .obj file, fitted to the frame and the volume
-    #[arg(long, value_name = "FILE", conflicts_with = "seed")]
+    #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
     /// Width and height, pixels
     #[arg(long, value_name = "WxH", default_value = "384x384", value_parser = parse_size)]

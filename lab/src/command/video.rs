@@ -1,18 +1,21 @@
 //! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
 
-use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size, progress_bar};
+mod sink;
+mod source;
+
+use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size};
+use super::frame::SeenDepthFlags;
 use super::hologram::PrecisionName;
 use super::method::{CoreMethod, Parts};
 use clap::{Args, ValueEnum};
-use ndarray::ArrayView3;
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
-use phasefront::unstable::depth::DepthUnit;
 use phasefront::{Brightness, Hologram, Session, SessionOptions, Sweep, Target};
 use phasefront_lab::files::{self, HologramInfo};
-use phasefront_lab::video::{self, RawVideo, VideoFrame};
-use phasefront_lab::{Error, Result, gpu};
+use phasefront_lab::{Error, Result, film, gpu};
 use serde_json::json;
+use sink::{Before, Sink};
+use source::Source;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, mpsc};
@@ -21,8 +24,20 @@ use std::time::{Duration, Instant};
 /// Make phase maps and previews of RGB-D video
 #[derive(Args)]
 pub(crate) struct Video {
-    /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …; or - for raw frames on stdin
+    /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, or as TUM's and Redwood's data sets are
+    /// laid; a film (.mp4, by ffmpeg); or - for raw frames on stdin
     input: PathBuf,
+    /// Names of a folder's colour and depth files, whose * stand for the same: 'left_*.png,left_*_z.png'
+    #[arg(long, value_name = "COLOUR,DEPTH")]
+    pairs: Option<String>,
+    /// Depth of a film: another film, in grey
+    #[arg(long, value_name = "FILE")]
+    depth_video: Option<PathBuf>,
+    /// Depth of a film: the right half of its pictures, in grey
+    #[arg(long)]
+    depth_beside: bool,
+    #[command(flatten)]
+    seen: SeenDepthFlags,
     /// Raw frames on stdin: size of their colour, rows of RGB bytes
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     raw: Option<(usize, usize)>,
@@ -34,8 +49,8 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
     method: CoreMethod,
-    /// A network that comes along, or an ONNX file [default: 8]
-    #[arg(long, value_name = "ddpm-8|8|15|FILE")]
+    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8]
+    #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
@@ -52,9 +67,9 @@ pub(crate) struct Video {
     /// Which amplitude full light stands for
     #[arg(long, value_enum, default_value_t = BrightnessName::Steady)]
     brightness: BrightnessName,
-    /// Frames a second of the input
-    #[arg(long, value_name = "N", default_value_t = 30.0)]
-    rate: f64,
+    /// Frames a second of the input [default: a film's own; else 30]
+    #[arg(long, value_name = "N")]
+    rate: Option<f64>,
     /// Submit frames at that rate and drop those for which there is no time
     #[arg(long)]
     live: bool,
@@ -67,8 +82,15 @@ pub(crate) struct Video {
     /// Write a preview of each hologram too, focused at this z
     #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
     preview_mm: Option<f64>,
-    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, statistics.json
-    #[arg(short, value_name = "DIR")]
+    /// Go on where an earlier run with the same flags was left
+    #[arg(long, requires = "output", conflicts_with_all = ["live", "overwrite"])]
+    resume: bool,
+    /// Replace what an earlier run made
+    #[arg(long, requires = "output")]
+    overwrite: bool,
+    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, statistics.json; for NAME.mp4 the folder
+    /// NAME, with a film of the previews and NAME-phases.mp4, without loss, beside it
+    #[arg(short, value_name = "DIR|NAME.mp4")]
     output: Option<PathBuf>,
 }
 
@@ -78,95 +100,6 @@ enum BrightnessName {
     Steady,
     /// Each frame's largest
     Max,
-}
-
-/// Frames from where they come.
-enum Source {
-    Folder {
-        paths: Vec<(PathBuf, PathBuf)>,
-        unit: DepthUnit,
-        /// Frames that were read, where they are shown again.
-        kept: Vec<Arc<VideoFrame>>,
-        next: usize,
-        total: usize,
-    },
-    Pipe {
-        raw: RawVideo,
-        first: Option<VideoFrame>,
-    },
-}
-
-impl Source {
-    fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
-        match self {
-            Source::Pipe { raw, first } => match first.take() {
-                Some(frame) => Ok(Some(Arc::new(frame))),
-                None => Ok(raw.read(&mut std::io::stdin().lock())?.map(Arc::new)),
-            },
-            Source::Folder {
-                paths,
-                unit,
-                kept,
-                next,
-                total,
-            } => {
-                if next == total {
-                    return Ok(None);
-                }
-                let at = *next % paths.len();
-                *next += 1;
-                if let Some(frame) = kept.get(at) {
-                    return Ok(Some(frame.clone()));
-                }
-                let (colour, depth) = &paths[at];
-                let frame = Arc::new(video::read_frame(colour, depth, *unit)?);
-                if *total > paths.len() {
-                    kept.push(frame.clone());
-                }
-                Ok(Some(frame))
-            }
-        }
-    }
-
-    fn total(&self) -> u64 {
-        match self {
-            Source::Folder { total, .. } => *total as u64,
-            Source::Pipe { .. } => 0,
-        }
-    }
-}
-
-/// Writes what comes out, and keeps what the report needs.
-struct Sink {
-    output: Option<PathBuf>,
-    preview_z_m: Option<f64>,
-    info: HologramInfo,
-    scales: Vec<f32>,
-}
-
-impl Sink {
-    fn take(&mut self, hologram: &Hologram) -> Result<()> {
-        let index = self.scales.len();
-        self.scales.push(hologram.scale());
-        let Some(dir) = &self.output else {
-            return Ok(());
-        };
-        let (height, width) = hologram.shape();
-        let levels =
-            ArrayView3::from_shape((3, height, width), hologram.levels()).map_err(|e| Error::Input(e.to_string()))?;
-        let info = HologramInfo {
-            scale: Some(hologram.scale()),
-            ..self.info.clone()
-        };
-        files::write_phase_only(&dir.join(format!("phase_{index:06}.png")), levels, &info)?;
-        if let Some(z_m) = self.preview_z_m {
-            let mut rgba = vec![0; 4 * height * width];
-            hologram.preview(z_m, height, width, &mut rgba)?;
-            let path = dir.join(format!("preview_{index:06}.png"));
-            files::write_rgba(&path, width, height, &rgba)?;
-        }
-        Ok(())
-    }
 }
 
 /// A session that is warm. Where the GPU was asked for and does not serve, that is said; where it does, what was
@@ -187,69 +120,39 @@ fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
 
 impl Video {
     pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
-        if !(self.rate.is_finite() && self.rate > 0.0 && self.rate <= 1000.0) {
-            return Err(Error::Input(format!(
-                "--rate {}: it must lie above 0 and up to 1000",
-                self.rate
-            )));
-        }
-        let unit = self.depth.options().unit;
-        let (mut source, (height, width)) = self.source(unit)?;
-        let (options, info) = self.options(height, width, threads)?;
-        if let Some(dir) = &self.output {
-            std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
-        }
-        let mut sink = Sink {
-            output: self.output.clone(),
-            preview_z_m: self.preview_mm.map(|mm| mm / 1e3),
-            info,
-            scales: Vec::new(),
+        let rate = self.rate_hz()?;
+        let before = match (self.resume, self.overwrite) {
+            (true, _) => Before::Resume,
+            (_, true) => Before::Overwrite,
+            _ => Before::Refuse,
         };
-        let bar = progress_bar(source.total(), "frames");
+        let (mut source, (height, width)) = Source::open(&self)?;
+        let (options, info) = self.options(height, width, threads, rate)?;
+        let preview_z_m = self.preview_mm.map(|mm| mm / 1e3);
+        let mut sink = Sink::new(self.output.as_deref(), preview_z_m, info, before)?;
+        let bar = source.progress();
         let start = Instant::now();
         let memory = memory_mb();
         let statistics = match self.live {
-            true => self.live(options, &mut source, &mut sink, &bar)?,
-            false => self.one_by_one(options, &mut source, &mut sink, &bar)?,
+            true => self.live(options, &mut source, &mut sink, &bar, rate)?,
+            false => self.one_by_one(options, &mut source, &mut sink, &bar, rate)?,
         };
         let seconds = start.elapsed().as_secs_f64();
         bar.finish_and_clear();
-        self.report(json, &statistics, seconds, &sink.scales, [memory, memory_mb()])
+        sink.finish(rate)?;
+        self.report(json, &statistics, seconds, &sink, [memory, memory_mb()])
     }
 
-    fn source(&self, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
-        if self.input.as_os_str() == "-" {
-            let Some((width, height)) = self.raw else {
-                return Err(Error::Input(
-                    "raw frames on stdin need --raw WxH, the size of their colour".into(),
-                ));
-            };
-            let (depth_width, depth_height) = self.raw_depth.unwrap_or((width, height));
-            let raw = RawVideo {
-                colour: (height, width),
-                depth: (depth_height, depth_width),
-                unit,
-            };
-            let first = raw.read(&mut std::io::stdin().lock())?;
-            if first.is_none() {
-                return Err(Error::Input("stdin holds no frame".into()));
-            }
-            return Ok((Source::Pipe { raw, first }, (height, width)));
+    /// Frames a second of the input.
+    fn rate_hz(&self) -> Result<f64> {
+        let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
+        let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
+        match rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
+            true => Ok(rate),
+            false => Err(Error::Input(format!(
+                "--rate {rate}: it must lie above 0 and up to 1000"
+            ))),
         }
-        if self.raw.is_some() {
-            return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
-        }
-        let paths = video::frames_of_folder(&self.input)?;
-        let shape = video::read_frame(&paths[0].0, &paths[0].1, unit)?.shape();
-        let total = paths.len() * self.repeat as usize;
-        let source = Source::Folder {
-            paths,
-            unit,
-            kept: Vec::new(),
-            next: 0,
-            total,
-        };
-        Ok((source, shape))
     }
 
     fn options(
@@ -257,6 +160,7 @@ impl Video {
         height: usize,
         width: usize,
         threads: Option<NonZeroUsize>,
+        rate: f64,
     ) -> Result<(SessionOptions, HologramInfo)> {
         let file = self.display.read()?;
         let (width, height) = self.size.unwrap_or((width, height));
@@ -307,7 +211,7 @@ impl Video {
         options.quality = Quality::Fixed(0);
         if self.adaptive {
             options.quality = Quality::Adaptive;
-            options.target_rate_hz = Some(self.rate);
+            options.target_rate_hz = Some(rate);
             for part in [2, 4] {
                 let mut rung = options.ladder[0].clone();
                 rung.height = (height / part).max(1);
@@ -325,10 +229,6 @@ impl Video {
         Ok((options, info))
     }
 
-    fn timestamp_ns(&self, frame: u64) -> u64 {
-        (frame as f64 * 1e9 / self.rate) as u64
-    }
-
     /// Every frame answered.
     fn one_by_one(
         &self,
@@ -336,11 +236,28 @@ impl Video {
         source: &mut Source,
         sink: &mut Sink,
         bar: &indicatif::ProgressBar,
+        rate: f64,
     ) -> Result<Statistics> {
+        let midpoint_steps = options.encoder.midpoint_steps;
         let session = start(options, RunningMode::Video)?;
+        let mut resuming = self.resume;
         let mut frame = 0;
         while let Some(image) = source.next()? {
-            sink.take(&session.process(&image.camera_frame(self.timestamp_ns(frame))?)?)?;
+            let image = image.camera_frame(timestamp_ns(frame, rate))?;
+            let written = if resuming { sink.written()? } else { None };
+            resuming = written.is_some();
+            match written {
+                // These remember more than a replay tells them, so that their frames are made again.
+                Some(scale) if self.method == CoreMethod::Auto || midpoint_steps > 0 => {
+                    session.process(&image)?;
+                    sink.skip(scale);
+                }
+                Some(scale) => {
+                    session.replay(&image, scale)?;
+                    sink.skip(scale);
+                }
+                None => sink.take(&session.process(&image)?)?,
+            }
             frame += 1;
             bar.inc(1);
         }
@@ -354,6 +271,7 @@ impl Video {
         source: &mut Source,
         sink: &mut Sink,
         bar: &indicatif::ProgressBar,
+        rate: f64,
     ) -> Result<Statistics> {
         // Results are written beside the session's thread; where writing is too slow, it waits and drops frames.
         let (sender, results) = mpsc::sync_channel::<Hologram>(2);
@@ -389,7 +307,7 @@ impl Video {
                 }
                 result
             });
-            let submitted = self.submit_all(&session, source);
+            let submitted = submit_all(&session, source, rate);
             session.close();
             let statistics = session.statistics();
             // The listener, and with it the channel, goes with the session.
@@ -408,29 +326,12 @@ impl Video {
         Ok(statistics)
     }
 
-    fn submit_all(&self, session: &Session, source: &mut Source) -> Result<()> {
-        let paced = matches!(source, Source::Folder { .. });
-        let start = Instant::now();
-        let mut frame = 0;
-        while let Some(image) = source.next()? {
-            let timestamp = self.timestamp_ns(frame);
-            if paced {
-                // A pipe's own rate is a camera's; files come when they are due.
-                let due = start + Duration::from_nanos(timestamp);
-                std::thread::sleep(due.saturating_duration_since(Instant::now()));
-            }
-            session.submit(&image.camera_frame(timestamp)?)?;
-            frame += 1;
-        }
-        Ok(())
-    }
-
     fn report(
         &self,
         json: bool,
         statistics: &Statistics,
         seconds: f64,
-        scales: &[f32],
+        sink: &Sink,
         memory_mb: [Option<f64>; 2],
     ) -> Result<()> {
         let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
@@ -438,6 +339,7 @@ impl Video {
             .map(|(stage, time)| (stage.to_owned(), json!(ms(time))))
             .collect();
         let s = statistics;
+        let scales = &sink.scales;
         let change = scales.windows(2).map(|pair| f64::from(pair[1] / pair[0] - 1.0).powi(2));
         let change = (change.sum::<f64>() / (scales.len().max(2) - 1) as f64).sqrt();
         let result = json!({
@@ -451,7 +353,7 @@ impl Video {
             "stage_ms": stages, "total_ms": ms(s.times.total()), "backend": s.backend.name,
             "backend_reason": s.backend.why, "rung": s.rung, "scale_change": change, "memory_mb": memory_mb,
         });
-        if let Some(dir) = &self.output {
+        if let Some(dir) = sink.folder() {
             files::write_atomically(&dir.join("statistics.json"), |file| {
                 serde_json::to_writer_pretty(&mut *file, &result)?;
                 std::io::Write::write_all(file, b"\n")
@@ -472,6 +374,27 @@ impl Video {
         );
         Ok(())
     }
+}
+
+fn timestamp_ns(frame: u64, rate_hz: f64) -> u64 {
+    (frame as f64 * 1e9 / rate_hz) as u64
+}
+
+fn submit_all(session: &Session, source: &mut Source, rate_hz: f64) -> Result<()> {
+    let paced = source.is_stored();
+    let start = Instant::now();
+    let mut frame = 0;
+    while let Some(image) = source.next()? {
+        let timestamp = timestamp_ns(frame, rate_hz);
+        if paced {
+            // A pipe's own rate is a camera's; files come when they are due.
+            let due = start + Duration::from_nanos(timestamp);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        session.submit(&image.camera_frame(timestamp)?)?;
+        frame += 1;
+    }
+    Ok(())
 }
 
 /// Memory in use, MB; None where the system does not say.

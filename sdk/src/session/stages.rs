@@ -9,7 +9,7 @@ use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use super::{MOST_THREADS, SessionOptions};
 use crate::depth::camera::CameraFrame;
-use crate::depth::stream::DepthStream;
+use crate::depth::stream::{DepthReport, DepthStream};
 use crate::error::{Error, Result};
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame};
 use rayon::ThreadPool;
@@ -26,6 +26,34 @@ struct RungPlan {
     frame: RgbdFrame,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
+}
+
+impl RungPlan {
+    /// Colour and depth of `frame` become those of the hologram.
+    fn take_in(
+        &mut self,
+        frame: &CameraFrame<'_>,
+        elapsed: Option<Duration>,
+        times: &mut FrameTimes,
+    ) -> Result<DepthReport> {
+        let start = Instant::now();
+        let (height, width) = self.frame.shape();
+        let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
+        if self.colour.as_mut().filter(fits).is_none() {
+            let colour = ColourPlan::new(&frame.colour, frame.orientation, height, width)?;
+            let scratch = colour.scratch();
+            self.colour = Some((colour, scratch));
+        }
+        let (rgb, depth) = self.frame.planes_mut();
+        if let Some((colour, scratch)) = &mut self.colour {
+            colour.convert(&frame.colour, rgb, scratch)?;
+        }
+        times.colour = start.elapsed();
+        let start = Instant::now();
+        let report = self.depth.next(frame, elapsed, rgb, depth)?;
+        times.depth = start.elapsed();
+        Ok(report)
+    }
 }
 
 /// The stages of a session.
@@ -171,10 +199,7 @@ impl Stages {
         quality: Quality,
     ) -> Result<Made> {
         let start = Instant::now();
-        let elapsed = (self.last_ns.filter(|_| past))
-            .and_then(|last| frame.timestamp_ns.checked_sub(last))
-            .map(Duration::from_nanos)
-            .filter(|gap| *gap <= LONGEST_GAP);
+        let elapsed = self.elapsed(frame, past);
         let mut plan = self.take_plan()?;
         let made = self.run(&mut plan, frame, elapsed);
         self.plan = Some(plan);
@@ -204,6 +229,28 @@ impl Stages {
         change
     }
 
+    /// Does of [`Self::process`] what the frames after `frame` need, where its hologram is known to have got `scale`.
+    pub(super) fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
+        let elapsed = self.elapsed(frame, past);
+        let mut plan = self.take_plan()?;
+        let taken = self
+            .pool
+            .install(|| plan.take_in(frame, elapsed, &mut FrameTimes::default()));
+        self.plan = Some(plan);
+        taken?;
+        self.brightness.heed(scale);
+        self.last_ns = Some(frame.timestamp_ns);
+        Ok(())
+    }
+
+    /// Since the frame before, where the past counts.
+    fn elapsed(&self, frame: &CameraFrame<'_>, past: bool) -> Option<Duration> {
+        (self.last_ns.filter(|_| past))
+            .and_then(|last| frame.timestamp_ns.checked_sub(last))
+            .map(Duration::from_nanos)
+            .filter(|gap| *gap <= LONGEST_GAP)
+    }
+
     fn run(&mut self, plan: &mut RungPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
         let Stages {
             pool,
@@ -224,24 +271,11 @@ impl Stages {
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {
-            let start = Instant::now();
-            let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
-            if plan.colour.as_mut().filter(fits).is_none() {
-                let colour = ColourPlan::new(&frame.colour, frame.orientation, shape.0, shape.1)?;
-                let scratch = colour.scratch();
-                plan.colour = Some((colour, scratch));
-            }
-            let (rgb, depth) = plan.frame.planes_mut();
-            if let Some((colour, scratch)) = &mut plan.colour {
-                colour.convert(&frame.colour, rgb, scratch)?;
-            }
-            times.colour = start.elapsed();
-            let start = Instant::now();
-            let report = plan.depth.next(frame, elapsed, rgb, depth)?;
-            for (to, d) in depths.values.iter_mut().zip(&*depth) {
+            let report = plan.take_in(frame, elapsed, &mut times)?;
+            let depth = plan.frame.depth();
+            for (to, d) in depths.values.iter_mut().zip(depth) {
                 *to = (d * 65535.0 + 0.5) as u16;
             }
-            times.depth = start.elapsed();
             let encoded = plan.engine.process(
                 &mut RungContext { options, rung, gpu },
                 &FrameInput {

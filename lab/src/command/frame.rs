@@ -1,0 +1,194 @@
+//! The flags of an RGB-D image: from two files, from a photo with depth inside, or from any picture by a network that
+//! sees depth; and how it lies on the modulator.
+
+use super::flags::DepthFlags;
+use clap::{Args, ValueEnum};
+use ndarray::{Array2, Array3};
+use phasefront::{Display, RgbdFrame};
+use phasefront_lab::depth_network::{Colours, DepthNetwork};
+use phasefront_lab::fit::{Fit, Placement};
+use phasefront_lab::photo;
+use phasefront_lab::{Error, Result, files, rgbd};
+use std::path::{Path, PathBuf};
+
+/// An RGB-D image, what its depth means, and how it lies on the modulator.
+#[derive(Default, Args)]
+pub(crate) struct FrameFlags {
+    /// Colour image, PNG or JPEG
+    #[arg(long, value_name = "FILE", conflicts_with = "photo")]
+    rgb: Option<PathBuf>,
+    /// Depth image: grey PNG of 8 or 16 bits, or .npy
+    #[arg(long, value_name = "FILE", requires = "rgb", conflicts_with = "depth_network")]
+    depth: Option<PathBuf>,
+    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth)
+    #[arg(long, value_name = "FILE")]
+    photo: Option<PathBuf>,
+    #[command(flatten)]
+    seen: SeenDepthFlags,
+    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with --photo]
+    #[arg(long, value_enum)]
+    fit: Option<FitName>,
+    #[command(flatten)]
+    depth_numbers: DepthFlags,
+}
+
+/// Depth that a network sees, and which way depth goes.
+#[derive(Clone, Default, Args)]
+pub(crate) struct SeenDepthFlags {
+    /// ONNX file of a network that sees relative inverse depth in colour alone (docs/depth.md)
+    #[arg(long, value_name = "FILE")]
+    depth_network: Option<PathBuf>,
+    /// Numbers that the colours are for --depth-network
+    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
+    depth_network_colours: ColoursName,
+    /// Take near for far: for depth that is larger where it is nearer, and for --depth-network that gives distance
+    #[arg(long)]
+    invert: bool,
+}
+
+impl SeenDepthFlags {
+    pub(crate) fn network(&self) -> Option<&Path> {
+        self.depth_network.as_deref()
+    }
+
+    pub(crate) fn invert(&self) -> bool {
+        self.invert
+    }
+
+    /// What `network` sees in `rgb`, larger where it is farther.
+    pub(crate) fn farther(&self, network: &DepthNetwork, rgb: &Array3<f32>) -> Result<Array2<f32>> {
+        let seen = network.see(rgb.view(), self.depth_network_colours.colours())?;
+        Ok(match self.invert {
+            true => seen,
+            false => seen.mapv(|v| -v),
+        })
+    }
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum ColoursName {
+    #[default]
+    /// Of ImageNet's mean and spread: MiDaS, DPT, Depth Anything
+    Imagenet,
+    /// From 0 to 1
+    Unit,
+    /// From -1 to 1
+    Signed,
+}
+
+impl ColoursName {
+    fn colours(self) -> Colours {
+        match self {
+            ColoursName::Imagenet => Colours::Imagenet,
+            ColoursName::Unit => Colours::Unit,
+            ColoursName::Signed => Colours::Signed,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FitName {
+    /// The whole image, in the middle of black
+    Contain,
+    /// As much of it as fills the modulator
+    Cover,
+    /// Pixel for pixel, in the middle
+    Centre,
+}
+
+impl FitName {
+    fn fit(self) -> Fit {
+        match self {
+            FitName::Contain => Fit::Contain,
+            FitName::Cover => Fit::Cover,
+            FitName::Centre => Fit::Centre,
+        }
+    }
+}
+
+impl FrameFlags {
+    /// The file of the picture.
+    pub(crate) fn source(&self) -> Option<&Path> {
+        self.photo.as_deref().or(self.rgb.as_deref())
+    }
+
+    /// The frame for `display`.
+    pub(crate) fn read(&self, display: &Display) -> Result<RgbdFrame> {
+        let frame = match (&self.rgb, &self.depth, &self.photo) {
+            (Some(rgb), Some(depth), _) => {
+                let frame = rgbd::read(rgb, depth, self.depth_numbers.options())?;
+                let frame = self.inverted(frame)?;
+                let placement = self.placement(frame.shape(), display);
+                placement.frame(placement.colour(frame.rgb()), placement.depth(frame.depth()))
+            }
+            (Some(rgb), None, _) => self.by_network(&files::read_rgb(rgb)?, display),
+            (None, _, Some(path)) => {
+                let photo = photo::read(path)?;
+                match self.seen.network() {
+                    Some(_) => self.by_network(&photo.rgb, display),
+                    None => self.inverted(self.of_photo(path, &photo, display)?),
+                }
+            }
+            _ => Err(Error::Input(
+                "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
+            )),
+        }?;
+        let modulator = (display.height(), display.width());
+        let usual = Display::default();
+        let is_usual = modulator == (usual.height(), usual.width());
+        if frame.shape() != modulator && !is_usual {
+            let (height, width) = frame.shape();
+            log::warn!(
+                "the hologram is {width}×{height} as the image is, the modulator {}×{}: --fit contain, cover or centre makes the whole modulator's",
+                modulator.1,
+                modulator.0
+            );
+        }
+        Ok(frame)
+    }
+
+    fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {
+        let usual = self.photo.is_some().then_some(Fit::Contain);
+        match self.fit.map(FitName::fit).or(usual) {
+            Some(fit) => Placement::new(picture, (display.height(), display.width()), fit),
+            None => Placement::as_is(picture),
+        }
+    }
+
+    fn inverted(&self, frame: RgbdFrame) -> Result<RgbdFrame> {
+        match self.seen.invert {
+            true => Ok(RgbdFrame::new(frame.rgb().to_owned(), frame.depth().mapv(|d| 1.0 - d))?),
+            false => Ok(frame),
+        }
+    }
+
+    /// The frame of a photo: by its distances where --near or --far ask for them, else d_n as it is.
+    fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
+        let options = self.depth_numbers.options();
+        let depth = match (options.near_m, options.far_m, photo.metres()) {
+            (None, None, _) => rgbd::relative(photo.depth.view(), None, None),
+            (near, far, Some(metres)) => rgbd::relative(metres.view(), near, far),
+            _ => {
+                return Err(Error::file(
+                    path,
+                    "does not say its depth's range in metres; leave out --near and --far",
+                ));
+            }
+        };
+        let depth = depth.map_err(|e| Error::file(path, e))?;
+        let (_, height, width) = photo.rgb.dim();
+        rgbd::refined(&photo.rgb, &depth, &self.placement((height, width), display))
+    }
+
+    fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
+        let Some(path) = self.seen.network() else {
+            return Err(Error::Input(
+                "--rgb needs --depth, or --depth-network that sees it".into(),
+            ));
+        };
+        let (_, height, width) = rgb.dim();
+        let farther = self.seen.farther(&DepthNetwork::open(path, (height, width))?, rgb)?;
+        let depth = rgbd::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
+        rgbd::refined(rgb, &depth, &self.placement((height, width), display))
+    }
+}

@@ -1,0 +1,339 @@
+//! `phasefront judge`: methods and encoders side by side, on one's own image and display.
+
+use super::flags::{DisplayFlags, EncoderFlags, EncoderName, progress_bar};
+use super::frame::FrameFlags;
+use super::hologram::{Image, Made, Making, Method, infos};
+use super::method::CoreMethod;
+use clap::Args;
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::EncoderOptions;
+use phasefront::unstable::depth::sharpness;
+use phasefront_lab::evaluate::{self, Figures};
+use phasefront_lab::files::{self, DisplayFile, Hologram};
+use phasefront_lab::ldi::Ldi;
+use phasefront_lab::viewer::{self, Depth, Scene};
+use phasefront_lab::{Error, Result, models, pictures};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Judge methods and encoders on an image and a display: what is shown, and what it takes
+///
+/// With a layered depth image the truth is its exact wave. With an RGB-D image there is none: where depth is sharp, the
+/// exact wave of what is visible and of the hidden surfaces that the sweep finds takes its place, else the largest
+/// network's. The answer says which.
+#[derive(Args)]
+pub(crate) struct Judge {
+    #[command(flatten)]
+    frame: FrameFlags,
+    /// Folder of a layered depth image
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth", "photo", "depth_network", "fit"])]
+    ldi: Option<PathBuf>,
+    /// Methods [default: sweep and, where they were trained for the display, network and seeded]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    method: Vec<CoreMethod>,
+    /// Encoders, each as published, corrected as is usual, and corrected for a still
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"])]
+    encoder: Vec<EncoderName>,
+    /// Planes of the exact wave
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
+    planes: u16,
+    /// Pixels at the border that do not count: into an image at an offset light comes from outside
+    #[arg(long, value_name = "PX", default_value_t = 0)]
+    margin: usize,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// A page to look at them all in
+    #[arg(short, value_name = "OUT.html")]
+    output: Option<PathBuf>,
+}
+
+/// Depths of the focal stack beside the midpoint, and of a page.
+const STACK: usize = 4;
+const PAGE_VIEWS: usize = 9;
+/// Bytes of all views of a page.
+const PAGE_BYTES: usize = 4_000_000;
+/// What corrects a still.
+const STILL_STEPS: usize = 3;
+
+/// One way to a hologram.
+struct Way {
+    method: CoreMethod,
+    encoder: EncoderFlags,
+    /// Of the pairs, whose encoder is their own.
+    network: Option<&'static str>,
+}
+
+/// A way, judged.
+struct Row {
+    method: &'static str,
+    encoder: String,
+    figures: Figures,
+    wave: Duration,
+    encode: Duration,
+    made: Made,
+}
+
+impl Judge {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        if let Some(path) = self.output.as_ref().filter(|path| !files::has_extension(path, "html")) {
+            return Err(Error::file(path, "the name must end in .html"));
+        }
+        let file = self.display.read()?;
+        let display = &file.target.display;
+        let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
+        let frame = match &layers {
+            Some(ldi) => evaluate::visible_frame(ldi)?,
+            None => self.frame.read(display)?,
+        };
+        let (height, width) = frame.shape();
+        if 2 * self.margin >= height.min(width) {
+            return Err(Error::Input(format!(
+                "--margin {} leaves nothing of {width}×{height} pixels",
+                self.margin
+            )));
+        }
+        let sharp = sharpness::measure(&frame).is_sharp();
+        let image = Image::Rgbd(frame);
+        let mut making = Making::of(self.display.clone());
+        let (truth, what) = self.truth(&file, &image, layers.as_ref(), sharp, &mut making)?;
+        let z_m: Vec<f64> = std::iter::once(0.0)
+            .chain((0..STACK).map(|i| display.z_of_depth((i as f64 + 0.5) / STACK as f64)))
+            .collect();
+        let wanted = truth.views_on(&file, &z_m)?;
+        let ways = self.ways(display);
+        let bar = progress_bar(ways.len() as u64, "ways");
+        let mut rows = Vec::new();
+        for way in ways {
+            making.way(Method::Core(way.method), way.network.map(str::to_owned), way.encoder);
+            let made = making.make(&file, &image)?;
+            let (info, _) = infos(&file, &made);
+            let shown = Hologram::PhaseOnly(made.levels.clone(), info).views_on(&file, &z_m)?;
+            let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
+            rows.push(Row {
+                method: if way.network.is_some() {
+                    "pair"
+                } else {
+                    way.method.name()
+                },
+                encoder: made.encoder.describe(),
+                figures: evaluate::judge(&shown, &wanted, self.margin)?,
+                wave: times[..times.len() - 1].iter().sum(),
+                encode: times[times.len() - 1],
+                made,
+            });
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        if let Some(path) = &self.output {
+            write_page(path, &file, &truth, &what, &image, &rows)?;
+        }
+        let value = json!({
+            "truth": what, "width": width, "height": height, "output": self.output.as_ref().map(|path| path.display().to_string()),
+            "rows": rows.iter().map(Row::json).collect::<Vec<_>>(),
+        });
+        super::print(json, &value, table(&rows, &what));
+        Ok(())
+    }
+
+    /// What ways are judged by: a field at the modulator, and what it is.
+    fn truth(
+        &self,
+        file: &DisplayFile,
+        image: &Image,
+        layers: Option<&Ldi>,
+        sharp: bool,
+        making: &mut Making,
+    ) -> Result<(Hologram, String)> {
+        let display = &file.target.display;
+        let best = "15";
+        let trained = models::network(best, models::Precision::Float32)?
+            .check_display(display)
+            .is_ok();
+        making.keeps_field = true;
+        let (made, what) = match (layers, image) {
+            (Some(ldi), _) => {
+                let what = format!("the exact wave of its {} layers: the truth", ldi.layers.len());
+                (self.exact(making, file, ldi)?, what)
+            }
+            (None, Image::Rgbd(frame)) if sharp || !trained => {
+                let filled = evaluate::filled(frame, display)?;
+                let what = "the exact wave of what is visible and of hidden surfaces as the sweep finds them, for there is no truth";
+                (self.exact(making, file, &filled)?, what.to_owned())
+            }
+            _ => {
+                making.way(
+                    Method::Core(CoreMethod::Network),
+                    Some(best.into()),
+                    EncoderFlags::default(),
+                );
+                making.in_float32();
+                let made = making.make(file, image)?;
+                let what = "the wave of the network of 15 layers, for depth is ragged and there is no truth";
+                (made, what.to_owned())
+            }
+        };
+        making.keeps_field = false;
+        let (_, info) = infos(file, &made);
+        let field: Array3<Complex32> = made.field.expect("kept for this");
+        Ok((Hologram::Complex(field, info), what))
+    }
+
+    fn exact(&self, making: &mut Making, file: &DisplayFile, ldi: &Ldi) -> Result<Made> {
+        making.way(Method::Layers, None, EncoderFlags::default());
+        making.with_planes(self.planes.into());
+        making.make(file, &Image::Layers(ldi.clone()))
+    }
+
+    fn ways(&self, display: &phasefront::Display) -> Vec<Way> {
+        let trained = phasefront_models::usual_network(display).is_some();
+        let usual = match trained {
+            true => vec![CoreMethod::Sweep, CoreMethod::Network, CoreMethod::Seeded],
+            false => vec![CoreMethod::Sweep],
+        };
+        let methods = if self.method.is_empty() {
+            usual
+        } else {
+            self.method.clone()
+        };
+        let mut ways = Vec::new();
+        for &method in &methods {
+            for &encoder in &self.encoder {
+                let steps = EncoderOptions::default().local_steps;
+                let corrections = [
+                    (0.0, 0, 0),
+                    (EncoderOptions::DARK, steps, 0),
+                    (EncoderOptions::DARK, steps, STILL_STEPS),
+                ];
+                ways.extend(corrections.map(|(dark, local, midpoint)| Way {
+                    method,
+                    encoder: EncoderFlags::of(encoder, dark, local, midpoint),
+                    network: None,
+                }));
+            }
+        }
+        let pair = phasefront_models::pair_for(display, models::Precision::Int8).is_some();
+        if pair && methods.contains(&CoreMethod::Network) {
+            ways.push(Way {
+                method: CoreMethod::Network,
+                encoder: EncoderFlags::default(),
+                network: Some(models::DEEP),
+            });
+        }
+        ways
+    }
+}
+
+impl Row {
+    fn name(&self) -> String {
+        format!("{}, {}", self.method, self.encoder)
+    }
+
+    fn json(&self) -> serde_json::Value {
+        let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        json!({
+            "method": self.method, "encoder": self.encoder, "psnr_db": self.figures.amplitude_psnr,
+            "ssim": self.figures.amplitude_ssim, "stack_psnr_db": self.figures.focal_psnr,
+            "stack_ssim": self.figures.focal_ssim, "brightness": self.figures.brightness,
+            "wave_ms": ms(self.wave), "encode_ms": ms(self.encode),
+        })
+    }
+}
+
+fn table(rows: &[Row], what: &str) -> String {
+    let wide = rows
+        .iter()
+        .map(|row| row.encoder.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(7);
+    let mut text = format!(
+        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  brightness  wave ms  encode ms",
+        "method", "encoder"
+    );
+    for row in rows {
+        let Figures {
+            amplitude_psnr,
+            amplitude_ssim,
+            focal_psnr,
+            focal_ssim,
+            brightness,
+            ..
+        } = row.figures;
+        text += &format!(
+            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {brightness:10.3}  {:7.1}  {:9.1}",
+            row.method,
+            row.encoder,
+            1e3 * row.wave.as_secs_f64(),
+            1e3 * row.encode.as_secs_f64(),
+        );
+    }
+    text + &format!("\nJudged by {what}. Times are of one run, after no warm-up.")
+}
+
+/// A page with what each way shows, and what it is judged by.
+fn write_page(
+    path: &std::path::Path,
+    file: &DisplayFile,
+    truth: &Hologram,
+    what: &str,
+    image: &Image,
+    rows: &[Row],
+) -> Result<()> {
+    let last = (PAGE_VIEWS - 1) as f64;
+    let z_m: Vec<f64> = (0..PAGE_VIEWS)
+        .map(|i| file.target.display.z_of_depth(i as f64 / last))
+        .collect();
+    let budget = PAGE_BYTES / (rows.len() + 1);
+    let Image::Rgbd(frame) = image else {
+        return Err(Error::Input("a page needs an RGB-D image".into()));
+    };
+    let depth = Depth::known(&frame.depth().to_owned(), |d| (f64::from(d) * last).round() as u8);
+    let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
+        let (height, width) = hologram.shape();
+        let views = hologram.views_on(file, &z_m)?;
+        let views: Vec<_> = (views.iter())
+            .map(|view| pictures::at_width(pictures::of_amplitude(view.view()), viewer::WIDEST))
+            .collect();
+        Ok(Scene {
+            title,
+            width,
+            height,
+            z_mm: z_m.iter().map(|z| z * 1e3).collect(),
+            frames: 1,
+            shown: viewer::pack(&views, budget)?,
+            field: Vec::new(),
+            phase: None,
+            depth: depth.clone(),
+            figures,
+        })
+    };
+    let mut scenes = vec![scene(format!("Judged by {what}"), truth, Vec::new())?];
+    for row in rows {
+        let Figures {
+            amplitude_psnr,
+            amplitude_ssim,
+            brightness,
+            ..
+        } = row.figures;
+        let figures = vec![
+            (
+                "At the middle".into(),
+                format!("{amplitude_psnr:.2} dB, SSIM {amplitude_ssim:.3}"),
+            ),
+            (
+                "Over depths".into(),
+                format!("{:.2} dB, SSIM {:.3}", row.figures.focal_psnr, row.figures.focal_ssim),
+            ),
+            ("Brightness".into(), format!("{brightness:.3} of what it is judged by")),
+        ];
+        let (info, _) = infos(file, &row.made);
+        scenes.push(scene(
+            row.name(),
+            &Hologram::PhaseOnly(row.made.levels.clone(), info),
+            figures,
+        )?);
+    }
+    viewer::write(path, &scenes).map(|_| ())
+}

@@ -1,0 +1,257 @@
+//! Frames from where they come: folders, films, pipes.
+
+use super::Video;
+use crate::command::flags::{progress_bar, progress_count};
+use crate::command::frame::SeenDepthFlags;
+use indicatif::ProgressBar;
+use phasefront::unstable::depth::DepthUnit;
+use phasefront_lab::depth_network::DepthNetwork;
+use phasefront_lab::film::{self, Film, Pixels};
+use phasefront_lab::sequence::{self, Sequence};
+use phasefront_lab::video::{self, RawVideo, VideoFrame};
+use phasefront_lab::{Error, Result, rgbd};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Frames from where they come.
+pub(super) enum Source {
+    Folder(Folder),
+    Film(Box<FilmSource>),
+    Pipe { raw: RawVideo, first: Option<VideoFrame> },
+}
+
+pub(super) struct Folder {
+    paths: Vec<(PathBuf, PathBuf)>,
+    unit: DepthUnit,
+    invert: bool,
+    /// Frames that were read, where they are shown again.
+    kept: Vec<Arc<VideoFrame>>,
+    next: usize,
+    total: usize,
+}
+
+pub(super) struct FilmSource {
+    colour: Film,
+    depth: FilmDepth,
+    unit: DepthUnit,
+    invert: bool,
+    first: Option<VideoFrame>,
+    frames: Option<u64>,
+}
+
+/// Where a film's depth is.
+enum FilmDepth {
+    /// In a film of its own.
+    Film(Film),
+    /// In the right half of the pictures.
+    Beside,
+    /// Seen by a network, made for the first picture's size.
+    Network {
+        path: PathBuf,
+        flags: SeenDepthFlags,
+        network: Option<DepthNetwork>,
+    },
+}
+
+impl Source {
+    /// The source that `flags` name, and the (H, W) of its first frame.
+    pub(super) fn open(flags: &Video) -> Result<(Source, (usize, usize))> {
+        let unit = flags.depth.options().unit;
+        if flags.input.as_os_str() == "-" {
+            return open_pipe(flags, unit);
+        }
+        if flags.raw.is_some() {
+            return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
+        }
+        if film::is_film(&flags.input) {
+            return open_film(flags, unit);
+        }
+        if flags.depth_video.is_some() || flags.depth_beside || flags.seen.network().is_some() {
+            return Err(Error::Input(
+                "--depth-video, --depth-beside and --depth-network go with a film, as clip.mp4".into(),
+            ));
+        }
+        let Sequence {
+            frames: paths,
+            unit: said,
+        } = match &flags.pairs {
+            None => sequence::of_folder(&flags.input)?,
+            Some(pattern) => {
+                let (colour, depth) = pattern.split_once(',').ok_or_else(|| {
+                    Error::Input("--pairs takes two patterns with a comma between, as rgb_*.png,depth_*.png".into())
+                })?;
+                sequence::by_pattern(&flags.input, colour, depth)?
+            }
+        };
+        // The layouts that say their unit never hold normalized depth.
+        let unit = said.filter(|_| unit == DepthUnit::Normalized).unwrap_or(unit);
+        let shape = video::read_frame(&paths[0].0, &paths[0].1, unit)?.shape();
+        let total = paths.len() * flags.repeat as usize;
+        let folder = Folder {
+            paths,
+            unit,
+            invert: flags.seen.invert(),
+            kept: Vec::new(),
+            next: 0,
+            total,
+        };
+        Ok((Source::Folder(folder), shape))
+    }
+
+    pub(super) fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+        match self {
+            Source::Pipe { raw, first } => match first.take() {
+                Some(frame) => Ok(Some(Arc::new(frame))),
+                None => Ok(raw.read(&mut std::io::stdin().lock())?.map(Arc::new)),
+            },
+            Source::Film(film) => Ok(film.next()?.map(Arc::new)),
+            Source::Folder(folder) => folder.next(),
+        }
+    }
+
+    /// Whether frames are there before they are due.
+    pub(super) fn is_stored(&self) -> bool {
+        !matches!(self, Source::Pipe { .. })
+    }
+
+    pub(super) fn progress(&self) -> ProgressBar {
+        let frames = match self {
+            Source::Folder(folder) => Some(folder.total as u64),
+            Source::Film(film) => film.frames,
+            Source::Pipe { .. } => None,
+        };
+        match frames {
+            Some(frames) => progress_bar(frames, "frames"),
+            None => progress_count("frames"),
+        }
+    }
+}
+
+impl Folder {
+    fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+        if self.next == self.total {
+            return Ok(None);
+        }
+        let at = self.next % self.paths.len();
+        self.next += 1;
+        if let Some(frame) = self.kept.get(at) {
+            return Ok(Some(frame.clone()));
+        }
+        let (colour, depth) = &self.paths[at];
+        let mut frame = video::read_frame(colour, depth, self.unit)?;
+        if self.invert {
+            frame.invert().map_err(|e| Error::file(depth, e))?;
+        }
+        let frame = Arc::new(frame);
+        if self.total > self.paths.len() {
+            self.kept.push(frame.clone());
+        }
+        Ok(Some(frame))
+    }
+}
+
+fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
+    let Some((width, height)) = flags.raw else {
+        return Err(Error::Input(
+            "raw frames on stdin need --raw WxH, the size of their colour".into(),
+        ));
+    };
+    let (depth_width, depth_height) = flags.raw_depth.unwrap_or((width, height));
+    let raw = RawVideo {
+        colour: (height, width),
+        depth: (depth_height, depth_width),
+        unit,
+    };
+    let first = raw.read(&mut std::io::stdin().lock())?;
+    if first.is_none() {
+        return Err(Error::Input("stdin holds no frame".into()));
+    }
+    Ok((Source::Pipe { raw, first }, (height, width)))
+}
+
+fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
+    let path = &flags.input;
+    let depth = match (&flags.depth_video, flags.depth_beside, flags.seen.network()) {
+        (Some(depth), false, None) => FilmDepth::Film(Film::open(depth, Pixels::Grey)?),
+        (None, true, None) => FilmDepth::Beside,
+        (None, false, Some(network)) => FilmDepth::Network {
+            path: network.into(),
+            flags: flags.seen.clone(),
+            network: None,
+        },
+        _ => {
+            return Err(Error::file(
+                path,
+                "a film holds colour alone; its depth comes from one of --depth-video FILE, --depth-beside and --depth-network FILE",
+            ));
+        }
+    };
+    let mut film = FilmSource {
+        colour: Film::open(path, Pixels::Rgb)?,
+        depth,
+        unit,
+        invert: flags.seen.invert(),
+        first: None,
+        frames: film::about(path).map(|about| about.frames),
+    };
+    film.first = film.read()?;
+    let first = film
+        .first
+        .as_ref()
+        .ok_or_else(|| Error::file(path, "holds no picture"))?;
+    let shape = first.shape();
+    Ok((Source::Film(Box::new(film)), shape))
+}
+
+impl FilmSource {
+    fn next(&mut self) -> Result<Option<VideoFrame>> {
+        match self.first.take() {
+            Some(frame) => Ok(Some(frame)),
+            None => self.read(),
+        }
+    }
+
+    fn read(&mut self) -> Result<Option<VideoFrame>> {
+        let Some(colour) = self.colour.read()? else {
+            return Ok(None);
+        };
+        let mut frame = match &mut self.depth {
+            // The shorter of two films is the end of both.
+            FilmDepth::Film(film) => match film.read()? {
+                None => return Ok(None),
+                Some(depth) => {
+                    VideoFrame::of_big_endian(colour.shape, colour.bytes, depth.shape, &depth.bytes, self.unit)
+                }
+            },
+            FilmDepth::Beside => VideoFrame::of_halves(colour.shape, &colour.bytes)?,
+            FilmDepth::Network { path, flags, network } => {
+                return see(path, flags, network, colour.shape, colour.bytes).map(Some);
+            }
+        };
+        if self.invert {
+            frame.invert()?;
+        }
+        Ok(Some(frame))
+    }
+}
+
+/// A frame whose depth `network` sees.
+fn see(
+    path: &Path,
+    flags: &SeenDepthFlags,
+    network: &mut Option<DepthNetwork>,
+    shape: (usize, usize),
+    colour: Vec<u8>,
+) -> Result<VideoFrame> {
+    let (height, width) = shape;
+    let rgb = ndarray::Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+        f32::from(colour[3 * (y * width + x) + c]) / 255.0
+    });
+    let network = match network {
+        Some(network) => network,
+        None => network.insert(DepthNetwork::open(path, shape)?),
+    };
+    let farther = flags.farther(network, &rgb)?;
+    let depth = rgbd::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
+    Ok(VideoFrame::normalized(shape, colour, &depth))
+}

@@ -1,0 +1,260 @@
+//! Films (mp4 and all else that ffmpeg knows), by the `ffmpeg` that is installed: pictures out of one, pictures into
+//! one.
+
+use crate::error::{Error, Result};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, ChildStdout, Command, Stdio};
+
+/// Endings of films' names.
+const ENDINGS: [&str; 6] = ["mp4", "mov", "mkv", "webm", "avi", "m4v"];
+
+/// Whether `path` is named as a film.
+pub fn is_film(path: &Path) -> bool {
+    ENDINGS.iter().any(|ending| crate::files::has_extension(path, ending))
+}
+
+/// What ffmpeg is called for.
+///
+/// # Errors
+/// No ffmpeg.
+pub fn check(path: &Path) -> Result<()> {
+    let found = Command::new("ffmpeg")
+        .arg("-version")
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
+    match found {
+        Ok(status) if status.success() => Ok(()),
+        _ => Err(Error::file(
+            path,
+            "films need ffmpeg, which is not installed; without it there are folders of pictures and raw frames on stdin",
+        )),
+    }
+}
+
+/// What a film says of itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct About {
+    /// Frames a second.
+    pub rate_hz: f64,
+    /// Frames in all, as far as it knows.
+    pub frames: u64,
+}
+
+/// Asks `ffprobe`; None where it does not know.
+pub fn about(path: &Path) -> Option<About> {
+    let output = Command::new("ffprobe")
+        .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
+        .args(["-show_entries", "stream=avg_frame_rate,nb_frames:format=duration"])
+        .arg(path)
+        .output()
+        .ok()?;
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).ok()?;
+    let number = |value: &serde_json::Value| value.as_str()?.parse::<f64>().ok();
+    let stream = &said["streams"][0];
+    let (over, under) = stream["avg_frame_rate"].as_str()?.split_once('/')?;
+    let rate_hz = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
+    let counted = number(&stream["nb_frames"]);
+    let frames = counted.or_else(|| Some(number(&said["format"]["duration"])? * rate_hz))?;
+    (rate_hz.is_finite() && rate_hz > 0.0).then_some(About {
+        rate_hz,
+        frames: frames.round() as u64,
+    })
+}
+
+/// What pictures of a film are wanted as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pixels {
+    /// Red, green, blue, a byte each.
+    Rgb,
+    /// Grey of 16 bits, big-endian.
+    Grey,
+}
+
+/// The pictures of a film, one after the other, upright.
+pub struct Film {
+    path: std::path::PathBuf,
+    ffmpeg: Child,
+    pictures: BufReader<ChildStdout>,
+}
+
+/// One picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// (H, W).
+    pub shape: (usize, usize),
+    /// Row by row, as asked.
+    pub bytes: Vec<u8>,
+}
+
+impl Film {
+    /// # Errors
+    /// No ffmpeg, or no such file.
+    pub fn open(path: &Path, pixels: Pixels) -> Result<Self> {
+        check(path)?;
+        if !path.is_file() {
+            return Err(Error::file(path, "there is no such file"));
+        }
+        let (format, codec) = match pixels {
+            Pixels::Rgb => ("rgb24", "ppm"),
+            Pixels::Grey => ("gray16be", "pgm"),
+        };
+        let mut ffmpeg = Command::new("ffmpeg")
+            .args(["-v", "error", "-nostdin", "-i"])
+            .arg(path)
+            .args([
+                "-map",
+                "0:v:0",
+                "-f",
+                "image2pipe",
+                "-pix_fmt",
+                format,
+                "-c:v",
+                codec,
+                "-",
+            ])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .map_err(|e| Error::file(path, format!("ffmpeg cannot be started: {e}")))?;
+        let pictures = BufReader::new(ffmpeg.stdout.take().expect("piped"));
+        Ok(Film {
+            path: path.into(),
+            ffmpeg,
+            pictures,
+        })
+    }
+
+    /// The next picture; None at the end.
+    ///
+    /// # Errors
+    /// A film that ffmpeg cannot read.
+    pub fn read(&mut self) -> Result<Option<Picture>> {
+        let Some((shape, bytes)) = self.header()? else {
+            return self.end().map(|()| None);
+        };
+        let mut picture = Picture {
+            shape,
+            bytes: vec![0; bytes],
+        };
+        match self.pictures.read_exact(&mut picture.bytes) {
+            Ok(()) => Ok(Some(picture)),
+            Err(_) => Err(Error::file(&self.path, "ends within a picture")),
+        }
+    }
+
+    /// A portable anymap's header, "P6\n640 480\n255\n": its shape, and the bytes that follow.
+    fn header(&mut self) -> Result<Option<((usize, usize), usize)>> {
+        let mut lines = [const { String::new() }; 3];
+        for line in &mut lines {
+            let read = self.pictures.read_line(line);
+            read.map_err(|e| Error::file(&self.path, format!("what ffmpeg makes of it cannot be read: {e}")))?;
+        }
+        let [kind, size, most] = lines.each_ref().map(|line| line.trim());
+        if kind.is_empty() {
+            return Ok(None);
+        }
+        let shape = size
+            .split_once(' ')
+            .and_then(|(w, h)| Some((h.parse().ok()?, w.parse().ok()?)));
+        let pixel = match (kind, most) {
+            ("P6", "255") => 3,
+            ("P5", "65535") => 2,
+            _ => 0,
+        };
+        match shape {
+            Some((height, width)) if pixel > 0 => Ok(Some(((height, width), pixel * height * width))),
+            _ => Err(Error::file(
+                &self.path,
+                "ffmpeg gives pictures of an unknown kind for it",
+            )),
+        }
+    }
+
+    fn end(&mut self) -> Result<()> {
+        let refuse = |why: String| Error::file(&self.path, format!("ffmpeg cannot read it: {why}"));
+        let mut said = String::new();
+        if let Some(mut errors) = self.ffmpeg.stderr.take() {
+            errors.read_to_string(&mut said).map_err(|e| refuse(e.to_string()))?;
+        }
+        match self.ffmpeg.wait() {
+            Ok(status) if status.success() => Ok(()),
+            _ => Err(refuse(last_line(&said))),
+        }
+    }
+}
+
+impl Drop for Film {
+    fn drop(&mut self) {
+        // Where the film was not read to its end.
+        let _ = self.ffmpeg.kill();
+        let _ = self.ffmpeg.wait();
+    }
+}
+
+/// How a film is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quality {
+    /// H.264 as every player shows it.
+    Seen,
+    /// H.264 in RGB without loss: every level stays what it is.
+    Lossless,
+}
+
+/// Makes the film at `path` of pictures whose names are `pattern`, as `out/preview_%06d.png`.
+///
+/// # Errors
+/// No ffmpeg, or what it refuses.
+pub fn write(path: &Path, pattern: &Path, rate_hz: f64, quality: Quality) -> Result<()> {
+    check(path)?;
+    let half = path.with_extension("half.mp4");
+    let mut command = Command::new("ffmpeg");
+    command
+        .args([
+            "-v",
+            "error",
+            "-nostdin",
+            "-y",
+            "-framerate",
+            &rate_hz.to_string(),
+            "-i",
+        ])
+        .arg(pattern);
+    match quality {
+        // Sides must be even for the colours of usual players.
+        Quality::Seen => command.args([
+            "-vf",
+            "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+            "-c:v",
+            "libx264",
+            "-crf",
+            "18",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+        ]),
+        Quality::Lossless => command.args(["-c:v", "libx264rgb", "-qp", "0", "-pix_fmt", "rgb24"]),
+    };
+    command.args(["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]);
+    let output = command
+        .arg(&half)
+        .output()
+        .map_err(|e| Error::file(path, format!("ffmpeg cannot be started: {e}")))?;
+    if !output.status.success() {
+        let _ = std::fs::remove_file(&half);
+        let why = last_line(&String::from_utf8_lossy(&output.stderr));
+        return Err(Error::file(path, format!("ffmpeg cannot write it: {why}")));
+    }
+    std::fs::rename(&half, path).map_err(|e| Error::file(path, format!("cannot be written: {e}")))
+}
+
+fn last_line(text: &str) -> String {
+    text.lines()
+        .map(str::trim)
+        .rfind(|line| !line.is_empty())
+        .unwrap_or("it does not say why")
+        .to_owned()
+}

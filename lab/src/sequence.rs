@@ -1,0 +1,271 @@
+//! Sequences of colour and depth files, as people and data sets lay them in folders.
+
+use crate::error::{Error, Result};
+use crate::video;
+use phasefront::unstable::depth::DepthUnit;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Seconds that a depth image may lie from its colour image where both have times, as TUM's own tool pairs them.
+const TUM_APART_S: f64 = 0.02;
+/// Units in a metre of the TUM RGB-D benchmark's depth.
+const TUM_UNITS_PER_M: f64 = 5000.0;
+/// Names of Redwood's folders of colour.
+const REDWOOD_COLOUR: [&str; 3] = ["rgb", "color", "image"];
+
+/// Frames in their order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sequence {
+    /// Colour and depth of each.
+    pub frames: Vec<(PathBuf, PathBuf)>,
+    /// What the depth's numbers mean, where the layout says so.
+    pub unit: Option<DepthUnit>,
+}
+
+/// The frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), one of Redwood (folders `rgb`
+/// and `depth`), or numbered files ([`video::frames_of_folder`]).
+///
+/// # Errors
+/// A folder that is none of these.
+pub fn of_folder(dir: &Path) -> Result<Sequence> {
+    if dir.join("rgb.txt").is_file() && dir.join("depth.txt").is_file() {
+        return tum(dir);
+    }
+    let colour = REDWOOD_COLOUR
+        .iter()
+        .map(|name| dir.join(name))
+        .find(|path| path.is_dir());
+    if let Some(colour) = colour
+        && dir.join("depth").is_dir()
+    {
+        return redwood(&colour, &dir.join("depth"));
+    }
+    Ok(Sequence {
+        frames: video::frames_of_folder(dir)?,
+        unit: None,
+    })
+}
+
+/// The frames of `dir` whose names are `colour` and `depth`, patterns with one `*` each that stands for the same in
+/// both, as `left_*_rgb.png` and `left_*_z.png`. Numbers are ordered as numbers.
+///
+/// # Errors
+/// A pattern that is none, files without a partner, or no files.
+pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
+    let mut colours = matching(dir, colour)?;
+    let mut depths = matching(dir, depth)?;
+    let alone = |a: &BTreeMap<Key, PathBuf>, b: &BTreeMap<Key, PathBuf>| {
+        a.iter()
+            .find(|(key, _)| !b.contains_key(*key))
+            .map(|(_, path)| path.clone())
+    };
+    if let Some(path) = alone(&colours, &depths).or_else(|| alone(&depths, &colours)) {
+        return Err(Error::file(path, format!("has no partner by --pairs {colour},{depth}")));
+    }
+    if colours.is_empty() {
+        return Err(Error::file(dir, format!("holds no files {colour} and {depth}")));
+    }
+    let mut frames = Vec::new();
+    while let (Some((_, colour)), Some((_, depth))) = (colours.pop_first(), depths.pop_first()) {
+        frames.push((colour, depth));
+    }
+    Ok(Sequence { frames, unit: None })
+}
+
+/// What a `*` stands for: a number before other words.
+type Key = (Option<u64>, String);
+
+fn matching(dir: &Path, pattern: &str) -> Result<BTreeMap<Key, PathBuf>> {
+    let pattern_path = dir.join(pattern);
+    let folder = pattern_path.parent().unwrap_or(dir);
+    let name = pattern_path
+        .file_name()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .into_owned();
+    let Some((before, after)) = name.split_once('*').filter(|(_, after)| !after.contains('*')) else {
+        return Err(Error::Input(format!(
+            "--pairs {pattern}: each of the two names has one *, as in rgb_*.png,depth_*.png"
+        )));
+    };
+    let mut found = BTreeMap::new();
+    for path in files_of(folder)? {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let Some(key) = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after)) else {
+            continue;
+        };
+        found.insert((key.parse().ok(), key.to_owned()), path);
+    }
+    Ok(found)
+}
+
+fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
+    let refuse = |e: std::io::Error| Error::file(dir, format!("cannot be read: {e}"));
+    let entries = std::fs::read_dir(dir).map_err(refuse)?;
+    entries.map(|entry| entry.map(|e| e.path()).map_err(refuse)).collect()
+}
+
+/// A sequence of the TUM RGB-D benchmark: each colour image with the depth image that is nearest in time.
+fn tum(dir: &Path) -> Result<Sequence> {
+    let colours = timed(dir, "rgb.txt")?;
+    let depths = timed(dir, "depth.txt")?;
+    let mut frames = Vec::new();
+    for (time, colour) in &colours {
+        let nearest = depths
+            .iter()
+            .min_by(|(a, _), (b, _)| (a - time).abs().total_cmp(&(b - time).abs()));
+        if let Some((at, depth)) = nearest
+            && (at - time).abs() <= TUM_APART_S
+        {
+            frames.push((colour.clone(), depth.clone()));
+        }
+    }
+    if frames.is_empty() {
+        return Err(Error::file(
+            dir,
+            "its rgb.txt and depth.txt have no images within 0.02 s of each other",
+        ));
+    }
+    Ok(Sequence {
+        frames,
+        unit: Some(DepthUnit::Raw {
+            units_per_m: TUM_UNITS_PER_M,
+        }),
+    })
+}
+
+/// Lines of a time in seconds and a file's name, `#` before what is said of them.
+fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
+    let path = dir.join(list);
+    let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, format!("cannot be read: {e}")))?;
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty() && !line.starts_with('#'));
+    lines
+        .map(|line| {
+            let (time, name) = line.split_once(char::is_whitespace).unwrap_or_default();
+            match time.parse::<f64>() {
+                Ok(time) => Ok((time, dir.join(name.trim()))),
+                Err(_) => Err(Error::file(&path, format!("{line:?} is no time and a file\'s name"))),
+            }
+        })
+        .collect()
+}
+
+/// A scan of Redwood: files whose names begin with the frame's number, as 0000012-000000366371.png. Those that have no
+/// partner are left out, as the scans' own depth may begin later.
+fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
+    let numbered = |dir: &Path| -> Result<BTreeMap<u64, PathBuf>> {
+        let mut found = BTreeMap::new();
+        for path in files_of(dir)? {
+            let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let digits: String = stem.chars().take_while(char::is_ascii_digit).collect();
+            if let Ok(number) = digits.parse() {
+                found.insert(number, path);
+            }
+        }
+        Ok(found)
+    };
+    let colours = numbered(colour)?;
+    let mut depths = numbered(depth)?;
+    let images = colours.len().max(depths.len());
+    let frames: Vec<_> = (colours.into_iter())
+        .filter_map(|(number, colour)| Some((colour, depths.remove(&number)?)))
+        .collect();
+    if frames.is_empty() {
+        return Err(Error::file(
+            depth,
+            format!("holds no image of a number that {} has too", colour.display()),
+        ));
+    }
+    if frames.len() < images {
+        log::warn!(
+            "{}: {} of {images} frames have both images",
+            colour.display(),
+            frames.len()
+        );
+    }
+    Ok(Sequence {
+        frames,
+        unit: Some(DepthUnit::Millimetres),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = dir.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        }
+        dir
+    }
+
+    fn names(sequence: &Sequence) -> Vec<(String, String)> {
+        let name = |path: &PathBuf| path.file_name().unwrap().to_string_lossy().into_owned();
+        sequence.frames.iter().map(|(a, b)| (name(a), name(b))).collect()
+    }
+
+    fn pairs(expected: &[(&str, &str)]) -> Vec<(String, String)> {
+        expected.iter().map(|(a, b)| ((*a).into(), (*b).into())).collect()
+    }
+
+    #[test]
+    fn tums_images_are_paired_by_time() {
+        let dir = folder(&[
+            (
+                "rgb.txt",
+                "# time name\n1.00 rgb/a.png\n1.04 rgb/b.png\n1.50 rgb/c.png\n",
+            ),
+            ("depth.txt", "1.031 depth/y.png\n1.012 depth/x.png\n"),
+        ]);
+        let found = of_folder(dir.path()).unwrap();
+        assert_eq!(names(&found), pairs(&[("a.png", "x.png"), ("b.png", "y.png")]));
+        assert_eq!(found.unit, Some(DepthUnit::Raw { units_per_m: 5000.0 }));
+        let broken = folder(&[("rgb.txt", "one rgb/a.png"), ("depth.txt", "")]);
+        assert!(of_folder(broken.path()).unwrap_err().to_string().contains("rgb.txt"));
+        let apart = folder(&[("rgb.txt", "1 a.png"), ("depth.txt", "2 b.png")]);
+        assert!(of_folder(apart.path()).unwrap_err().to_string().contains("0.02 s"));
+    }
+
+    #[test]
+    fn redwoods_images_are_paired_by_number() {
+        let dir = folder(&[
+            ("rgb/0000001-000000000000.jpg", ""),
+            ("rgb/0000002-000000033369.jpg", ""),
+            ("depth/0000002-000000040000.png", ""),
+            ("depth/0000010-000000400000.png", ""),
+        ]);
+        let found = of_folder(dir.path()).unwrap();
+        let expected = [("0000002-000000033369.jpg", "0000002-000000040000.png")];
+        assert_eq!(names(&found), pairs(&expected));
+        assert_eq!(found.unit, Some(DepthUnit::Millimetres));
+        let none = folder(&[("image/1.jpg", ""), ("depth/2.png", "")]);
+        assert!(of_folder(none.path()).unwrap_err().to_string().contains("no image"));
+    }
+
+    #[test]
+    fn a_pattern_pairs_any_names_in_the_order_of_their_numbers() {
+        let dir = folder(&[
+            ("left_10_rgb.png", ""),
+            ("left_9_rgb.png", ""),
+            ("z/left_10.png", ""),
+            ("z/left_9.png", ""),
+            ("notes.txt", ""),
+        ]);
+        let found = by_pattern(dir.path(), "left_*_rgb.png", "z/left_*.png").unwrap();
+        let expected = [("left_9_rgb.png", "left_9.png"), ("left_10_rgb.png", "left_10.png")];
+        assert_eq!(names(&found), pairs(&expected));
+        let refused = |a, b| by_pattern(dir.path(), a, b).unwrap_err().to_string();
+        assert!(refused("left_rgb.png", "z/left_*.png").contains("one *"));
+        assert!(refused("no_*", "not_*").contains("no files"));
+        std::fs::write(dir.path().join("left_11_rgb.png"), "").unwrap();
+        assert!(refused("left_*_rgb.png", "z/left_*.png").contains("left_11_rgb.png"));
+    }
+}
