@@ -2,7 +2,8 @@
 //! relative inverse depth, on any scale, run by tract.
 //!
 //! The file's own input says what it takes: its numbers' type, the place of its three colours (NCHW or NHWC), its size.
-//! Where the size is left open, the picture nearly keeps its proportions at about [`USUAL_SIDE`], in multiples of [`MULTIPLE`].
+//! Where the size is left open, the picture nearly keeps its proportions at about [`USUAL_SIDE`], in multiples of
+//! [`MULTIPLE`].
 
 use crate::error::{Error, Result};
 use image::imageops::{self, FilterType};

@@ -44,7 +44,7 @@ impl VideoFrame {
         }
     }
 
-    /// Colour in the left half of a picture, rows of RGB bytes, (H, W) = `shape`, and normalized depth in the right one.
+    /// Colour in the left half of a picture, rows of RGB bytes, (H, W), and normalized depth in the right one.
     ///
     /// # Errors
     /// A picture that has no two halves.

@@ -55,8 +55,8 @@ pub(crate) struct Making {
     /// --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method
-    /// seeded]
+    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with
+    /// --method seeded]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
