@@ -122,6 +122,7 @@ impl View {
         let z_m = self.z_m(&file.target.display, STILL_VIEWS);
         let bar = progress_bar(2 * z_m.len() as u64, "views");
         let mut figures = figures(&levels, (made.levels.dim().1, made.levels.dim().2));
+        figures.retain(|(name, _)| name != "Encoder");
         figures.insert(
             0,
             ("Method".into(), format!("{}; {}", made.method, made.encoder.describe())),
