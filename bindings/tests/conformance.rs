@@ -432,11 +432,12 @@ mod write {
         let amplitude = ndarray::Array3::from_shape_fn((3, 4, 5), |(c, y, x)| {
             1.0 - 0.05 * ((x as f32 - 2.0).powi(2) + (y as f32 - 1.5).powi(2)) - 0.01 * c as f32
         });
+        let display = phasefront::Display::from_toml(display).unwrap();
         phasefront::Target {
-            display: phasefront::Display::from_toml(display).unwrap(),
             response: phasefront::target::Response::PerPixel(Arc::new(table)),
             illumination: Some(phasefront::target::Illumination::new(amplitude.view()).unwrap()),
             correction: Some(Aberration::new([[0.0, 1.5, 0.2, 0.0, 0.0]; 3]).unwrap()),
+            ..display.into()
         }
         .to_bytes()
         .unwrap()

@@ -5,6 +5,7 @@ mod bench;
 mod calibrate;
 mod compare;
 mod dataset;
+mod devices;
 mod evaluate;
 mod flags;
 mod frame;
@@ -13,6 +14,7 @@ mod judge;
 mod method;
 mod networks;
 mod occlusion;
+mod pack;
 mod refocus;
 mod scene;
 mod seeds;
@@ -55,6 +57,9 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
     Video(video::Video),
+    Devices(devices::Devices),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
     #[command(subcommand)]
     Calibrate(calibrate::Calibrate),
 }
@@ -87,6 +92,9 @@ impl Phasefront {
                 let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
+            Command::Devices(command) => command.run(json),
+            Command::Pack(command) => command.run(json),
+            Command::Unpack(command) => command.run(json),
             Command::Calibrate(command) => command.run(json),
         })
     }

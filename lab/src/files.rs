@@ -6,10 +6,12 @@
 use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
 use crate::npy;
+use crate::panel_file;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
+use phasefront::device::Device;
 use phasefront::target::Response;
 use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
@@ -37,6 +39,9 @@ pub struct HologramInfo {
     /// The modulator's look-up table, if it is not linear: the level of each of 256 phase steps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lut: Option<Vec<u8>>,
+    /// The phase that each of the modulator's levels shows, in turns of 2π, if they are not even over one turn.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub levels_turns: Option<Vec<f64>>,
     /// What else of a calibrated display it was made for, as the display's file names it: its view needs that file.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub calibrated: Vec<String>,
@@ -54,9 +59,20 @@ impl HologramInfo {
                 self.calibrated.join(", ")
             )));
         }
+        let lut = self.lut.as_deref().map(lut_of).transpose()?;
+        let device = Device {
+            levels_turns: self.levels_turns.clone(),
+            ..Device::from(self.display.clone())
+        };
+        let mut target = device.target()?;
+        if let Some(lut) = lut {
+            target.response = Response::lut(lut);
+        }
         Ok(DisplayFile {
-            lut: self.lut.as_deref().map(lut_of).transpose()?,
-            ..DisplayFile::from(self.display.clone())
+            target,
+            device,
+            lut,
+            aberration: None,
         })
     }
 }
@@ -70,11 +86,40 @@ fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
     })
 }
 
+/// Levels of a modulator, (3, H, W).
+#[derive(Debug, Clone, PartialEq)]
+pub enum Levels {
+    /// Of up to 8 bits.
+    Bytes(Array3<u8>),
+    /// Of more.
+    Words(Array3<u16>),
+}
+
+impl Levels {
+    /// (3, H, W).
+    pub fn dim(&self) -> (usize, usize, usize) {
+        match self {
+            Levels::Bytes(levels) => levels.dim(),
+            Levels::Words(levels) => levels.dim(),
+        }
+    }
+
+    /// The hologram of them that `info` is about.
+    pub fn hologram(self, info: HologramInfo) -> Hologram {
+        match self {
+            Levels::Bytes(levels) => Hologram::PhaseOnly(levels, info),
+            Levels::Words(levels) => Hologram::Words(levels, info),
+        }
+    }
+}
+
 /// A hologram as a file holds it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hologram {
     /// Modulator levels, (3, H, W).
     PhaseOnly(Array3<u8>, HologramInfo),
+    /// Modulator levels of over 8 bits, (3, H, W).
+    Words(Array3<u16>, HologramInfo),
     /// A complex field, (3, H, W).
     Complex(Array3<Complex32>, HologramInfo),
 }
@@ -168,10 +213,13 @@ fn decode_from<R: BufRead + Seek>(
     reader: std::io::Result<ImageReader<R>>,
 ) -> std::result::Result<DynamicImage, String> {
     let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
-    if !matches!(reader.format(), Some(ImageFormat::Png | ImageFormat::Jpeg)) {
-        return Err("is not a PNG or JPEG image".into());
+    if !matches!(
+        reader.format(),
+        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Bmp)
+    ) {
+        return Err("is not a PNG, JPEG or BMP image".into());
     }
-    let broken = |e| format!("is not a whole PNG or JPEG image: {e}");
+    let broken = |e| format!("is not a whole PNG, JPEG or BMP image: {e}");
     let mut decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();
     // A small file may hold a large image.
@@ -323,32 +371,50 @@ pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
 /// # Errors
 /// A file that cannot be written.
 pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Result<()> {
-    write_atomically(path, |file| {
-        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
-        encoder.set_color(png::ColorType::Rgba);
-        encoder.set_depth(png::BitDepth::Eight);
-        let other = std::io::Error::other;
-        let mut writer = encoder.write_header().map_err(other)?;
-        writer.write_image_data(rgba).map_err(other)?;
-        writer.finish().map_err(other)
-    })
+    let shape = PngShape {
+        width,
+        height,
+        color: png::ColorType::Rgba,
+        depth: png::BitDepth::Eight,
+    };
+    write_png_of(path, shape, rgba, None)
+}
+
+/// Size and kind of a PNG's pixels.
+#[derive(Clone, Copy)]
+pub(crate) struct PngShape {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) color: png::ColorType,
+    pub(crate) depth: png::BitDepth,
 }
 
 fn write_png(path: &Path, width: usize, height: usize, rgb: &[u8], info: Option<&HologramInfo>) -> Result<()> {
+    let shape = PngShape {
+        width,
+        height,
+        color: png::ColorType::Rgb,
+        depth: png::BitDepth::Eight,
+    };
+    write_png_of(path, shape, rgb, info)
+}
+
+/// Writes a PNG of rows of `pixels`, words big-endian, that carries `info`.
+pub(crate) fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<()> {
     let text = info
         .map(serde_json::to_string)
         .transpose()
         .map_err(|e| Error::file(path, e))?;
     write_atomically(path, |file| {
-        let mut encoder = png::Encoder::new(file, width as u32, height as u32);
-        encoder.set_color(png::ColorType::Rgb);
-        encoder.set_depth(png::BitDepth::Eight);
+        let mut encoder = png::Encoder::new(file, shape.width as u32, shape.height as u32);
+        encoder.set_color(shape.color);
+        encoder.set_depth(shape.depth);
         let other = std::io::Error::other;
         if let Some(text) = text {
             encoder.add_text_chunk(PNG_CHUNK.into(), text).map_err(other)?;
         }
         let mut writer = encoder.write_header().map_err(other)?;
-        writer.write_image_data(rgb).map_err(other)?;
+        writer.write_image_data(pixels).map_err(other)?;
         writer.finish().map_err(other)
     })
 }
@@ -360,6 +426,35 @@ fn write_png(path: &Path, width: usize, height: usize, rgb: &[u8], info: Option<
 pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
     let (_, height, width) = levels.dim();
     write_png(path, width, height, &interleaved(levels, |v| v), Some(info))
+}
+
+/// Writes a phase-only hologram of over 8 bits, (3, H, W), as a 16-bit RGB PNG of levels that carries `info`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo) -> Result<()> {
+    let (_, height, width) = levels.dim();
+    let words = levels.permuted_axes([1, 2, 0]);
+    let bytes: Vec<u8> = words.iter().flat_map(|level| level.to_be_bytes()).collect();
+    let shape = PngShape {
+        width,
+        height,
+        color: png::ColorType::Rgb,
+        depth: png::BitDepth::Sixteen,
+    };
+    write_png_of(path, shape, &bytes, Some(info))
+}
+
+/// Writes `hologram` to the file of its kind.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
+    match hologram {
+        Hologram::PhaseOnly(levels, info) => write_phase_only(path, levels.view(), info),
+        Hologram::Words(levels, info) => write_words(path, levels.view(), info),
+        Hologram::Complex(field, info) => write_complex(path, field.view(), info),
+    }
 }
 
 /// Writes a complex hologram, (3, H, W), as a `.npy` of complex64 with `info` in `NAME.json` beside it.
@@ -400,13 +495,31 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         )
     })?;
     let image = open_image(path)?;
-    let DynamicImage::ImageRgb8(image) = image else {
-        return Err(Error::file(path, "is not an 8-bit RGB image of levels"));
-    };
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let bytes = image.into_raw();
-    let levels = Array3::from_shape_fn((3, height, width), |(c, y, x)| bytes[3 * (y * width + x) + c]);
-    Ok(Hologram::PhaseOnly(levels, info))
+    let at = |(c, y, x): (usize, usize, usize)| 3 * (y * width + x) + c;
+    match image {
+        DynamicImage::ImageRgb8(image) => {
+            let bytes = image.into_raw();
+            let levels = Array3::from_shape_fn((3, height, width), |place| bytes[at(place)]);
+            Ok(Hologram::PhaseOnly(levels, info))
+        }
+        DynamicImage::ImageRgb16(image) => {
+            let words = image.into_raw();
+            let most = words.iter().copied().max().unwrap_or_default();
+            if u32::from(most) >> info.display.bits() != 0 {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "holds a level of {most}, over the {} bits that it says",
+                        info.display.bits()
+                    ),
+                ));
+            }
+            let levels = Array3::from_shape_fn((3, height, width), |place| words[at(place)]);
+            Ok(Hologram::Words(levels, info))
+        }
+        _ => Err(Error::file(path, "is not an RGB image of levels")),
+    }
 }
 
 /// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
@@ -437,6 +550,8 @@ pub fn is_hologram(path: &Path) -> Result<bool> {
 pub struct DisplayFile {
     /// What it says but for aberrations.
     pub target: Target,
+    /// The modulator, and how its input takes a hologram.
+    pub device: Device,
     /// The modulator's table, where it is calibrated as a whole.
     pub lut: Option<[u8; 256]>,
     /// What corrects the display's aberrations.
@@ -446,7 +561,8 @@ pub struct DisplayFile {
 impl From<Display> for DisplayFile {
     fn from(display: Display) -> Self {
         DisplayFile {
-            target: display.into(),
+            target: (&display).into(),
+            device: display.into(),
             lut: None,
             aberration: None,
         }
@@ -481,14 +597,62 @@ impl DisplayFile {
             ("per_pixel", phase_only && self.target.response.shape().is_some()),
             ("laser", phase_only && self.target.illumination.is_some()),
             ("aberration", self.aberration.is_some()),
+            (
+                "carrier_mrad, lens_mm or flatness",
+                phase_only && self.target.panel.adds(),
+            ),
         ];
         let there = keys.into_iter().filter(|(_, there)| *there);
         there.map(|(key, _)| key.to_owned()).collect()
     }
 }
 
+/// The display of a file, or the device of that name: one that comes along, or one of the user's, a file in
+/// `phasefront/devices` of the folder for configurations.
+///
+/// # Errors
+/// As [`read_display`]; neither a file nor a name.
+pub fn find_display(name: &str) -> Result<DisplayFile> {
+    let path = Path::new(name);
+    if path.exists() || has_extension(path, "toml") {
+        return read_display(path);
+    }
+    if let Some(own) = own_devices()
+        .into_iter()
+        .find(|own| own.file_stem() == Some(name.as_ref()))
+    {
+        return read_display(&own);
+    }
+    let device = Device::shipped(name)
+        .map_err(|e| Error::Input(format!("--display {name}: no such file, and {}", one_line_of(&e))))?;
+    Ok(DisplayFile {
+        target: device.target()?,
+        device,
+        lut: None,
+        aberration: None,
+    })
+}
+
+fn one_line_of(error: &phasefront::Error) -> String {
+    error.to_string().trim_start_matches("display: ").to_owned()
+}
+
+/// The files of the user's own devices, sorted.
+pub fn own_devices() -> Vec<PathBuf> {
+    let folder = std::env::var_os("XDG_CONFIG_HOME")
+        .map(PathBuf::from)
+        .or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".config")));
+    let entries = folder.and_then(|folder| std::fs::read_dir(folder.join("phasefront/devices")).ok());
+    let mut files: Vec<_> = (entries.into_iter().flatten().flatten())
+        .map(|entry| entry.path())
+        .filter(|path| has_extension(path, "toml"))
+        .collect();
+    files.sort();
+    files
+}
+
 /// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
-/// 256 levels, and those of [`crate::calibrate::table`].
+/// 256 levels, and those of [`crate::calibrate::table`]. Others are those of [`Device`] and [`crate::panel_file`].
 ///
 /// # Errors
 /// A file that is missing or says what cannot be.
@@ -505,7 +669,9 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     };
     let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
     let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
-    let display = Display::deserialize(table).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let panel = panel_file::take(path, &mut table)?;
+    let device = Device::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
+    let display = &device.display;
     let lut = match lut_path {
         None => None,
         Some(path) => {
@@ -532,18 +698,22 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
             Some(Arc::new(table))
         }
     };
-    let linear = Target::from(display);
-    let target = Target {
-        response: match (per_pixel, lut) {
-            (Some(table), _) => Response::PerPixel(table),
-            (None, Some(lut)) => Response::lut(lut),
-            (None, None) => linear.response,
-        },
-        illumination: laser_path.map(|p| table::read_laser(&p)).transpose()?,
-        ..linear
+    let mut target = device.target()?;
+    let calibrated = match (per_pixel, lut) {
+        (Some(table), _) => Some(Response::PerPixel(table)),
+        (None, Some(lut)) => Some(Response::lut(lut)),
+        (None, None) => None,
     };
+    if let Some(response) = calibrated {
+        // A table says what levels show; what the device's file says of them is not asked.
+        target.panel.levels_turns = None;
+        target.response = response;
+    }
+    target.illumination = laser_path.map(|p| table::read_laser(&p)).transpose()?;
+    panel.onto(path, &mut target)?;
     Ok(DisplayFile {
         target,
+        device,
         lut,
         aberration: aberration_path.map(|p| table::read_aberrations(&p)).transpose()?,
     })

@@ -19,6 +19,8 @@ pub mod metrics;
 pub mod models;
 mod npy;
 pub mod occlusion;
+pub mod packed;
+pub mod panel_file;
 pub mod photo;
 pub mod pictures;
 pub mod plot;

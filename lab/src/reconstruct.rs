@@ -7,9 +7,11 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::target::Aberration;
+use phasefront::unstable::panel::PanelPlan;
 use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::wave::aperture::Opening;
 use phasefront::unstable::wave::asm::Propagator;
+use std::f32::consts::TAU;
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
 pub struct AberratedOptics([Propagator; 3]);
@@ -48,6 +50,7 @@ impl Hologram {
     pub fn shape(&self) -> (usize, usize) {
         let (_, height, width) = match self {
             Hologram::PhaseOnly(levels, _) => levels.dim(),
+            Hologram::Words(levels, _) => levels.dim(),
             Hologram::Complex(field, _) => field.dim(),
         };
         (height, width)
@@ -56,7 +59,7 @@ impl Hologram {
     /// What the file says of the hologram.
     pub fn info(&self) -> &HologramInfo {
         match self {
-            Hologram::PhaseOnly(_, info) | Hologram::Complex(_, info) => info,
+            Hologram::PhaseOnly(_, info) | Hologram::Words(_, info) | Hologram::Complex(_, info) => info,
         }
     }
 
@@ -79,22 +82,9 @@ impl Hologram {
         let info = self.info();
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
-            Hologram::PhaseOnly(levels, _) => {
-                let response = file.target.response.clone().centred(height, width)?;
-                let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
-                let values = field.as_slice_mut().expect("standard layout");
-                phase_only_field(
-                    levels.as_slice().expect("standard layout"),
-                    &response,
-                    info.scale.unwrap_or(1.0),
-                    values,
-                );
-                if let Some(light) = &file.target.illumination {
-                    let display = &file.target.display;
-                    let modulator = (display.height(), display.width());
-                    light.shine(values, shape, modulator);
-                }
-                (field, Some(Opening::centred(file.target.display.aperture_radius())))
+            _ => {
+                let opening = Opening::centred(file.target.display.aperture_radius());
+                (self.shown(file)?, Some(opening))
             }
         };
         if let Some(AberrationFile::Uniform(all)) = &file.aberration
@@ -113,5 +103,37 @@ impl Hologram {
             .into_iter()
             .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the hologram's shape"))
             .collect())
+    }
+
+    /// The light that its levels make behind the modulator of `file`. What the panel adds is left out: it undoes the
+    /// panel's own bend, or turns all light alike.
+    fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
+        let shape = self.shape();
+        let (height, width) = shape;
+        let scale = self.info().scale.unwrap_or(1.0);
+        let display = &file.target.display;
+        let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
+        let values = field.as_slice_mut().expect("standard layout");
+        match self {
+            Hologram::PhaseOnly(levels, _) => {
+                let response = file.target.response.clone().centred(height, width)?;
+                let levels = levels.as_slice().expect("standard layout");
+                phase_only_field(levels, &response, scale, values);
+            }
+            Hologram::Words(levels, info) => {
+                let turn = TAU / (1u32 << info.display.bits()) as f32;
+                for (value, level) in values.iter_mut().zip(levels) {
+                    *value = Complex32::from_polar(scale, f32::from(*level) * turn);
+                }
+            }
+            Hologram::Complex(..) => unreachable!("a complex hologram has no levels"),
+        }
+        if let Some(panel) = PanelPlan::new(&file.target.panel, display, shape)? {
+            panel.remove(values);
+        }
+        if let Some(light) = &file.target.illumination {
+            light.shine(values, shape, (display.height(), display.width()));
+        }
+        Ok(field)
     }
 }

@@ -303,6 +303,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
             encoder: None,
             scale: Some(modulation.scale),
             lut: None,
+            levels_turns: None,
             calibrated: Vec::new(),
         };
         (levels, info)

@@ -327,6 +327,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
             encoder: Some(shown.name.clone()),
             scale: Some(modulation.scale),
             lut: None,
+            levels_turns: None,
         };
         let view = Hologram::PhaseOnly(levels, info).views(&[0.0]).unwrap().remove(0);
         let truth = pair.hologram.mapv(|v| v.norm());

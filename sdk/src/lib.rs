@@ -39,7 +39,8 @@
 //! | [`target`] | what it is made for: display, modulator's response, lasers' light, correction of the optics |
 //! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
 //! | [`Pipeline`] | one frame through all stages, by hand |
-//! | [`output`] | levels to the images that a modulator takes |
+//! | [`output`] | levels to the images that a modulator takes, and back |
+//! | [`device`] | modulators that can be bought, as data |
 //! | [`unstable`] | what the laboratory and the tests need; it changes without notice |
 //!
 //! The networks that come along are in the crate `phasefront-models`.
@@ -70,6 +71,7 @@
 
 mod brightness;
 mod depth;
+pub mod device;
 mod display;
 mod encode;
 mod error;
@@ -81,9 +83,11 @@ mod method;
 mod modulator;
 mod network;
 pub mod output;
+mod panel;
 mod pipeline;
 mod preview;
 mod refocus;
+mod registration;
 mod seeded;
 pub mod session;
 mod slm;

@@ -7,6 +7,9 @@ use crate::brightness::{Brightness, Past, Percentile};
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::error::Result;
+use crate::panel::PanelPlan;
+use crate::registration::RegistrationPlan;
+use crate::slm;
 use crate::target::Target;
 use crate::wave::asm::Propagator;
 use crate::wave::fft::ConvolveScratch;
@@ -21,8 +24,11 @@ pub struct Modulator {
     width: usize,
     /// None where the field stands at the modulator and there is nothing to correct.
     offset: Option<[Propagator; 3]>,
+    registration: Option<RegistrationPlan>,
     encoder: Encoder,
     midpoint: Option<MidpointSteps>,
+    panel: Option<PanelPlan>,
+    bits: u32,
     keeps_phase: bool,
     brightness: Brightness,
 }
@@ -30,15 +36,13 @@ pub struct Modulator {
 /// Working memory of a [`Modulator`] for one call at a time.
 pub struct ModulatorScratch {
     propagation: Option<ConvolveScratch>,
+    /// A plane, where colours are moved.
+    moved: Vec<Complex32>,
     encoder: EncoderScratch,
-    midpoint: Option<OfMidpoint>,
-    percentile: Percentile,
-}
-
-/// What steps at the midpoint work on.
-struct OfMidpoint {
+    midpoint: Option<MidpointScratch>,
+    /// Where phases lie in memory before they become levels.
     phases: Vec<f32>,
-    scratch: MidpointScratch,
+    percentile: Percentile,
 }
 
 /// What became of a field on the modulator.
@@ -74,11 +78,14 @@ impl Modulator {
             height: shape.0,
             width: shape.1,
             offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
+            registration: RegistrationPlan::new(shape, &target.registration)?,
             encoder: Encoder::new(shape, target, options)?,
             midpoint: match options.midpoint_steps {
                 0 => None,
                 steps => Some(MidpointSteps::new(shape, target, steps)?),
             },
+            panel: PanelPlan::new(&target.panel, &target.display, shape)?,
+            bits: target.display.bits(),
             keeps_phase: options.encoding.keeps_phase(),
             brightness: options.brightness,
         })
@@ -100,10 +107,15 @@ impl Modulator {
         ModulatorScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
-            midpoint: self.midpoint.as_ref().map(|plan| OfMidpoint {
-                phases: vec![0.0; 3 * self.height * self.width],
-                scratch: plan.scratch(),
-            }),
+            moved: match &self.registration {
+                None => Vec::new(),
+                Some(_) => vec![Complex32::ZERO; self.height * self.width],
+            },
+            midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
+            phases: match self.midpoint.is_some() || self.panel.is_some() {
+                true => vec![0.0; 3 * self.height * self.width],
+                false => Vec::new(),
+            },
             percentile: Percentile::new(),
         }
     }
@@ -116,6 +128,12 @@ impl Modulator {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
                 plan.propagate(plane, scratch);
+            }
+        }
+        if let Some(plan) = &self.registration {
+            let planes = field.chunks_exact_mut(self.height * self.width);
+            for (colour, plane) in planes.enumerate() {
+                plan.apply(colour, plane, &mut scratch.moved);
             }
         }
     }
@@ -138,22 +156,43 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
+        if scratch.phases.is_empty() {
+            let start = Instant::now();
+            let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+            let scale = (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder);
+            return Modulation {
+                scale,
+                encode: start.elapsed(),
+            };
+        }
         let start = Instant::now();
-        let scale = self.brightness.scale(field, past, &mut scratch.percentile);
-        let scale = match (&self.midpoint, &mut scratch.midpoint) {
-            (Some(plan), Some(of)) => {
-                plan.keep(field, past.map(|past| past.scale), &mut of.scratch);
-                let scale = (self.encoder).encode(field, scale, &mut of.phases, &mut scratch.encoder);
-                plan.correct(scale, &mut of.phases, &mut of.scratch);
-                self.encoder.levels(&of.phases, levels);
-                scale
-            }
-            _ => (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder),
-        };
+        let mut phases = std::mem::take(&mut scratch.phases);
+        let scale = self.phases_after(past, field, &mut phases, scratch).scale;
+        if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {
+            self.encoder.levels(&phases, levels);
+        }
+        scratch.phases = phases;
         Modulation {
             scale,
             encode: start.elapsed(),
         }
+    }
+
+    /// [`Self::modulate`] to levels of the display's bits that do not fit bytes. `phases` is worked on and holds the
+    /// phases in the end.
+    ///
+    /// # Panics
+    /// If `field`, `phases` or `words` has not 3·H·W values.
+    pub fn modulate_words(
+        &self,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        words: &mut [u16],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let modulation = self.phases_after(None, field, phases, scratch);
+        slm::linear_words(phases, self.bits, words);
+        modulation
     }
 
     /// [`Self::modulate_after`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
@@ -168,11 +207,14 @@ impl Modulator {
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
         let mut midpoint = self.midpoint.as_ref().zip(scratch.midpoint.as_mut());
         if let Some((plan, of)) = &mut midpoint {
-            plan.keep(field, past.map(|past| past.scale), &mut of.scratch);
+            plan.keep(field, past.map(|past| past.scale), of);
         }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
         if let Some((plan, of)) = midpoint {
-            plan.correct(scale, phases, &mut of.scratch);
+            plan.correct(scale, phases, of);
+        }
+        if let Some(panel) = &self.panel {
+            panel.add(phases);
         }
         Modulation {
             scale,

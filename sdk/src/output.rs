@@ -7,6 +7,12 @@
 //! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
 //! and a shifted hologram does not stand where the table takes it to be.
 
+mod cells;
+mod split;
+
+pub use cells::{BitPlanes, Cells};
+pub use split::Split;
+
 use crate::error::{Error, Result};
 use crate::slm::Response;
 use crate::slm::per_pixel::PerPixel;
@@ -32,6 +38,8 @@ pub enum Layout {
     Grey,
     /// Three images, one after another: red, green, blue; a 16-bit little-endian word a pixel.
     Grey16,
+    /// Three images, one after another; bytes red, green, blue, over which a level's bits are spread.
+    Split(Split),
 }
 
 /// A hologram's levels, (3, H, W).
@@ -47,7 +55,7 @@ impl Layout {
     /// How many images a hologram becomes.
     pub fn images(self) -> usize {
         match self {
-            Layout::Grey | Layout::Grey16 => 3,
+            Layout::Grey | Layout::Grey16 | Layout::Split(_) => 3,
             _ => 1,
         }
     }
@@ -55,7 +63,7 @@ impl Layout {
     /// Bytes of a pixel.
     pub fn pixel_bytes(self) -> usize {
         match self {
-            Layout::Rgb => 3,
+            Layout::Rgb | Layout::Split(_) => 3,
             Layout::Rgba | Layout::Bgra | Layout::Rgb10 => 4,
             Layout::Grey => 1,
             Layout::Grey16 => 2,
@@ -63,10 +71,11 @@ impl Layout {
     }
 
     /// Bits of a level's place.
-    fn place_bits(self) -> u32 {
+    pub(crate) fn place_bits(self) -> u32 {
         match self {
             Layout::Rgb10 => 10,
             Layout::Grey16 => 16,
+            Layout::Split(split) => split.bits(),
             _ => 8,
         }
     }
@@ -85,6 +94,23 @@ impl Layout {
             }
             Layout::Grey => pixel[0] = byte(image),
             Layout::Grey16 => pixel.copy_from_slice(&level(image).to_le_bytes()),
+            Layout::Split(split) => pixel.copy_from_slice(&split.pixel(level(image))),
+        }
+    }
+
+    /// The level of `colour` in a pixel of image `image`, as wide as its place; None where it is another image's.
+    fn read_pixel(self, image: usize, colour: usize, pixel: &[u8]) -> Option<u16> {
+        let alone = |level: u16| (colour == image).then_some(level);
+        match self {
+            Layout::Rgb | Layout::Rgba => Some(pixel[colour].into()),
+            Layout::Bgra => Some(pixel[2 - colour].into()),
+            Layout::Rgb10 => {
+                let word = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+                Some((word >> (10 * colour)) as u16 & 0x3ff)
+            }
+            Layout::Grey => alone(pixel[0].into()),
+            Layout::Grey16 => alone(u16::from_le_bytes([pixel[0], pixel[1]])),
+            Layout::Split(split) => alone(split.level([pixel[0], pixel[1], pixel[2]])),
         }
     }
 }
@@ -168,6 +194,7 @@ impl Output {
             ),
             bits: match &target.response {
                 Response::Linear { bits: bytes } => (*bytes, bits),
+                Response::Lut { .. } if target.panel.levels_turns.is_some() => (bits, bits),
                 Response::Lut { .. } | Response::PerPixel(_) => (8, bits),
             },
             dark: match target.response.clone() {
@@ -221,6 +248,57 @@ impl Output {
         }
     }
 
+    /// The inverse of [`Self::write`]: the levels that image `image` shows, of the display's bits, into their places of
+    /// (3, H, W). What other images hold is left as it is, and so are pixels that were shifted off the modulator.
+    ///
+    /// # Errors
+    /// An image that the layout has not, or whose pixels have fewer bits than the display.
+    ///
+    /// # Panics
+    /// If `levels` or `bytes` has another length than planned.
+    pub fn read(&self, bytes: &[u8], image: usize, levels: &mut [u16]) -> Result<()> {
+        let layout = self.placement.layout;
+        let (height, width) = self.hologram;
+        let (out_height, out_width) = self.modulator;
+        assert_eq!(bytes.len(), self.image_bytes());
+        assert_eq!(levels.len(), 3 * height * width);
+        self.check_image(image)?;
+        let (place, bits) = (layout.place_bits(), self.bits.1);
+        if place < bits {
+            return Err(Error::Plan(format!(
+                "{layout:?} has {place} bits a level, the display has {bits}; what it leaves out cannot be read"
+            )));
+        }
+        for y in 0..height {
+            for x in 0..width {
+                let (row, column) = (y as i64 - self.from.0, x as i64 - self.from.1);
+                if !(0..out_height as i64).contains(&row) || !(0..out_width as i64).contains(&column) {
+                    continue;
+                }
+                let row = flip(row as usize, out_height, self.placement.flip_y);
+                let column = flip(column as usize, out_width, self.placement.flip_x);
+                let pixel = &bytes[(row * out_width + column) * layout.pixel_bytes()..][..layout.pixel_bytes()];
+                for colour in 0..3 {
+                    if let Some(level) = layout.read_pixel(image, colour, pixel) {
+                        levels[(colour * height + y) * width + x] = level >> (place - bits);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_image(&self, image: usize) -> Result<()> {
+        let layout = self.placement.layout;
+        if image >= layout.images() {
+            return Err(Error::Plan(format!(
+                "there is no image {image}; {layout:?} has {}",
+                layout.images()
+            )));
+        }
+        Ok(())
+    }
+
     fn write_levels(
         &self,
         level: impl Fn(usize) -> u16,
@@ -233,19 +311,13 @@ impl Output {
         let (height, width) = self.hologram;
         let (out_height, out_width) = self.modulator;
         assert_eq!(bytes.len(), self.image_bytes());
-        if image >= layout.images() {
-            return Err(Error::Plan(format!(
-                "there is no image {image}; {layout:?} has {}",
-                layout.images()
-            )));
-        }
+        self.check_image(image)?;
         let place = layout.place_bits();
         let placed = |level: u16| match bits <= place {
             true => level << (place - bits),
             false => level >> (bits - place),
         };
         let pixel_bytes = layout.pixel_bytes();
-        let flip = |at: usize, n: usize, flipped: bool| if flipped { n - 1 - at } else { at };
         for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
             let modulator_y = flip(y, out_height, self.placement.flip_y);
             let y = self.from.0 + modulator_y as i64;
@@ -265,6 +337,11 @@ impl Output {
         }
         Ok(())
     }
+}
+
+/// Place `at` of `n`, counted from the other end where `flipped`.
+fn flip(at: usize, n: usize, flipped: bool) -> usize {
+    if flipped { n - 1 - at } else { at }
 }
 
 #[cfg(test)]
@@ -365,6 +442,45 @@ mod tests {
             let top = ((1u32 << bits) - 1) as u8;
             assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
         }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let ten = Split::new([&[9, 8, 7], &[6, 5, 4], &[3, 2, 1, 0]]).unwrap();
+        let all = [
+            (Layout::Rgb, 8),
+            (Layout::Bgra, 5),
+            (Layout::Rgb10, 10),
+            (Layout::Grey, 4),
+            (Layout::Grey16, 10),
+            (Layout::Split(ten), 10),
+        ];
+        for (layout, bits) in all {
+            let placement = Placement {
+                flip_x: true,
+                flip_y: true,
+                shift_x: 1,
+                ..Placement::centred(layout)
+            };
+            let output = Output::new(&target(9, 6, bits), (3, 5), placement).unwrap();
+            let words: Vec<u16> = (0..45).map(|i| (i * 37 + 5) % (1 << bits)).collect();
+            let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
+            let mut read = vec![0; words.len()];
+            for image in 0..layout.images() {
+                let mut pixels = vec![0; output.image_bytes()];
+                let levels = if bits > 8 {
+                    Levels::Words(&words)
+                } else {
+                    Levels::Bytes(&bytes)
+                };
+                output.write(levels, image, &mut pixels).unwrap();
+                output.read(&pixels, image, &mut read).unwrap();
+            }
+            assert_eq!(read, words, "{layout:?}");
+        }
+        let output = Output::new(&target(2, 1, 10), (1, 2), Placement::centred(Layout::Grey)).unwrap();
+        let error = output.read(&[0; 2], 0, &mut [0; 6]).unwrap_err().to_string();
+        assert!(error.contains("10"), "{error}");
     }
 
     #[test]

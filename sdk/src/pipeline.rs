@@ -147,6 +147,20 @@ impl Pipeline {
         self.modulator.phases_after(past, field, phases, &mut scratch.modulator)
     }
 
+    /// [`Modulator::modulate_words`].
+    ///
+    /// # Panics
+    /// If `field`, `phases` or `words` has not 3·H·W values.
+    pub fn modulate_words(
+        &self,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        words: &mut [u16],
+        scratch: &mut PipelineScratch,
+    ) -> Modulation {
+        (self.modulator).modulate_words(field, phases, words, &mut scratch.modulator)
+    }
+
     /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked
     /// on: what it holds afterwards means nothing.
     ///

@@ -9,6 +9,7 @@
 use crate::error::{Error, Result};
 use crate::frame::Axis;
 use crate::illumination::Illumination;
+use crate::panel::PanelPlan;
 use crate::slm::Response;
 use crate::target::Target;
 use crate::wave::asm::Propagator;
@@ -32,6 +33,7 @@ pub struct Preview {
     /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
     response: Response,
+    panel: Option<PanelPlan>,
     screen: (usize, usize),
     x: Axis,
     y: Axis,
@@ -87,6 +89,7 @@ impl Preview {
             propagators: target.propagators(small, factor, distance_m, aberration.as_ref())?,
             illumination: illumination.map(|light| (light, target.modulator())),
             response: target.response.clone().centred(height, width)?,
+            panel: PanelPlan::new(&target.panel, &target.display, (height, width))?,
             screen,
             x: Axis::new(small.1, 0.0, small.1 as f64, screen.1),
             y: Axis::new(small.0, 0.0, small.0 as f64, screen.0),
@@ -137,13 +140,12 @@ impl Preview {
                 .zip(levels.par_chunks_exact(width * self.factor))
                 .enumerate()
                 .for_each(|(y, (sums, rows))| {
-                    match &self.response {
-                        Response::PerPixel(table) => {
-                            let first = (colour * height + y * self.factor) * width;
-                            self.sum(rows, sums, |level, at| {
-                                Complex32::from_polar(light, table.phase(level, first + at))
-                            });
-                        }
+                    let first = (colour * height + y * self.factor) * width;
+                    match (&self.response, &self.panel) {
+                        (Response::PerPixel(_), _) | (_, Some(_)) => self.sum(rows, sums, |level, at| {
+                            let added = (self.panel.as_ref()).map_or(0.0, |panel| panel.added(first + at));
+                            Complex32::from_polar(light, self.response.phase(level, first + at) - added)
+                        }),
                         _ => self.sum(rows, sums, |level, _| shown[usize::from(level)]),
                     }
                     self.divide_by_light(colour, y, sums);

@@ -70,6 +70,42 @@ impl Response {
         }
     }
 
+    /// The response of a modulator whose level l shows `turns[l]` of 2π, in rising order from 0 on: a phase becomes
+    /// the level whose phase, modulo 2π, is nearest, the higher of two that are as near. Above 2π only what the first
+    /// turn does not hold is used.
+    ///
+    /// # Errors
+    /// Fewer than 2 or more than 256 levels, or phases that do not rise from 0, up to 4 turns.
+    pub fn of_turns(turns: &[f64]) -> Result<Self> {
+        let refuse = |what: String| Err(Error::Plan(format!("a modulator's levels: {what}")));
+        if !(2..=256).contains(&turns.len()) {
+            return refuse(format!("{} of them; there must be 2 to 256", turns.len()));
+        }
+        let rises = turns.is_sorted_by(|a, b| a < b);
+        if turns[0] != 0.0 || !rises || !turns.iter().all(|turn| (0.0..=4.0).contains(turn)) {
+            return refuse("their phases must rise from 0, up to 4 turns".into());
+        }
+        let first_turn = turns.iter().take_while(|turn| **turn < 1.0).count();
+        let nearest = |step: usize| {
+            let apart = |level: usize| {
+                let apart = (turns[level] - step as f64 / 256.0).rem_euclid(1.0);
+                apart.min(1.0 - apart)
+            };
+            // Level 0 comes last: it is the higher one where a phase lies between the last level and 2π.
+            let order = (1..first_turn).chain([0]);
+            let best = order.reduce(|best, level| if apart(level) <= apart(best) { level } else { best });
+            best.unwrap_or(0) as u8
+        };
+        let phase = std::array::from_fn(|level| {
+            let turn = turns.get(level).or(turns.last()).copied().unwrap_or(0.0);
+            wrap(turn.fract() as f32 * TAU)
+        });
+        Ok(Response::Lut {
+            level: Box::new(std::array::from_fn(nearest)),
+            phase: Box::new(phase),
+        })
+    }
+
     /// The response of the (`height`, `width`) pixels in the middle of the modulator, where a smaller hologram stands.
     ///
     /// # Errors
@@ -197,6 +233,33 @@ mod tests {
                 let error = (shown - phase).abs();
                 assert!(error.min(TAU - error) < TAU / 256.0, "{i}: {shown}");
             }
+        }
+    }
+
+    #[test]
+    fn phases_become_the_level_that_is_nearest_around_the_turn() {
+        let turns = [0.0, 0.1, 0.3, 0.35, 0.6, 0.9];
+        let response = Response::of_turns(&turns).unwrap();
+        for step in 0..256 {
+            let turn = step as f64 / 256.0;
+            let level = response.level(turn as f32 * TAU, 0);
+            let apart = |l: usize| {
+                let apart = (turns[l] - turn).abs();
+                apart.min(1.0 - apart)
+            };
+            let best = (0..6).map(apart).fold(1.0, f64::min);
+            assert!(apart(level.into()) < best + 1e-9, "{turn}: {level}");
+            assert!((response.phase(level, 0) - turns[level as usize] as f32 * TAU).abs() < 1e-5);
+        }
+        // Half-way from the last level to the turn.
+        assert_eq!(response.level(0.96 * TAU, 0), 0);
+        assert_eq!(response.level(0.94 * TAU, 0), 5);
+        // A panel of 1.5 turns: what its upper levels show is known, though none is asked for.
+        let over: Vec<f64> = (0..256).map(|l| 1.5 * f64::from(l) / 256.0).collect();
+        let response = Response::of_turns(&over).unwrap();
+        assert!((response.phase(192, 0) - 0.125 * TAU).abs() < 1e-5);
+        for bad in [vec![], vec![0.0], vec![0.1, 0.2], vec![0.0, 0.5, 0.5], vec![0.0, 99.0]] {
+            assert!(Response::of_turns(&bad).is_err(), "{bad:?}");
         }
     }
 

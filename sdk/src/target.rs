@@ -14,6 +14,8 @@ mod file;
 use crate::display::Display;
 use crate::error::{Error, Result};
 pub use crate::illumination::Illumination;
+pub use crate::panel::{Flatness, Panel};
+pub use crate::registration::Registration;
 pub use crate::slm::Response;
 pub use crate::slm::per_pixel::PerPixel;
 use crate::wave::asm::{Padding, Propagator};
@@ -30,6 +32,10 @@ pub struct Target {
     pub illumination: Option<Illumination>,
     /// What corrects the optics' aberration, where it is one for all depths.
     pub correction: Option<Aberration>,
+    /// What the panel adds to the response.
+    pub panel: Panel,
+    /// How each colour is moved and scaled.
+    pub registration: Registration,
 }
 
 impl From<Display> for Target {
@@ -42,6 +48,8 @@ impl From<Display> for Target {
             display,
             illumination: None,
             correction: None,
+            panel: Panel::default(),
+            registration: Registration::default(),
         }
     }
 }
@@ -61,7 +69,7 @@ impl Default for Target {
 
 impl Target {
     /// # Errors
-    /// A table for another modulator, or one for a display of over 8 bits.
+    /// A table or a map for another modulator, or a table for a display of over 8 bits.
     pub(crate) fn check(&self) -> Result<()> {
         let shape = (self.display.height(), self.display.width());
         if let Some(other) = self.response.shape()
@@ -78,7 +86,8 @@ impl Target {
                 self.display.bits()
             )));
         }
-        Ok(())
+        self.panel.check(&self.display)?;
+        self.registration.check()
     }
 
     /// (H, W) of the modulator.

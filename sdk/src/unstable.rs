@@ -38,6 +38,10 @@ pub mod illumination {
 pub mod network {
     pub use crate::network::*;
 }
+/// What a panel adds to the response.
+pub mod panel {
+    pub use crate::panel::*;
+}
 /// Small views of holograms.
 pub mod preview {
     pub use crate::preview::*;

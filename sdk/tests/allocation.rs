@@ -7,7 +7,7 @@ use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
-use phasefront::target::{Aberration, Illumination, PerPixel, Response};
+use phasefront::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
 use phasefront::unstable::depth::refine::Refiner;
 use phasefront::unstable::frame::{ColourPlan, Crop};
 use phasefront::unstable::method::MethodPlan;
@@ -85,6 +85,32 @@ fn camera_frames_and_previews() {
     assert_eq!(count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)), 0);
 }
 
+/// A target with all that a calibration and a bench may put there.
+fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
+    let (rows, columns) = per_pixel::nodes(h, w, 8);
+    let levels_of = |i: usize| (i % 9) as f32 * 32.0;
+    let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
+    let turns = vec![6.0; 3 * rows * columns];
+    let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
+    let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
+    let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
+    let flatness = Flatness::new((h, w), (0..h * w).map(|i| 7 * i as u16).collect()).unwrap();
+    Target {
+        display: display.clone().with_size(h, w).unwrap(),
+        panel: Panel {
+            flatness: Some(flatness),
+            ..Panel::default()
+        },
+        registration: Registration {
+            scale: [1.01, 1.0, 0.99],
+            ..Registration::default()
+        },
+        response: Response::PerPixel(table.into()),
+        illumination: Some(laser),
+        correction: Some(correction),
+    }
+}
+
 #[test]
 fn hot_calls_allocate_nothing() {
     let (h, w) = (61, 47);
@@ -131,19 +157,7 @@ fn hot_calls_allocate_nothing() {
                 };
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
-            let (rows, columns) = per_pixel::nodes(h, w, 8);
-            let levels_of = |i: usize| (i % 9) as f32 * 32.0;
-            let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
-            let turns = vec![6.0; 3 * rows * columns];
-            let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
-            let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
-            let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
-            let target = Target {
-                display: display.clone().with_size(h, w).unwrap(),
-                response: Response::PerPixel(table.into()),
-                illumination: Some(laser),
-                correction: Some(correction),
-            };
+            let target = calibrated(&display, (h, w));
             let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
             let mut scratch = plan.scratch();
             let frame = || {

@@ -7,7 +7,7 @@ mod reference;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;
-use phasefront::target::{Aberration, Illumination, PerPixel, Response};
+use phasefront::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Response};
 use phasefront::unstable::encode::{Encoder, anti_alias::AntiAlias, double_phase};
 use phasefront::unstable::modulator::Modulator;
 use phasefront::unstable::refocus::{Refocus, phase_only_field};
@@ -404,6 +404,53 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     let mut expected = vec![0; 3 * h * w];
     encoder.encode_levels(&mut filtered, Some(2.5), &mut expected, &mut encoder.scratch());
     assert_eq!(levels, expected);
+}
+
+/// What a panel adds, in whole levels, is added to the levels modulo their number, of 8 bits and of 10, with every step
+/// of the encoder.
+#[test]
+fn a_panel_adds_its_phases_after_the_encoder() {
+    let (h, w) = (40, 33);
+    let field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 80 + c)).collect();
+    let steps = |at: usize| (at * 13 % 256) as u16;
+    for (midpoint_steps, bits) in [(0, 8), (1, 8), (0, 10)] {
+        let display = Display::from_toml(&format!("width = {w}\nheight = {h}\nbits = {bits}")).unwrap();
+        let plain = Target::from(display);
+        let maps = (0..h * w).map(|at| steps(at) << 8).collect();
+        let added = Target {
+            panel: Panel {
+                flatness: Some(Flatness::new((h, w), maps).unwrap()),
+                ..Panel::default()
+            },
+            ..plain.clone()
+        };
+        let options = EncoderOptions {
+            midpoint_steps,
+            ..Encoding::ANTI_ALIAS.into()
+        };
+        let [before, after] = [&plain, &added].map(|target| {
+            let plan = Modulator::new((h, w), target, &options).unwrap();
+            let (mut field, mut scratch) = (field.clone(), plan.scratch());
+            let mut words = vec![0; 3 * h * w];
+            if bits > 8 {
+                plan.modulate_words(&mut field, &mut vec![0.0; 3 * h * w], &mut words, &mut scratch);
+                return words;
+            }
+            let mut levels = vec![0; 3 * h * w];
+            plan.modulate(&mut field, &mut levels, &mut scratch);
+            levels.into_iter().map(u16::from).collect()
+        });
+        let count = 1u16 << bits;
+        let mut other = 0;
+        for (at, (before, after)) in before.iter().zip(&after).enumerate() {
+            let want = (before + steps(at % (h * w)) * (count / 256)) % count;
+            let apart = want.abs_diff(*after);
+            assert!(apart.min(count - apart) <= 1, "{bits} {at}: {want} {after}");
+            other += usize::from(apart != 0);
+        }
+        // A sum is rounded once more than its parts.
+        assert!(other < before.len() / 500, "{other}");
+    }
 }
 
 #[test]

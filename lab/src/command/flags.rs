@@ -16,9 +16,10 @@ use std::sync::{Arc, LazyLock};
 /// The display that a hologram is for.
 #[derive(Clone, Args)]
 pub(crate) struct DisplayFlags {
-    /// TOML file of the display [default: 1920×1080, 8 µm, 638/520/450 nm, 6 mm]
-    #[arg(long, value_name = "FILE")]
-    display: Option<PathBuf>,
+    /// TOML file of the display, or a modulator's name as `phasefront devices` lists them [default: 1920×1080, 8 µm,
+    /// 638/520/450 nm, 6 mm]
+    #[arg(long, value_name = "FILE|NAME")]
+    display: Option<String>,
     /// z of the hologram against the middle of the volume, mm, positive toward the viewer
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     offset_mm: Option<f64>,
@@ -27,11 +28,12 @@ pub(crate) struct DisplayFlags {
 impl DisplayFlags {
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
-            Some(path) => files::read_display(path)?,
+            Some(name) => files::find_display(name)?,
             None => phasefront::Display::default().into(),
         };
         if let Some(mm) = self.offset_mm {
             file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
+            file.device.display = file.target.display.clone();
         }
         Ok(file)
     }

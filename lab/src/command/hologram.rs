@@ -9,7 +9,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::unstable::depth::sharpness;
 use phasefront::unstable::gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
-use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::modulator::{Modulation, Modulator};
 use phasefront::unstable::network::{Engine, InputKind};
 use phasefront::{Brightness, EncoderOptions, Encoding, Pipeline, RgbdFrame, Sweep};
 use phasefront_lab::calibrate::table::AberrationFile;
@@ -18,7 +18,7 @@ use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, evaluate, gpu, models, sm_lbm};
+use phasefront_lab::{Error, Result, evaluate, gpu, models, packed, sm_lbm};
 use phasefront_models::usual_network;
 use serde::Serialize;
 use serde_json::json;
@@ -37,6 +37,9 @@ pub(crate) struct Hologram {
     /// Say how near to its own wave is what the hologram shows: at the midpoint, and over a stack of depths
     #[arg(long)]
     judge: bool,
+    /// Write what the modulator's input takes there too: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
+    #[arg(long, value_name = "FRAME.png")]
+    packed: Option<PathBuf>,
     /// The hologram: a PNG of modulator levels
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
@@ -168,6 +171,8 @@ pub(crate) struct Made {
     pub(crate) method: &'static str,
     pub(crate) field: Option<Array3<Complex32>>,
     pub(crate) levels: Array3<u8>,
+    /// Of over 8 bits, of which `levels` are then the upper ones.
+    pub(crate) words: Option<Array3<u16>>,
     pub(crate) encoder: Encoder,
     scale: f32,
     /// The last is the encoder's.
@@ -175,9 +180,24 @@ pub(crate) struct Made {
     engine: Option<String>,
 }
 
+impl Made {
+    /// The levels with all their bits.
+    fn hologram(&self, info: HologramInfo) -> files::Hologram {
+        match &self.words {
+            Some(words) => files::Hologram::Words(words.clone(), info),
+            None => files::Hologram::PhaseOnly(self.levels.clone(), info),
+        }
+    }
+}
+
 impl Hologram {
     pub(crate) fn run(mut self, json: bool) -> Result<()> {
-        for (path, extension) in [(Some(&self.output), "png"), (self.complex.as_ref(), "npy")] {
+        let names = [
+            (Some(&self.output), "png"),
+            (self.packed.as_ref(), "png"),
+            (self.complex.as_ref(), "npy"),
+        ];
+        for (path, extension) in names {
             if let Some(path) = path
                 && !files::has_extension(path, extension)
             {
@@ -204,7 +224,11 @@ impl Hologram {
             }
             files::write_complex(path, values.view(), &field)?;
         }
-        files::write_phase_only(&self.output, made.levels.view(), &levels)
+        let hologram = made.hologram(levels);
+        if let Some(path) = &self.packed {
+            packed::write(path, &packed::pack(&hologram, display)?)?;
+        }
+        files::write_hologram(&self.output, &hologram)
     }
 
     fn report(&self, json: bool, made: &Made, judged: Option<&Judged>) {
@@ -377,18 +401,21 @@ impl Making {
         let options = self.encoder_options(&encoder.options);
         let pipeline = Pipeline::new((height, width), method, &target, &options)?;
         let mut scratch = pipeline.scratch();
-        let mut levels = Array3::zeros((3, height, width));
         let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
-        let (values, bytes) = slices(&mut field, &mut levels);
+        let values = field.as_slice_mut().expect("standard layout");
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field that it is given, so a copy is kept where it is asked for.
         let kept = self.keeps_field.then(|| values.to_vec());
-        let modulation = pipeline.modulate(values, bytes, &mut scratch);
+        let (levels, words, modulation) = levels_by(&target.display, (height, width), |out| match out {
+            Out::Bytes(bytes) => pipeline.modulate(values, bytes, &mut scratch),
+            Out::Words(phases, words) => pipeline.modulate_words(values, phases, words, &mut scratch),
+        });
         let engine = pipeline.method().engine();
         Ok(Made {
             method: stage,
             field: kept.map(|values| stack(values, height, width)),
             levels,
+            words,
             encoder,
             scale: modulation.scale,
             stages: vec![
@@ -410,6 +437,11 @@ impl Making {
         encoder: Encoder,
         options: &DeviceOptions,
     ) -> Result<Made> {
+        if display.target.display.bits() > 8 {
+            return Err(Error::Input(
+                "--backend gpu makes levels of up to 8 bits; those of over 8 are the CPU's".into(),
+            ));
+        }
         let (height, width) = frame.shape();
         let mut job = Job::new((height, width), method, display.corrected()?);
         job.encoder = self.encoder_options(&encoder.options);
@@ -425,6 +457,7 @@ impl Making {
             method: stage,
             field: None,
             levels,
+            words: None,
             encoder,
             scale: report.scale,
             stages: vec![
@@ -491,16 +524,19 @@ impl Making {
         };
         bar.finish_and_clear();
         let waved = Instant::now();
-        let mut levels = Array3::zeros((3, height, width));
-        let (values, bytes) = slices(&mut field, &mut levels);
+        let values = field.as_slice_mut().expect("standard layout");
         modulator.propagate(values, &mut scratch);
         let propagate = waved.elapsed();
         let kept = self.keeps_field.then(|| values.to_vec());
-        let modulation = modulator.modulate(values, bytes, &mut scratch);
+        let (levels, words, modulation) = levels_by(display, (height, width), |out| match out {
+            Out::Bytes(bytes) => modulator.modulate(values, bytes, &mut scratch),
+            Out::Words(phases, words) => modulator.modulate_words(values, phases, words, &mut scratch),
+        });
         Ok(Made {
             method: stage,
             field: kept.map(|values| stack(values, height, width)),
             levels,
+            words,
             encoder,
             scale: modulation.scale,
             stages: vec![
@@ -544,11 +580,13 @@ pub(crate) fn infos(display: &DisplayFile, made: &Made) -> (HologramInfo, Hologr
         encoder: Some(made.encoder.name.into()),
         scale: Some(made.scale),
         lut: display.lut.map(Vec::from),
+        levels_turns: display.target.panel.levels_turns.clone(),
     };
     let field = HologramInfo {
         encoder: None,
         scale: None,
         lut: None,
+        levels_turns: None,
         calibrated: display.calibrated(false),
         ..levels.clone()
     };
@@ -585,7 +623,7 @@ pub(crate) fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
     let depths = depths.map(|depth| display.target.display.z_of_depth(depth));
     let z_m: Vec<f64> = std::iter::once(0.0).chain(depths).collect();
     let wave = files::Hologram::Complex(wave, field).views_on(display, &z_m)?;
-    let shown = files::Hologram::PhaseOnly(made.levels.clone(), levels).views_on(display, &z_m)?;
+    let shown = made.hologram(levels).views_on(display, &z_m)?;
     let figures = evaluate::judge(&shown, &wave, 0)?;
     Ok(Judged {
         psnr_db: figures.amplitude_psnr,
@@ -600,11 +638,29 @@ fn described(engine: &Engine) -> String {
     format!("{} ({})", engine.name, engine.why)
 }
 
-fn slices<'a>(field: &'a mut Array3<Complex32>, levels: &'a mut Array3<u8>) -> (&'a mut [Complex32], &'a mut [u8]) {
-    (
-        field.as_slice_mut().expect("standard layout"),
-        levels.as_slice_mut().expect("standard layout"),
-    )
+/// Where levels are put.
+enum Out<'a> {
+    Bytes(&'a mut [u8]),
+    /// With memory for phases.
+    Words(&'a mut [f32], &'a mut [u16]),
+}
+
+/// Levels of the bits of `display` for (H, W) pixels, which `modulate` makes: bytes, and words where there are over 8.
+fn levels_by(
+    display: &phasefront::Display,
+    (height, width): (usize, usize),
+    modulate: impl FnOnce(Out<'_>) -> Modulation,
+) -> (Array3<u8>, Option<Array3<u16>>, Modulation) {
+    let mut levels = Array3::zeros((3, height, width));
+    if display.bits() <= 8 {
+        let modulation = modulate(Out::Bytes(levels.as_slice_mut().expect("standard layout")));
+        return (levels, None, modulation);
+    }
+    let mut words = Array3::zeros((3, height, width));
+    let values = words.as_slice_mut().expect("standard layout");
+    let modulation = modulate(Out::Words(&mut vec![0.0; values.len()], values));
+    let upper = words.mapv(|word: u16| (word >> (display.bits() - 8)) as u8);
+    (upper, Some(words), modulation)
 }
 
 fn stack(values: Vec<Complex32>, height: usize, width: usize) -> Array3<Complex32> {

@@ -22,9 +22,9 @@ pub(crate) struct Refocus {
     /// That many views from the near end of the volume to the far one
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
     stack: Option<u32>,
-    /// TOML file of a calibrated display, whose tables the hologram was made for
-    #[arg(long, value_name = "FILE")]
-    display: Option<PathBuf>,
+    /// TOML file of a calibrated display, whose tables the hologram was made for, or a modulator's name
+    #[arg(long, value_name = "FILE|NAME")]
+    display: Option<String>,
     /// Width of the pictures, pixels; their sides keep their proportion [default: the hologram's]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384))]
     width: Option<u32>,
@@ -48,7 +48,7 @@ impl Refocus {
         let z_m: Vec<f64> = z_mm.iter().map(|z| z / 1e3).collect();
         let views = match &self.display {
             None => hologram.views(&z_m),
-            Some(path) => hologram.views_on(&files::read_display(path)?, &z_m),
+            Some(name) => hologram.views_on(&files::find_display(name)?, &z_m),
         }
         .map_err(|e| Error::file(&self.hologram, e))?;
         let views: Vec<_> = (views.iter())

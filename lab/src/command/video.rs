@@ -224,6 +224,7 @@ impl Video {
             encoder: Some(encoder.name.into()),
             scale: None,
             lut: file.lut.map(Vec::from),
+            levels_turns: file.target.panel.levels_turns.clone(),
             calibrated: file.calibrated(true),
         };
         Ok((options, info))

@@ -12,6 +12,7 @@ use crate::brightness::Past;
 use crate::encode::{EncoderOptions, Encoding};
 use crate::method::Method;
 use crate::pipeline::StageTimes;
+use crate::registration::Registration;
 use crate::target::Target;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -134,6 +135,12 @@ impl GpuPipeline {
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
         job.encoder.check()?;
         job.target.check()?;
+        if !job.target.panel.is_plain() || job.target.registration != Registration::default() {
+            return Err(GpuError::Refused(
+                "a panel's flatness, carrier, lens or range over 2π and colours that are moved, which are the CPU's"
+                    .into(),
+            ));
+        }
         if let Encoding::Deep(network) = &job.encoder.encoding {
             network.check_prefilter(display)?;
         }

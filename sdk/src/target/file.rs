@@ -1,12 +1,14 @@
 //! A target in one file, for an app to carry. `phasefront calibrate pack` writes it from what calibration found.
 //!
-//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the laser's gains as f32, (3, Gh, Gw), then the
-//! bytes of the per-pixel table; numbers little-endian.
+//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the laser's gains as f32, (3, Gh, Gw), the
+//! flatness maps as u16, (1 or 3, H, W), then the bytes of the per-pixel table; numbers little-endian.
 
 use super::Target;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
+use crate::panel::{Flatness, Panel};
+use crate::registration::Registration;
 use crate::slm::Response;
 use crate::slm::per_pixel::PerPixel;
 use crate::wave::zernike::{Aberration, Coefficients};
@@ -31,6 +33,20 @@ struct Header {
     laser: Option<[usize; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     correction: Option<[Coefficients; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    carrier_rad: Option<[f64; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    lens_m: Option<f64>,
+    /// Flatness maps: none, one for all colours, or one for each.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    flatness: Option<usize>,
+    /// The phases of the levels, from which the response is made where there is no other.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    levels_turns: Option<Vec<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    shift_px: Option<[[f64; 2]; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    scale: Option<[f64; 3]>,
     display: Display,
 }
 
@@ -57,7 +73,14 @@ impl Target {
         if rows > MOST_NODES || columns > MOST_NODES {
             return Err(refuse(format!("holds a laser's map of {columns}×{rows}")));
         }
-        let (laser, table) = rest.split_at_checked(12 * rows * columns).ok_or_else(short)?;
+        let maps = header.flatness.unwrap_or_default();
+        if maps > 3 {
+            return Err(refuse(format!("holds {maps} flatness maps; there are at most 3")));
+        }
+        let (laser, rest) = rest.split_at_checked(12 * rows * columns).ok_or_else(short)?;
+        let modulator = (header.display.height(), header.display.width());
+        let values = maps * modulator.0 * modulator.1;
+        let (flatness, table) = rest.split_at_checked(2 * values).ok_or_else(short)?;
         if table.len() != header.per_pixel {
             return Err(refuse(format!(
                 "holds {} bytes of a table, its header says {}",
@@ -76,7 +99,10 @@ impl Target {
             }
         };
         let response = match (header.lut, table) {
-            (None, []) => Target::from(&header.display).response,
+            (None, []) => match &header.levels_turns {
+                None => Target::from(&header.display).response,
+                Some(turns) => Response::of_turns(turns)?,
+            },
             (Some(levels), []) => {
                 let count = levels.len();
                 Response::lut(
@@ -93,6 +119,22 @@ impl Target {
             response,
             illumination,
             correction: header.correction.map(Aberration::new).transpose()?,
+            panel: Panel {
+                carrier_rad: header.carrier_rad.unwrap_or_default(),
+                lens_m: header.lens_m,
+                flatness: match flatness.as_chunks().0 {
+                    [] => None,
+                    maps => Some(Flatness::new(
+                        modulator,
+                        maps.iter().map(|b| u16::from_le_bytes(*b)).collect(),
+                    )?),
+                },
+                levels_turns: header.levels_turns,
+            },
+            registration: Registration {
+                shift_px: header.shift_px.unwrap_or_default(),
+                scale: header.scale.unwrap_or([1.0; 3]),
+            },
         };
         target.check().map_err(refuse)?;
         Ok(target)
@@ -104,8 +146,16 @@ impl Target {
     /// As [`Self::from_bytes`] would.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.check()?;
+        let Panel {
+            carrier_rad,
+            lens_m,
+            flatness,
+            levels_turns,
+        } = &self.panel;
+        let of_levels = levels_turns.as_deref().map(Response::of_turns).transpose()?;
         let (lut, table) = match &self.response {
             Response::Linear { .. } => (None, vec![]),
+            response if of_levels.as_ref() == Some(response) => (None, vec![]),
             Response::Lut { level, .. } => (Some(level.to_vec()), vec![]),
             Response::PerPixel(table) => (None, table.to_bytes()),
         };
@@ -114,6 +164,14 @@ impl Target {
             per_pixel: table.len(),
             laser: (self.illumination.as_ref()).map(|light| [light.nodes().0, light.nodes().1]),
             correction: self.correction.map(|correction| *correction.coefficients()),
+            carrier_rad: Some(*carrier_rad).filter(|rad| *rad != [0.0; 2]),
+            lens_m: *lens_m,
+            flatness: flatness
+                .as_ref()
+                .map(|flatness| flatness.maps().len() / (flatness.shape().0 * flatness.shape().1)),
+            levels_turns: levels_turns.clone(),
+            shift_px: Some(self.registration.shift_px).filter(|shift| *shift != [[0.0; 2]; 3]),
+            scale: Some(self.registration.scale).filter(|scale| *scale != [1.0; 3]),
             display: self.display.clone(),
         };
         let text = toml::to_string(&header).map_err(refuse)?;
@@ -122,6 +180,8 @@ impl Target {
         bytes.extend(text.as_bytes());
         let gains = self.illumination.iter().flat_map(Illumination::gains);
         bytes.extend(gains.flat_map(|gain| gain.to_le_bytes()));
+        let maps = flatness.iter().flat_map(|flatness| flatness.maps());
+        bytes.extend(maps.flat_map(|turns| turns.to_le_bytes()));
         bytes.extend(table);
         Ok(bytes)
     }
@@ -148,6 +208,16 @@ mod tests {
             response: Response::PerPixel(Arc::new(table)),
             illumination: Some(Illumination::new(amplitude.view()).unwrap()),
             correction: Some(Aberration::new([[0.1, -2.0, 0.0, 0.25, 1e-9]; 3]).unwrap()),
+            panel: Panel {
+                carrier_rad: [0.01, -0.002],
+                lens_m: Some(0.5),
+                flatness: Some(Flatness::new((24, 40), (0..960).map(|i| 64 * i).collect()).unwrap()),
+                levels_turns: None,
+            },
+            registration: Registration {
+                shift_px: [[0.5, 0.0], [0.0, 0.0], [-1.0, 2.25]],
+                scale: [1.001, 1.0, 0.998],
+            },
         }
     }
 
@@ -159,6 +229,8 @@ mod tests {
         assert_eq!(got.display, want.display);
         assert_eq!(got.response, want.response);
         assert_eq!(got.correction, want.correction);
+        assert_eq!(got.panel, want.panel);
+        assert_eq!(got.registration, want.registration);
         let gains = |of: &Target| of.illumination.as_ref().unwrap().gains().to_vec();
         for (got, want) in gains(&got).iter().zip(gains(&want)) {
             assert!((got / want - 1.0).abs() < 1e-6);
@@ -177,6 +249,18 @@ mod tests {
             assert_eq!(got.response, response);
             assert!(got.illumination.is_none() && got.correction.is_none());
         }
+        // Levels that say what they show.
+        let turns = [0.0, 0.1, 0.4, 0.8];
+        let of_levels = Target {
+            response: Response::of_turns(&turns).unwrap(),
+            panel: Panel {
+                levels_turns: Some(turns.into()),
+                ..Panel::default()
+            },
+            ..Target::from(&want.display)
+        };
+        let got = Target::from_bytes(&of_levels.to_bytes().unwrap()).unwrap();
+        assert_eq!((got.response, got.panel), (of_levels.response, of_levels.panel));
     }
 
     #[test]
