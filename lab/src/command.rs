@@ -11,13 +11,16 @@ mod flags;
 mod frame;
 mod hologram;
 mod judge;
+mod link;
 mod method;
+mod multiplex;
 mod networks;
 mod occlusion;
 mod pack;
 mod refocus;
 mod scene;
 mod seeds;
+mod show;
 mod study;
 mod video;
 mod view;
@@ -57,9 +60,14 @@ enum Command {
     Evaluate(evaluate::Evaluate),
     Study(study::Study),
     Video(video::Video),
+    Multiplex(multiplex::MultiplexCommand),
     Devices(devices::Devices),
     Pack(pack::Pack),
     Unpack(pack::Unpack),
+    Show(show::Show),
+    Screens(show::Screens),
+    #[command(subcommand)]
+    Link(link::Link),
     #[command(subcommand)]
     Calibrate(calibrate::Calibrate),
 }
@@ -92,9 +100,13 @@ impl Phasefront {
                 let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
+            Command::Multiplex(command) => command.run(json),
             Command::Devices(command) => command.run(json),
             Command::Pack(command) => command.run(json),
             Command::Unpack(command) => command.run(json),
+            Command::Show(command) => command.run(json),
+            Command::Screens(command) => command.run(json),
+            Command::Link(command) => command.run(json),
             Command::Calibrate(command) => command.run(json),
         })
     }

@@ -26,6 +26,11 @@ pub(crate) struct DisplayFlags {
 }
 
 impl DisplayFlags {
+    /// Whether a display is asked for.
+    pub(crate) fn is_given(&self) -> bool {
+        self.display.is_some()
+    }
+
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => files::find_display(name)?,

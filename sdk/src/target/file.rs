@@ -286,6 +286,11 @@ mod tests {
         let error = other.to_bytes().unwrap_err().to_string();
         assert!(error.contains("40×24"), "{error}");
         // The same of a file whose display was changed by hand.
+        let plain = Target {
+            panel: Panel::default(),
+            ..calibration()
+        };
+        let bytes = plain.to_bytes().unwrap();
         let at = bytes.windows(10).position(|part| part == b"width = 40").unwrap();
         let mut changed = bytes.clone();
         changed[at..at + 10].copy_from_slice(b"width = 48");

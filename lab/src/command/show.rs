@@ -1,0 +1,139 @@
+//! `phasefront show` and `phasefront screens`: frames on a modulator that is a screen to the computer.
+
+use super::flags::DisplayFlags;
+use clap::Args;
+use phasefront_lab::show::{self, Screen, Showing};
+use phasefront_lab::{Error, Result, files, packed};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Show frames on a screen: full, unscaled, at its rate; Escape or Q ends it
+#[derive(Args)]
+pub(crate) struct Show {
+    /// Images as the modulator's input takes them, or with --display holograms, which are packed for it; several are
+    /// shown one after another, a folder's in the order of their names
+    #[arg(required = true)]
+    frames: Vec<PathBuf>,
+    /// The screen, counted from 1, as `phasefront screens` lists them
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    screen: usize,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Of holograms that take an image a colour, the one colour that is shown
+    #[arg(long, value_parser = packed::COLOURS)]
+    colour: Option<String>,
+    /// Frames a second [default: the screen's]
+    #[arg(long, value_name = "HZ")]
+    rate: Option<f64>,
+    /// Stop after so many seconds
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+impl Show {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        for (flag, value) in [("--rate", self.rate), ("--seconds", self.seconds)] {
+            if let Some(value) = value
+                && !(value > 0.0 && value <= 1e6)
+            {
+                return Err(Error::Input(format!(
+                    "{flag} {value}: it must lie above 0 and up to 1000000"
+                )));
+            }
+        }
+        let frames = self.images()?;
+        let shown = show::show(
+            &frames,
+            &Showing {
+                screen: self.screen,
+                rate_hz: self.rate,
+                length: self.seconds.map(Duration::from_secs_f64),
+            },
+        )?;
+        let text = format!(
+            "screen {}: {} frames at {} Hz, {} left out",
+            self.screen, shown.frames, shown.rate_hz, shown.late
+        );
+        super::print(json, &json!(shown), text);
+        Ok(())
+    }
+
+    fn images(&self) -> Result<Vec<packed::Image>> {
+        let mut images = Vec::new();
+        for path in self
+            .frames
+            .iter()
+            .map(|path| images_of(path))
+            .collect::<Result<Vec<_>>>()?
+            .concat()
+        {
+            if !self.display.is_given() {
+                images.push(packed::Image::read(&path)?);
+                continue;
+            }
+            let hologram = files::read_hologram(&path)?;
+            let mut of_colours = packed::pack(&hologram, &self.display.read()?)?;
+            match self
+                .colour
+                .as_ref()
+                .and_then(|name| packed::COLOURS.iter().position(|known| known == name))
+            {
+                Some(colour) if of_colours.len() == 3 => images.push(of_colours.swap_remove(colour)),
+                Some(_) => {
+                    return Err(Error::Input(
+                        "--colour is for packings of an image a colour; this one has all in one".into(),
+                    ));
+                }
+                None => images.append(&mut of_colours),
+            }
+        }
+        Ok(images)
+    }
+}
+
+/// The image files of a folder in the order of their names, or the one file.
+fn images_of(path: &Path) -> Result<Vec<PathBuf>> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let entries = std::fs::read_dir(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let mut files: Vec<_> = (entries.flatten().map(|entry| entry.path()))
+        .filter(|file| {
+            ["png", "bmp"]
+                .iter()
+                .any(|extension| files::has_extension(file, extension))
+        })
+        .collect();
+    files.sort();
+    match files.is_empty() {
+        true => Err(Error::file(path, "holds no .png and no .bmp")),
+        false => Ok(files),
+    }
+}
+
+/// List the screens of this computer
+#[derive(Args)]
+pub(crate) struct Screens {}
+
+impl Screens {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let screens = show::screens()?;
+        let rows: Vec<_> = screens.iter().map(row).collect();
+        super::print(json, &json!(screens), rows.join("\n"));
+        Ok(())
+    }
+}
+
+fn row(screen: &Screen) -> String {
+    let rate = screen.rate_hz.map_or(String::new(), |rate| format!("  {rate} Hz"));
+    let scaled = match screen.scale == 1.0 {
+        true => String::new(),
+        false => format!("  scaled by {}: turn this off for a modulator", screen.scale),
+    };
+    let [x, y] = screen.at;
+    format!(
+        "{}  {}  {}×{} at {x}, {y}{rate}{scaled}",
+        screen.number, screen.name, screen.width, screen.height
+    )
+}

@@ -1,0 +1,407 @@
+//! From an image to what each modulator takes, and back; one line for each thing that is wrong; a screen that shows what
+//! it is given.
+#![allow(clippy::unwrap_used)]
+
+mod folder;
+
+use folder::Folder;
+use phasefront::device::{Device, Packing};
+use phasefront_lab::files::{self, Hologram};
+use phasefront_lab::packed::{Image, Kind};
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Writes `rgb.png` and `depth.png`.
+fn frame(folder: &Folder, (width, height): (u32, u32)) {
+    let rgb = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([(x * 5) as u8, (y * 7) as u8, 90]));
+    rgb.save(folder.path("rgb.png")).unwrap();
+    let depth = image::GrayImage::from_fn(width, height, |x, _| {
+        image::Luma([if x < width / 2 { 30 } else { 220 }])
+    });
+    depth.save(folder.path("depth.png")).unwrap();
+}
+
+fn levels(path: &Path) -> Vec<u16> {
+    match files::read_hologram(path).unwrap() {
+        Hologram::PhaseOnly(levels, _) => levels.iter().map(|level| u16::from(*level)).collect(),
+        Hologram::Words(levels, _) => levels.iter().copied().collect(),
+        Hologram::Complex(..) => panic!("levels were written"),
+    }
+}
+
+#[test]
+fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
+    for name in Device::names() {
+        let device = Device::shipped(name).unwrap();
+        let folder = Folder::new();
+        // Cells need every pixel; elsewhere a small hologram stands in the middle.
+        let (width, height) = match device.packing {
+            Packing::BitPlanes(_) => (device.display.width() as u32, device.display.height() as u32),
+            _ => (48, 32),
+        };
+        frame(&folder, (width, height));
+        let made = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "sweep",
+            "--planes",
+            "8",
+        ];
+        let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
+        folder.succeeds(&[&made[..], &to].concat());
+        let frames = match folder.path("frame.png").exists() {
+            true => vec!["frame.png"],
+            false => vec!["frame-red.png", "frame-green.png", "frame-blue.png"],
+        };
+        let size = format!("{width}x{height}");
+        let back = ["--display", name, "--size", &size, "-o", "back.png"];
+        folder.succeeds(&[&["unpack"], &frames[..], &back].concat());
+        let hologram = levels(&folder.path("hologram.png"));
+        assert_eq!(levels(&folder.path("back.png")), hologram, "{name}");
+        let most = hologram.iter().max().unwrap();
+        let highest = (1u16 << device.display.bits()) - 1;
+        assert!(*most <= highest && *most > highest / 2, "{name}: {most}");
+        // By hand it is the same frame.
+        folder.succeeds(&["pack", "hologram.png", "--display", name, "-o", "frame_.png"]);
+        let again = frames[0].replace("frame", "frame_");
+        let [packed, again] = [frames[0], &again].map(|name| fs::read(folder.path(name)).unwrap());
+        assert_eq!(packed, again, "{name}");
+        folder.succeeds(&["refocus", "hologram.png", "--z-mm", "0", "-o", "view.png"]);
+    }
+}
+
+#[test]
+fn a_view_is_not_turned_by_what_the_panel_adds() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    let flat = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(x * 3 + y * y) as u8]));
+    flat.save(folder.path("flat.bmp")).unwrap();
+    let plain = "width = 64\nheight = 48\n";
+    fs::write(folder.path("plain.toml"), plain).unwrap();
+    let added = "carrier_mrad = [6.0, -2.0]\nlens_mm = 400\nflatness = \"flat.bmp\"\n";
+    fs::write(folder.path("added.toml"), format!("{plain}{added}")).unwrap();
+    fs::write(folder.path("over.toml"), format!("{plain}range_turns = 1.7\n")).unwrap();
+    let mut views = Vec::new();
+    for name in ["plain", "added", "over"] {
+        let (toml, hologram, view) = (
+            format!("{name}.toml"),
+            format!("{name}.png"),
+            format!("{name}-view.png"),
+        );
+        let frame = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "sweep",
+        ];
+        folder.succeeds(&[&frame[..], &["--display", &toml, "-o", &hologram]].concat());
+        folder.succeeds(&["refocus", &hologram, "--display", &toml, "--z-mm", "0", "-o", &view]);
+        views.push(files::read_rgb(&folder.path(&view)).unwrap());
+    }
+    assert_ne!(levels(&folder.path("plain.png")), levels(&folder.path("added.png")));
+    assert!(
+        levels(&folder.path("over.png")).iter().any(|level| *level > 170),
+        "beyond one turn"
+    );
+    for other in &views[1..] {
+        let alike = phasefront_lab::metrics::compare(other.view(), views[0].view()).unwrap();
+        assert!(alike.psnr_overall > 35.0, "{}", alike.psnr_overall);
+    }
+    // Without its file such a hologram cannot be looked at.
+    let errors = folder.fails(&["refocus", "added.png", "--z-mm", "0", "-o", "v.png"], 1);
+    assert!(errors.contains("--display"), "{errors}");
+}
+
+#[test]
+fn maps_of_one_image_become_bit_planes() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    let cells = "{ memory = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12], layout = [[2, 3], [0, 1]] }";
+    let toml = format!("width = 64\nheight = 48\nbits = 4\npacking = {cells}\n");
+    fs::write(folder.path("plm.toml"), toml).unwrap();
+    let image = [
+        "multiplex",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "--display",
+        "plm.toml",
+    ];
+    let more = [
+        "--maps",
+        "8",
+        "--packed",
+        "frame.png",
+        "--judge",
+        "--json",
+        "-o",
+        "maps",
+    ];
+    let told: serde_json::Value = serde_json::from_str(&folder.succeeds(&[&image[..], &more].concat())).unwrap();
+    let shown = told["shown"].as_array().unwrap();
+    assert_eq!(shown.len(), 4);
+    assert!(shown[3]["psnr_db"].as_f64() > shown[0]["psnr_db"].as_f64());
+    // The first plane of each channel is the first map of its colour, also by hand.
+    folder.succeeds(&["unpack", "frame.png", "--display", "plm.toml", "-o", "first.png"]);
+    assert_eq!(
+        levels(&folder.path("first.png")),
+        levels(&folder.path("maps/phase_000.png"))
+    );
+    let maps: Vec<String> = (0..8).map(|n| format!("maps/phase_{n:03}.png")).collect();
+    let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
+    let green = ["--colour", "green", "--display", "plm.toml", "-o", "green.png"];
+    folder.succeeds(&[&["pack"], &maps[..], &green].concat());
+    assert_eq!(Image::read(&folder.path("green.png")).unwrap().shape, (96, 128));
+    let errors = folder.fails(&[&["pack"], &maps[..5], &green].concat(), 1);
+    assert!(errors.contains("24"), "{errors}");
+}
+
+#[test]
+fn what_is_wrong_is_one_line() {
+    let folder = Folder::new();
+    frame(&folder, (48, 32));
+    let files = [
+        ("key.toml", "widht = 48"),
+        ("bits.toml", "bits = 12"),
+        ("packing.toml", "packing = \"gray\""),
+        ("flat.toml", "width = 48\nheight = 32\nflatness = \"rgb.png\""),
+        ("size.toml", "width = 48\nheight = 33\nflatness = \"depth.png\""),
+        ("steep.toml", "width = 48\nheight = 32\ncarrier_mrad = [90, 0]"),
+        ("scale.toml", "width = 48\nheight = 32\nscale = [1, 2, 1]"),
+    ];
+    for (name, text) in files {
+        fs::write(folder.path(name), text).unwrap();
+    }
+    let hologram = [
+        "hologram",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "--method",
+        "sweep",
+        "-o",
+        "h.png",
+    ];
+    for (display, word) in [
+        ("key.toml", "widht"),
+        ("bits.toml", "bits is 12"),
+        ("packing.toml", "gray"),
+        ("flat.toml", "grey"),
+        ("size.toml", "48×33"),
+        ("steep.toml", "0.5"),
+        ("scale.toml", "scale"),
+        ("santec", "santec-slm-200"),
+        ("none.toml", "none.toml"),
+    ] {
+        let errors = folder.fails(&[&hologram[..], &["--display", display]].concat(), 1);
+        assert!(
+            errors.contains(word) && errors.lines().count() == 1,
+            "{display}: {errors}"
+        );
+        assert!(!folder.path("h.png").exists());
+    }
+    folder.succeeds(&[&hologram[..], &["--display", "holoeye-pluto"]].concat());
+    for (arguments, word) in [
+        (
+            &["pack", "h.png", "--display", "santec-slm-200", "-o", "f.png"][..],
+            "8 bits",
+        ),
+        (&["pack", "h.png", "--display", "ti-plm-p47", "-o", "f.png"], "bits"),
+        (
+            &["pack", "rgb.png", "--display", "holoeye-pluto", "-o", "f.png"],
+            "hologram",
+        ),
+        (
+            &["unpack", "rgb.png", "--display", "holoeye-gaea-2", "-o", "f.png"],
+            "3840×2160",
+        ),
+        (&["unpack", "rgb.png", "--display", "holoeye-pluto", "-o", "f.png"], "3"),
+        (&["link", "pattern", "--size", "100x100", "-o", "f.png"], "512"),
+        (&["link", "read", "rgb.png"], "512"),
+        (&["show", "none.png"], "none.png"),
+        (&["show", "rgb.png", "--rate", "0"], "--rate"),
+    ] {
+        let errors = folder.fails(arguments, 1);
+        assert!(
+            errors.contains(word) && errors.lines().count() == 1,
+            "{arguments:?}: {errors}"
+        );
+    }
+}
+
+#[test]
+fn devices_are_listed_with_their_sources() {
+    let folder = Folder::new();
+    let text = folder.succeeds(&["devices"]);
+    for name in Device::names() {
+        assert!(text.contains(name), "{text}");
+    }
+    let one = folder.succeeds(&["devices", "ti-plm-p67"]);
+    assert!(one.contains("unconfirmed") && one.contains("width: "), "{one}");
+    // One of the user's stands beside them, before one of the same name.
+    fs::create_dir_all(folder.path("phasefront/devices")).unwrap();
+    fs::write(folder.path("phasefront/devices/mine.toml"), "width = 123\nheight = 99").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+        .args(["devices", "--json"])
+        .env("XDG_CONFIG_HOME", folder.0.path())
+        .output()
+        .unwrap();
+    let list: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&list[0]["name"], &list[0]["width"]), (&"mine".into(), &123.into()));
+}
+
+#[test]
+fn the_links_pattern_goes_through_files() {
+    let folder = Folder::new();
+    folder.succeeds(&["link", "pattern", "--size", "640x96", "-o", "pattern.png"]);
+    let read = ["link", "read", "pattern.png", "--size", "640x96"];
+    assert_eq!(folder.succeeds(&read), "every pixel arrives as it is\n");
+    // What a link of limited range makes of it.
+    let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
+    let limited = image::RgbImage::from_fn(640, 96, |x, y| {
+        image::Rgb(pattern.get_pixel(x, y).0.map(|v| 16 + (u32::from(v) * 219 / 255) as u8))
+    });
+    limited.save(folder.path("limited.png")).unwrap();
+    let told = folder.succeeds(&["link", "read", "limited.png", "--size", "640x96"]);
+    assert!(told.starts_with("limited range"), "{told}");
+}
+
+/// A virtual X server with one screen of 640×480, which keeps what it shows in a file.
+struct Screen {
+    server: Child,
+    display: String,
+    folder: tempfile::TempDir,
+}
+
+impl Screen {
+    /// None, with a line that says why, where there is no such server.
+    fn open() -> Option<Self> {
+        let folder = tempfile::tempdir().unwrap();
+        let number = 90 + std::process::id() % 9000;
+        let display = format!(":{number}");
+        let server = Command::new("Xvfb")
+            .args([&display, "-screen", "0", "640x480x24", "-fbdir"])
+            .arg(folder.path())
+            .stderr(Stdio::null())
+            .spawn();
+        let Ok(server) = server else {
+            println!("skipped: there is no Xvfb (Debian's package xvfb)");
+            return None;
+        };
+        let screen = Screen {
+            server,
+            display,
+            folder,
+        };
+        let socket = format!("/tmp/.X11-unix/X{number}");
+        let start = Instant::now();
+        while !Path::new(&socket).exists() {
+            assert!(start.elapsed() < Duration::from_secs(20), "the X server does not start");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        Some(screen)
+    }
+
+    fn command(&self, folder: &Folder, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_phasefront"));
+        command
+            .args(arguments)
+            .current_dir(folder.0.path())
+            .env("DISPLAY", &self.display)
+            .env_remove("WAYLAND_DISPLAY");
+        command
+    }
+
+    /// Rows of red, green, blue of what it shows: a file of X's window dump.
+    fn pixels(&self) -> Vec<u8> {
+        let bytes = fs::read(self.folder.path().join("Xvfb_screen0")).unwrap();
+        let number = |n: usize| u32::from_be_bytes([0, 1, 2, 3].map(|i| bytes[4 * n + i])) as usize;
+        // Header, its colour map of 12 bytes an entry, then lines of words, blue first.
+        let (header, colours, line) = (number(0), number(19), number(12));
+        assert_eq!((number(4), number(5), number(11)), (640, 480, 32));
+        let image = &bytes[header + 12 * colours..];
+        let rows = image.chunks(line).take(480);
+        rows.flat_map(|row| row[..4 * 640].chunks(4).flat_map(|p| [p[2], p[1], p[0]]))
+            .collect()
+    }
+}
+
+impl Drop for Screen {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+#[test]
+fn a_screen_shows_exactly_what_it_is_given() {
+    let Some(screen) = Screen::open() else {
+        return;
+    };
+    let folder = Folder::new();
+    let frames = [1u32, 2].map(|seed| Image {
+        shape: (480, 640),
+        bytes: (0..3 * 640 * 480)
+            .map(|i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 977) >> 13) as u8)
+            .collect(),
+        kind: Kind::Rgb,
+    });
+    fs::create_dir(folder.path("frames")).unwrap();
+    for (n, frame) in frames.iter().enumerate() {
+        frame.write(&folder.path(&format!("frames/{n}.png"))).unwrap();
+    }
+    let screens = screen.command(&folder, &["screens", "--json"]).output().unwrap();
+    if !screens.status.success() {
+        println!("skipped: {}", String::from_utf8_lossy(&screens.stderr).trim());
+        return;
+    }
+    let list: serde_json::Value = serde_json::from_slice(&screens.stdout).unwrap();
+    assert_eq!((&list[0]["width"], &list[0]["height"]), (&640.into(), &480.into()));
+
+    // One frame, then both at 5 a second: what stands there is one of them, whole, and each is seen.
+    for shown in [&frames[..1], &frames] {
+        let path = if shown.len() == 1 { "frames/0.png" } else { "frames" };
+        let arguments = ["show", path, "--screen", "1", "--seconds", "60", "--rate", "5"];
+        let mut player = screen.command(&folder, &arguments).spawn().unwrap();
+        let (start, mut seen) = (Instant::now(), vec![false; shown.len()]);
+        while seen.contains(&false) {
+            assert!(
+                start.elapsed() < Duration::from_secs(50),
+                "{} frames are not seen",
+                shown.len()
+            );
+            let pixels = screen.pixels();
+            if let Some(n) = shown.iter().position(|frame| frame.bytes == pixels) {
+                seen[n] = true;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        player.kill().unwrap();
+        player.wait().unwrap();
+    }
+
+    // The pattern of the link arrives as it is, and a screen that is not there is named.
+    folder.succeeds(&["link", "pattern", "--size", "640x480", "-o", "pattern.png"]);
+    let errors = screen
+        .command(&folder, &["show", "pattern.png", "--screen", "2"])
+        .output()
+        .unwrap();
+    assert!(String::from_utf8_lossy(&errors.stderr).contains("no screen 2"));
+    let large = screen.command(
+        &folder,
+        &["show", "frames/0.png", "--screen", "1", "--seconds", "0.1", "--json"],
+    );
+    let told: serde_json::Value = serde_json::from_slice(&{ large }.output().unwrap().stdout).unwrap();
+    assert_eq!(told["screen"]["width"], 640);
+}
