@@ -37,11 +37,15 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
         let device = Device::shipped(name).unwrap();
         let folder = Folder::new();
         // Cells need every pixel; elsewhere a small hologram stands in the middle.
-        let (width, height) = match device.packing {
-            Packing::BitPlanes(_) => (device.display.width() as u32, device.display.height() as u32),
-            _ => (48, 32),
+        let (size, fit) = match device.packing {
+            Packing::BitPlanes(_) => (
+                (device.display.width(), device.display.height()),
+                &["--fit", "cover"][..],
+            ),
+            _ => ((48, 32), &[][..]),
         };
-        frame(&folder, (width, height));
+        frame(&folder, (48, 32));
+        let size = format!("{}x{}", size.0, size.1);
         let made = [
             "hologram",
             "--rgb",
@@ -54,12 +58,11 @@ fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
             "8",
         ];
         let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
-        folder.succeeds(&[&made[..], &to].concat());
+        folder.succeeds(&[&made[..], fit, &to].concat());
         let frames = match folder.path("frame.png").exists() {
             true => vec!["frame.png"],
             false => vec!["frame-red.png", "frame-green.png", "frame-blue.png"],
         };
-        let size = format!("{width}x{height}");
         let back = ["--display", name, "--size", &size, "-o", "back.png"];
         folder.succeeds(&[&["unpack"], &frames[..], &back].concat());
         let hologram = levels(&folder.path("hologram.png"));
@@ -211,6 +214,11 @@ fn what_is_wrong_is_one_line() {
         );
         assert!(!folder.path("h.png").exists());
     }
+    // A panel under 2π is encoded for what it can, and that is told.
+    fs::write(folder.path("short.toml"), "width = 48\nheight = 32\nrange_turns = 0.8").unwrap();
+    let output = folder.run(&[&hologram[..], &["--display", "short.toml"]].concat());
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && told.contains("reach 0.80 of 2π"), "{told}");
     folder.succeeds(&[&hologram[..], &["--display", "holoeye-pluto"]].concat());
     for (arguments, word) in [
         (

@@ -3,6 +3,8 @@
 
 use divan::{Bencher, counter::ItemsCount};
 use num_complex::Complex32;
+use phasefront::device::{Device, Packing};
+use phasefront::output::BitPlanes;
 use phasefront::unstable::encode::Encoder;
 use phasefront::unstable::wave::{
     aperture::{Aperture, Opening},
@@ -49,6 +51,23 @@ fn remove_mean_phase(bencher: Bencher<'_, '_>) {
     let mut field = field(3);
     let run = || phasefront::unstable::modulator::remove_mean_phase(&mut field);
     bencher.counter(pixels(3)).bench_local(run);
+}
+
+/// 24 maps of 16 levels into a frame of 1920×1080 cells.
+#[divan::bench(args = [1, 2])]
+fn pack_24_maps(bencher: Bencher<'_, '_>, threads: usize) {
+    let device = Device::shipped("ti-plm-p47").unwrap();
+    let Packing::BitPlanes(cells) = &device.packing else {
+        unreachable!("it has cells")
+    };
+    let plan = BitPlanes::new(cells, SIZE, device.flip_x, device.flip_y);
+    let map = |n: usize| (0..SIZE.0 * SIZE.1).map(|i| ((i * 7 + n) % 16) as u8).collect();
+    let maps: Vec<Vec<u8>> = (0..24).map(map).collect();
+    let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
+    let mut frame = vec![0; plan.frame_bytes()];
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let run = || pool.install(|| plan.pack(&maps, &mut frame).unwrap());
+    bencher.counter(pixels(24)).bench_local(run);
 }
 
 #[divan::bench(args = ["double", "anti-alias", "band-limit"])]

@@ -60,6 +60,23 @@ impl Flatness {
         self.shape
     }
 
+    /// The map of the (`height`, `width`) pixels in the middle, for a hologram smaller than the modulator.
+    ///
+    /// # Errors
+    /// More pixels than there are.
+    pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
+        let (rows, columns) = self.shape;
+        if height > rows || width > columns {
+            return Err(Error::Plan(format!(
+                "the flatness map is for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
+            )));
+        }
+        let (top, left) = ((rows - height) / 2, (columns - width) / 2);
+        let maps = self.maps.chunks_exact(rows * columns);
+        let middle = maps.flat_map(|map| (top..top + height).flat_map(move |y| &map[y * columns + left..][..width]));
+        Self::new((height, width), middle.copied().collect())
+    }
+
     /// (1 or 3, H, W), in turns of 2π/65536.
     pub fn maps(&self) -> &[u16] {
         &self.maps
@@ -335,6 +352,12 @@ mod tests {
                 assert!((0.0..TAU).contains(&shown[at]));
             }
         }
+        let mut middle = panel.clone();
+        middle.flatness = Some(panel.flatness.as_ref().unwrap().centred(height, width).unwrap());
+        let small = display.clone().with_size(height, width).unwrap();
+        let of_middle = PanelPlan::new(&middle, &small, (height, width)).unwrap().unwrap();
+        assert_eq!(of_middle.added, plan.added);
+        assert!(panel.flatness.unwrap().centred(25, 40).is_err());
         let mut field: Vec<Complex32> = shown.iter().map(|p| Complex32::from_polar(1.0, *p)).collect();
         plan.remove(&mut field);
         for (value, phase) in field.iter().zip(&phases) {

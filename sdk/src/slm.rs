@@ -87,14 +87,11 @@ impl Response {
         }
         let first_turn = turns.iter().take_while(|turn| **turn < 1.0).count();
         let nearest = |step: usize| {
-            let apart = |level: usize| {
-                let apart = (turns[level] - step as f64 / 256.0).rem_euclid(1.0);
-                apart.min(1.0 - apart)
-            };
-            // Level 0 comes last: it is the higher one where a phase lies between the last level and 2π.
-            let order = (1..first_turn).chain([0]);
-            let best = order.reduce(|best, level| if apart(level) <= apart(best) { level } else { best });
-            best.unwrap_or(0) as u8
+            let apart = |turn: f64| (turn - step as f64 / 256.0).abs();
+            // Level 0 stands at the turn's end too.
+            let all = turns[..first_turn].iter().copied().zip(0..).chain([(1.0, 0)]);
+            let best = all.reduce(|best, other| if apart(other.0) <= apart(best.0) { other } else { best });
+            best.map_or(0, |(_, level)| level)
         };
         let phase = std::array::from_fn(|level| {
             let turn = turns.get(level).or(turns.last()).copied().unwrap_or(0.0);

@@ -40,8 +40,24 @@ impl DisplayFlags {
             file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
             file.device.display = file.target.display.clone();
         }
+        if let Some(turns) = &file.target.panel.levels_turns
+            && let Some(gap) = gap(turns)
+        {
+            log::warn!(
+                "the modulator's levels reach {:.2} of 2π; phases beyond become the nearest that they show, at most {:.2} rad away",
+                1.0 - gap,
+                gap * std::f64::consts::PI
+            );
+        }
         Ok(file)
     }
+}
+
+/// The part of a turn that levels of these phases do not reach, where it is wider than what they leave out elsewhere.
+fn gap(turns: &[f64]) -> Option<f64> {
+    let widest = turns.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let gap = 1.0 - turns.last()?;
+    (gap > 1.5 * widest).then_some(gap)
 }
 
 /// How the field becomes phases.

@@ -1,6 +1,7 @@
 //! `phasefront multiplex`: several phase maps of one image, for modulators that are faster than the eye.
 
-use super::flags::{DisplayFlags, EncoderFlags, FrameFlags};
+use super::flags::{DisplayFlags, EncoderFlags};
+use super::frame::FrameFlags;
 use super::hologram::{PrecisionName, sweep_for};
 use super::method::{CoreMethod, Parts};
 use clap::Args;
@@ -66,7 +67,7 @@ impl MultiplexCommand {
                 "maps are made for levels of up to 8 bits, without a carrier, a lens or a flatness map".into(),
             ));
         }
-        let frame = self.frame.read()?;
+        let frame = self.frame.read(&target.display)?;
         let (method, encoder) = self.method.of(&Parts {
             network: self.network.as_deref(),
             precision: self.precision.precision(),

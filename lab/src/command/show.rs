@@ -2,6 +2,7 @@
 
 use super::flags::DisplayFlags;
 use clap::Args;
+use phasefront_lab::files::DisplayFile;
 use phasefront_lab::show::{self, Screen, Showing};
 use phasefront_lab::{Error, Result, files, packed};
 use serde_json::json;
@@ -60,35 +61,30 @@ impl Show {
     }
 
     fn images(&self) -> Result<Vec<packed::Image>> {
+        let display = self.display.is_given().then(|| self.display.read()).transpose()?;
+        let paths = self.frames.iter().map(|path| images_of(path));
         let mut images = Vec::new();
-        for path in self
-            .frames
-            .iter()
-            .map(|path| images_of(path))
-            .collect::<Result<Vec<_>>>()?
-            .concat()
-        {
-            if !self.display.is_given() {
-                images.push(packed::Image::read(&path)?);
-                continue;
-            }
-            let hologram = files::read_hologram(&path)?;
-            let mut of_colours = packed::pack(&hologram, &self.display.read()?)?;
-            match self
-                .colour
-                .as_ref()
-                .and_then(|name| packed::COLOURS.iter().position(|known| known == name))
-            {
-                Some(colour) if of_colours.len() == 3 => images.push(of_colours.swap_remove(colour)),
-                Some(_) => {
-                    return Err(Error::Input(
-                        "--colour is for packings of an image a colour; this one has all in one".into(),
-                    ));
-                }
-                None => images.append(&mut of_colours),
+        for path in paths.collect::<Result<Vec<_>>>()?.concat() {
+            match &display {
+                None => images.push(packed::Image::read(&path)?),
+                Some(display) => images.append(&mut self.packed(&path, display)?),
             }
         }
         Ok(images)
+    }
+
+    /// The images of a hologram, or that of the one colour.
+    fn packed(&self, path: &Path, display: &DisplayFile) -> Result<Vec<packed::Image>> {
+        let mut images = packed::pack(&files::read_hologram(path)?, display)?;
+        let Some(name) = &self.colour else {
+            return Ok(images);
+        };
+        match packed::COLOURS.iter().position(|known| known == name) {
+            Some(colour) if images.len() == packed::COLOURS.len() => Ok(vec![images.swap_remove(colour)]),
+            _ => Err(Error::Input(
+                "--colour is for packings of an image a colour; this one has all in one".into(),
+            )),
+        }
     }
 }
 

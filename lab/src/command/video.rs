@@ -10,6 +10,7 @@ use super::method::{CoreMethod, Parts};
 use clap::{Args, ValueEnum};
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
+use phasefront::target::Panel;
 use phasefront::{Brightness, Hologram, Session, SessionOptions, Sweep, Target};
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::{Error, Result, film, gpu};
@@ -179,6 +180,12 @@ impl Video {
         let target = Target {
             display: target.display.with_size(height, width)?,
             response: target.response.centred(height, width)?,
+            panel: Panel {
+                flatness: (target.panel.flatness.as_ref())
+                    .map(|map| map.centred(height, width))
+                    .transpose()?,
+                ..target.panel
+            },
             ..target
         };
         let display = target.display.clone();
