@@ -9,8 +9,8 @@
 //! ```
 //!
 //! A flatness file is a grey image of the modulator's size, whose full range is 2π, as makers give it (Hamamatsu's
-//! correction pattern), or a CSV of levels 0 to 1023 with a first row and column of coordinates (Santec). It is added to
-//! the phases, modulo 2π.
+//! correction pattern), or a CSV of levels 0 to 1023 with a first row and column of coordinates (Santec). It is added
+//! to the phases, modulo 2π.
 
 use crate::error::{Error, Result};
 use crate::files::{has_extension, open_image};

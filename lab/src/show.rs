@@ -1,7 +1,7 @@
 //! Frames on a screen: full, unscaled, each pixel as the file has it.
 //!
-//! A modulator is a screen to the computer. What stands between the two can still change pixels: `phasefront link` finds
-//! that out.
+//! A modulator is a screen to the computer. What stands between the two can still change pixels: `phasefront link`
+//! finds that out.
 
 use crate::error::{Error, Result};
 use crate::packed::{Image, Kind};

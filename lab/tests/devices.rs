@@ -1,5 +1,5 @@
-//! From an image to what each modulator takes, and back; one line for each thing that is wrong; a screen that shows what
-//! it is given.
+//! From an image to what each modulator takes, and back; one line for each thing that is wrong; a screen that shows
+//! what it is given.
 #![allow(clippy::unwrap_used)]
 
 mod folder;

@@ -21,8 +21,8 @@ pub struct Panel {
     pub lens_m: Option<f64>,
     /// The phases that make the panel flat.
     pub flatness: Option<Flatness>,
-    /// The phase that each level shows, in turns of 2π, rising from 0: where they go on over one turn, each row's phases
-    /// follow their neighbours instead of jumping at 2π, as far as the range goes. None: the response alone decides.
+    /// The phase that each level shows, in turns of 2π, rising from 0: where they go on over one turn, each row's
+    /// phases follow their neighbours instead of jumping at 2π, as far as the range goes. None: the response alone decides.
     pub levels_turns: Option<Vec<f64>>,
 }
 
@@ -202,8 +202,8 @@ impl PanelPlan {
     }
 
     /// The levels of `phases`, (3, H, W) in \[0, 2π), where they go on over one turn: of the levels that show a phase,
-    /// the one whose own phase is nearest to its left neighbour's, the first pixel's nearest to the middle of the range.
-    /// False, and nothing done, where they do not. Allocates nothing.
+    /// the one whose own phase is nearest to its left neighbour's, the first pixel's nearest to the middle of the
+    /// range. False, and nothing done, where they do not. Allocates nothing.
     ///
     /// # Panics
     /// If `phases` or `levels` has another length than planned.
