@@ -352,7 +352,16 @@ mod tests {
             let Response::Lut { level, .. } = response else {
                 panic!("{name} has levels of its own")
             };
-            assert_eq!(level[..], digits(golden.trim()), "{name}");
+            let turns = Device::shipped(name).unwrap().levels_turns.unwrap();
+            for (step, (level, golden)) in level.iter().zip(digits(golden.trim())).enumerate() {
+                // Half-way between two levels the package's rounding decides: at step 111 of p47.
+                let apart = |level: u8| (turns[usize::from(level)] - step as f64 / 256.0).abs();
+                let tie = level.abs_diff(golden) == 1 && (apart(*level) - apart(golden)).abs() < 1e-12;
+                assert!(
+                    *level == golden || tie,
+                    "{name}: {level} for step {step}, {golden} is right"
+                );
+            }
         }
     }
 

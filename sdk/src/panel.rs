@@ -269,7 +269,7 @@ struct Nearest {
 }
 
 /// Steps of a turn.
-const STEPS: f32 = 1024.0;
+const STEPS: f32 = 4096.0;
 
 impl Nearest {
     fn new(turns: &[f64]) -> Self {
@@ -417,7 +417,7 @@ mod tests {
             for (pair, phase) in row.windows(2).zip(phases) {
                 assert!(pair[0].abs_diff(pair[1]) < 4, "{pair:?}");
                 let apart = (turns[pair[0] as usize] - f64::from(phase / TAU)).rem_euclid(1.0);
-                assert!(apart.min(1.0 - apart) < 1.0 / 256.0, "{} {phase}", pair[0]);
+                assert!(apart.min(1.0 - apart) < 1.05 / 256.0, "{} {phase}", pair[0]);
             }
         }
         // Where the range ends, any phase is still shown by a level that shows it.
@@ -425,7 +425,7 @@ mod tests {
         assert!(plan.levels(&wild, &mut levels));
         for (level, phase) in levels.iter().zip(&wild) {
             let apart = (turns[*level as usize] - f64::from(phase / TAU)).rem_euclid(1.0);
-            assert!(apart.min(1.0 - apart) < 1.2 / 256.0, "{level} {phase}");
+            assert!(apart.min(1.0 - apart) < 1.05 / 256.0, "{level} {phase}");
         }
     }
 
