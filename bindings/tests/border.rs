@@ -6,8 +6,8 @@ use std::path::Path;
 /// The exported functions of a file, each from its name to its end.
 fn exported(source: &str) -> Vec<&str> {
     let mut found = Vec::new();
-    let mut exports = source.match_indices("#[uniffi::export").peekable();
-    while let Some((at, _)) = exports.next() {
+    let exports = source.match_indices("#[uniffi::export").peekable();
+    for (at, _) in exports {
         // To the end of what is exported, a function or an `impl`, which stands at the margin.
         let block = &source[at..][..source[at..].find("\n}\n").unwrap()];
         if block.contains("pub trait ") {

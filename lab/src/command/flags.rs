@@ -10,7 +10,6 @@ use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::models::Precision;
 use phasefront_lab::rgbd::DepthOptions;
 use phasefront_lab::{Error, Result, gpu, models};
-use std::path::PathBuf;
 use std::sync::{Arc, LazyLock};
 
 /// The display that a hologram is for.
