@@ -63,14 +63,17 @@ pub struct BitPlanes {
     flip_y: bool,
     /// Of each level the four cells' bits as they stand in the frame, in the lowest bit of a byte each: upper left,
     /// upper right, lower left, lower right.
-    spread: [u32; 256],
+    spread: [u32; 16],
+    /// The same of two levels of neighbouring planes, the later in the upper four bits of the index and in the second
+    /// bit of each byte: looking up is what takes the time.
+    pairs: Box<[u32; 256]>,
 }
 
 impl BitPlanes {
     /// Plans frames of the 2·H×2·W cells of `shape` = (H, W) pixels, left and right, top and bottom exchanged where
     /// asked for: cells and pixels alike.
     pub fn new(cells: &Cells, shape: (usize, usize), flip_x: bool, flip_y: bool) -> Self {
-        let spread = std::array::from_fn(|level| {
+        let spread: [u32; 16] = std::array::from_fn(|level| {
             // Bits above a level's mean nothing.
             let bits = cells.bits(level % cells.levels());
             let cell = |n: usize| bits[flip(n / 2, 2, flip_y)][flip(n % 2, 2, flip_x)];
@@ -81,6 +84,7 @@ impl BitPlanes {
             shape,
             flip_x,
             flip_y,
+            pairs: Box::new(std::array::from_fn(|pair| spread[pair % 16] | spread[pair / 16] << 1)),
             spread,
         }
     }
@@ -126,22 +130,28 @@ impl BitPlanes {
 
     /// Two rows of a frame from one row of pixels.
     fn pack_row(&self, planes: &[&[u8]; PLANES], rows: &mut [u8]) {
+        const RUN: usize = 64;
         let width = planes[0].len();
         let (upper, lower) = rows.split_at_mut(6 * width);
-        let pixels = upper
-            .as_chunks_mut::<6>()
-            .0
-            .iter_mut()
-            .zip(lower.as_chunks_mut::<6>().0);
-        for (x, (upper, lower)) in pixels.enumerate() {
-            let x = flip(x, width, self.flip_x);
-            for colour in 0..3 {
-                let of_colour = &planes[8 * colour..8 * colour + 8];
-                let all = (of_colour.iter().enumerate())
-                    .fold(0, |all, (n, plane)| all | self.spread[usize::from(plane[x])] << n);
-                let [upper_left, upper_right, lower_left, lower_right] = all.to_le_bytes();
-                (upper[colour], upper[3 + colour]) = (upper_left, upper_right);
-                (lower[colour], lower[3 + colour]) = (lower_left, lower_right);
+        for first in (0..width).step_by(RUN) {
+            let count = RUN.min(width - first);
+            let at = if self.flip_x { width - first - count } else { first };
+            let mut cells = [[0; RUN]; 3];
+            for (n, [one, other]) in planes.as_chunks::<2>().0.iter().enumerate() {
+                let levels = one[at..at + count].iter().zip(&other[at..at + count]);
+                for (cells, (one, other)) in cells[n / 4].iter_mut().zip(levels) {
+                    *cells |= self.pairs[usize::from((one & 15) | (other << 4))] << (2 * (n % 4));
+                }
+            }
+            let upper = upper[6 * first..][..6 * count].as_chunks_mut::<6>().0;
+            let lower = lower[6 * first..][..6 * count].as_chunks_mut::<6>().0;
+            for (x, (upper, lower)) in upper.iter_mut().zip(lower).enumerate() {
+                let x = flip(x, count, self.flip_x);
+                for (colour, cells) in cells.iter().enumerate() {
+                    let [upper_left, upper_right, lower_left, lower_right] = cells[x].to_le_bytes();
+                    (upper[colour], upper[3 + colour]) = (upper_left, upper_right);
+                    (lower[colour], lower[3 + colour]) = (lower_left, lower_right);
+                }
             }
         }
     }
