@@ -3,8 +3,8 @@
 //!
 //! Maps differ in what an encoder may choose freely: which pixels of the checkerboard get φ + acos A (its parity), and
 //! a constant phase, by which levels round otherwise. With feedback each map is made for what the mean of those before
-//! it lacks: after k maps of intensities I₁ … I_k the next one is to show (k + 1)·I − ΣI_j at the midpoint, where I is the
-//! wave's, with the wave's phase.
+//! it lacks: after k maps of intensities I₁ … I_k the next one is to show (k + 1)·I − ΣI_j at the midpoint, where I is
+//! the wave's, with the wave's phase.
 
 use crate::error::Result;
 use crate::evaluate::{self, Figures};

@@ -22,7 +22,8 @@ pub struct Panel {
     /// The phases that make the panel flat.
     pub flatness: Option<Flatness>,
     /// The phase that each level shows, in turns of 2π, rising from 0: where they go on over one turn, each row's
-    /// phases follow their neighbours instead of jumping at 2π, as far as the range goes. None: the response alone decides.
+    /// phases follow their neighbours instead of jumping at 2π, as far as the range goes. None: the response alone
+    /// decides.
     pub levels_turns: Option<Vec<f64>>,
 }
 
