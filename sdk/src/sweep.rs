@@ -46,9 +46,9 @@ pub const MAX_TAPS: usize = 63;
 pub const CARRIED: f64 = 0.5;
 /// Most hidden layers.
 pub const MAX_HIDDEN_LAYERS: usize = 2;
-/// Light that spreads farther than this through the volume, in pixels, is not swept: fitting the way home would take
-/// seconds, and every tile would read the whole frame.
-pub const MAX_REACH: usize = 2048;
+/// Light that spreads farther than this through the volume, in pixels, is not swept: a tile is swept with a halo as
+/// wide, so that even a small frame would take minutes.
+pub const MAX_REACH: usize = 512;
 /// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
 /// from the midpoint by Fourier transforms.
 pub const MAX_HOME_REACH: usize = 32;

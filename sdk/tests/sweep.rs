@@ -305,3 +305,13 @@ fn hidden_surfaces_are_their_oracle() {
         }
     }
 }
+
+#[test]
+fn what_light_spreads_too_far_in_is_refused_at_once() {
+    for text in ["pitch_um = 1.0", "volume_depth_mm = 400"] {
+        let display = Display::from_toml(text).unwrap();
+        let refused = SweepPlan::new(12, 16, &display, Sweep::for_display(&display), 0.0).map(|_| ());
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("512 are the most: a volume of"), "{message}");
+    }
+}
