@@ -88,7 +88,8 @@ pub enum Method {
     },
 }
 
-/// One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is shown in its middle.
+/// One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
+/// shown in its middle.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct Rung {
     /// What makes the hologram.

@@ -252,7 +252,8 @@ fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
     assert!(inner > whole + 0.5 && inner > 18.0, "{whole} {inner}");
 }
 
-/// A correction for the aperture that is looked through shows more than one for another; one beside the axis shows less.
+/// A correction for the aperture that is looked through shows more than one for another; one beside the axis shows
+/// less.
 #[test]
 fn what_is_shown_depends_on_the_aperture() {
     let data = Data::new();

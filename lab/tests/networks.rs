@@ -85,8 +85,8 @@ fn the_fast_path_agrees_with_tract() {
     }
 }
 
-/// To the paraxial order a hologram depends on λ·z/p² alone: a display of the same or a smaller λ·V/p² is served as well
-/// as the one a network was trained for, by its own exact hologram.
+/// To the paraxial order a hologram depends on λ·z/p² alone: a display of the same or a smaller λ·V/p² is served as
+/// well as the one a network was trained for, by its own exact hologram.
 #[test]
 fn other_displays_are_served_by_physics() {
     let (height, width) = (128, 160);

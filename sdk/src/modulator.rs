@@ -147,8 +147,8 @@ impl Modulator {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] of a frame that follows another: steady brightness comes from `past`, and steps at the midpoint go
-    /// on where the frame before ended.
+    /// [`Self::modulate`] of a frame that follows another: steady brightness comes from `past`, and steps at the
+    /// midpoint go on where the frame before ended.
     pub(crate) fn modulate_after(
         &self,
         past: Option<Past>,

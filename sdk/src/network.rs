@@ -183,9 +183,9 @@ impl Network {
         &self.display
     }
 
-    /// What depths of frames for `display` are stretched by about the middle of the volume for this network to give their
-    /// hologram, from 0 to 1: (λ·V/p²) over that of the display it was trained for. To the paraxial order a hologram
-    /// without its carrier depends on λ·z/p² alone.
+    /// What depths of frames for `display` are stretched by about the middle of the volume for this network to give
+    /// their hologram, from 0 to 1: (λ·V/p²) over that of the display it was trained for. To the paraxial order a
+    /// hologram without its carrier depends on λ·z/p² alone.
     ///
     /// # Errors
     /// [`Error::Network`] for a display of a larger λ·V/p², or one whose lasers differ by over 5 % from one stretch.
@@ -225,8 +225,8 @@ impl Network {
         })
     }
 
-    /// Prepares the network for frames of `height` × `width` pixels, whose depth is for the display it was trained for, on
-    /// the fastest path that runs it.
+    /// Prepares the network for frames of `height` × `width` pixels, whose depth is for the display it was trained for,
+    /// on the fastest path that runs it.
     ///
     /// # Errors
     /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.

@@ -115,8 +115,8 @@ impl MidpointSteps {
         }
     }
 
-    /// Keeps `field`, (3, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward. Of
-    /// a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
+    /// Keeps `field`, (3, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward.
+    /// Of a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
     ///
     /// # Panics
     /// If `field` has not 3·H·W values.

@@ -116,7 +116,8 @@ impl Encoder {
         })
     }
 
-    /// Which frame the one follows that is submitted next: steady brightness and steps at the midpoint go on from there.
+    /// Which frame the one follows that is submitted next: steady brightness and steps at the midpoint go on from
+    /// there.
     pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
         self.double_phase.heed(device, past);
         if let Some(steadier) = &self.steadier {

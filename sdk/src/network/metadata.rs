@@ -137,12 +137,12 @@ impl TrainedDisplay {
     /// What depths d of frames for `display` are stretched by about the middle of the volume, d' = ½ + s·(d − ½), for a
     /// network for this display to give their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over the colours.
     ///
-    /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display of
-    /// another pitch, volume or laser is one for this display with its depth stretched.
+    /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display
+    /// of another pitch, volume or laser is one for this display with its depth stretched.
     ///
     /// # Errors
-    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch; any
-    /// other display where an aberration is corrected.
+    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch;
+    /// any other display where an aberration is corrected.
     pub(super) fn depth_scale(&self, display: &Display) -> Result<f64> {
         let trained = self.pitch_m.powi(2) / self.volume_depth_m;
         let given = display.volume_depth_m() / display.pitch_m().powi(2);

@@ -6,7 +6,8 @@ use crate::error::{Error, Result};
 use crate::method::Method;
 use std::time::Duration;
 
-/// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its middle.
+/// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its
+/// middle.
 #[derive(Clone)]
 pub struct Rung {
     /// What makes the midpoint hologram.

@@ -1,6 +1,7 @@
-// Steps at the midpoint, after local.wgsl; see encode/midpoint.rs. `depart` takes what double phase or local steps leave,
-// or where a pixel stands still what the frame before ended with; `ask` and `follow` are a step's two halves, each behind its way through the aperture, and `arrive` writes levels. The
-// header that midpoint.rs writes gives WAVE and GAIN.
+// Steps at the midpoint, after local.wgsl; see encode/midpoint.rs. `depart` takes what double phase or local steps
+// leave, or where a pixel stands still what the frame before ended with; `ask` and `follow` are a step's two halves,
+// each behind its way through the aperture, and `arrive` writes levels. The header that midpoint.rs writes gives WAVE
+// and GAIN.
 
 // T, the wanted field over the scale: at the modulator, then at the midpoint.
 @group(0) @binding(14) var<storage, read_write> aim: array<vec2f>;

@@ -1,5 +1,5 @@
-// Channels of a seeded network: colour and depth, each minus a half, depth stretched, and the sweep's field u as ½(Re u − ½) and ½ Im u
-// of the three colours; see seeded.rs. Goes behind pack.wgsl.
+// Channels of a seeded network: colour and depth, each minus a half, depth stretched, and the sweep's field u as ½(Re u
+// − ½) and ½ Im u of the three colours; see seeded.rs. Goes behind pack.wgsl.
 
 // Red, green, blue, depth.
 @group(0) @binding(1) var<storage, read> surfaces: array<vec4f>;
