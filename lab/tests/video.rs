@@ -285,11 +285,13 @@ fn has_ffmpeg() -> bool {
     found
 }
 
-/// Makes `path` of the pictures `pattern`.
-fn film(pattern: &Path, path: &Path, codec: &[&str]) {
+/// Makes `path` of `from`: a film of pictures, or pictures of a film.
+fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
     let made = Command::new("ffmpeg")
-        .args(["-v", "error", "-y", "-framerate", "10", "-i"])
-        .arg(pattern)
+        .args(["-v", "error", "-y"])
+        .args(rate)
+        .arg("-i")
+        .arg(from)
         .args(codec)
         .arg(path)
         .status();
@@ -304,13 +306,15 @@ fn films_go_in_and_come_out() {
     let (dir, input) = folder(5);
     let at = |name: &str| dir.path().join(name);
     let text = |path: &Path| path.to_str().unwrap().to_owned();
-    let lossless = ["-c:v", "ffv1"];
+    let (lossless, rate) = (["-c:v", "ffv1"], ["-framerate", "10"]);
     film(
+        &rate,
         &input.join("color_%d.png"),
         &at("colour.mkv"),
         &[&lossless[..], &["-pix_fmt", "gbrp"]].concat(),
     );
     film(
+        &rate,
         &input.join("depth_%d.png"),
         &at("depth.mkv"),
         &[&lossless[..], &["-pix_fmt", "gray16le"]].concat(),
@@ -341,7 +345,7 @@ fn films_go_in_and_come_out() {
     let phases = at("out-phases.mp4");
     let back = at("back");
     std::fs::create_dir(&back).unwrap();
-    film(&phases, &back.join("phase_%06d.png"), &["-start_number", "0"]);
+    film(&[], &phases, &back.join("phase_%06d.png"), &["-start_number", "0"]);
     for index in 0..5 {
         let levels = |dir: &Path| {
             image::open(dir.join(format!("phase_{index:06}.png")))

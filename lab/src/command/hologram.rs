@@ -316,6 +316,14 @@ impl Making {
 
     /// The image for `display`.
     pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
+        if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.ldi)
+            && method != CoreMethod::Network
+        {
+            return Err(Error::Input(
+                "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
+                    .into(),
+            ));
+        }
         match &self.ldi {
             Some(dir) => Ok(Image::Layers(Ldi::read(dir)?)),
             None => Ok(Image::Rgbd(self.frame.read(&display.target.display)?)),
@@ -352,10 +360,6 @@ impl Making {
                 })?;
                 self.by_core(method.name(), core, frame, display, encoder, device.as_ref())
             }
-            (Method::Core(method), Image::Layers(_)) if method != CoreMethod::Network => Err(Error::Input(
-                "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
-                    .into(),
-            )),
             (method, Image::Rgbd(frame)) => {
                 self.by_layers(method, &single_layer(frame)?, display, self.encoder.read()?)
             }

@@ -162,9 +162,10 @@ impl View {
         let bar = progress_bar(z_m.len() as u64, "views");
         let phase = match &hologram {
             Hologram::PhaseOnly(levels, _) => Some(Phase::new(levels.view())?),
+            // A page shows the upper 8 bits of finer levels.
             Hologram::Words(levels, info) => {
-                let finer = info.display.bits().saturating_sub(8);
-                Some(Phase::new(levels.mapv(|level| (level >> finer) as u8).view())?)
+                let below = info.display.bits().saturating_sub(8);
+                Some(Phase::new(levels.mapv(|level| (level >> below) as u8).view())?)
             }
             Hologram::Complex(..) => None,
         };
