@@ -640,7 +640,7 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
- * Hears log messages, on any thread.
+ * Hears log messages, on any thread. What it throws is ignored.
  */
 public protocol LogListener: AnyObject, Sendable {
     
@@ -651,7 +651,7 @@ public protocol LogListener: AnyObject, Sendable {
     
 }
 /**
- * Hears log messages, on any thread.
+ * Hears log messages, on any thread. What it throws is ignored.
  */
 open class LogListenerImpl: LogListener, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -709,7 +709,7 @@ open class LogListenerImpl: LogListener, @unchecked Sendable {
     /**
      * One message.
      */
-open func onLog(level: LogLevel, message: String)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func onLog(level: LogLevel, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_loglistener_on_log(
             self.uniffiCloneHandle(),
@@ -771,7 +771,7 @@ fileprivate struct UniffiCallbackInterfaceLogListener {
                 callStatus: uniffiCallStatus,
                 makeCall: makeCall,
                 writeReturn: writeReturn,
-                lowerError: FfiConverterTypePhasefrontError_lower
+                lowerError: FfiConverterTypeListenerError_lower
             )
         }
     )
@@ -1554,7 +1554,8 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
     
     /**
      * Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-     * be called again; called by the listener itself, it returns at once. Closing twice does nothing.
+     * be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
+     * nothing.
      */
     func shutDown() throws 
     
@@ -1748,7 +1749,8 @@ open func setThermal(thermal: Thermal)throws   {try rustCallWithError(FfiConvert
     
     /**
      * Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-     * be called again; called by the listener itself, it returns at once. Closing twice does nothing.
+     * be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
+     * nothing.
      */
 open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -1951,7 +1953,7 @@ open class SessionListenerImpl: SessionListener, @unchecked Sendable {
     /**
      * A frame became a hologram.
      */
-open func onHologram(hologram: RawHologram)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func onHologram(hologram: RawHologram)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_hologram(
             self.uniffiCloneHandle(),
@@ -1963,7 +1965,7 @@ open func onHologram(hologram: RawHologram)throws   {try rustCallWithError(FfiCo
     /**
      * A frame was dropped.
      */
-open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_dropped(
             self.uniffiCloneHandle(),
@@ -1976,7 +1978,7 @@ open func onDropped(timestampNs: UInt64, reason: DropReason)throws   {try rustCa
     /**
      * A frame could not be processed. The session goes on.
      */
-open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_failed(
             self.uniffiCloneHandle(),
@@ -1989,7 +1991,7 @@ open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWi
     /**
      * The frames after this one are made on another rung of the ladder.
      */
-open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
     uniffi_phasefront_ffi_fn_method_sessionlistener_on_quality_changed(
             self.uniffiCloneHandle(),
@@ -2049,7 +2051,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 callStatus: uniffiCallStatus,
                 makeCall: makeCall,
                 writeReturn: writeReturn,
-                lowerError: FfiConverterTypePhasefrontError_lower
+                lowerError: FfiConverterTypeListenerError_lower
             )
         },
         onDropped: { (
@@ -2076,7 +2078,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 callStatus: uniffiCallStatus,
                 makeCall: makeCall,
                 writeReturn: writeReturn,
-                lowerError: FfiConverterTypePhasefrontError_lower
+                lowerError: FfiConverterTypeListenerError_lower
             )
         },
         onFailed: { (
@@ -2103,7 +2105,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 callStatus: uniffiCallStatus,
                 makeCall: makeCall,
                 writeReturn: writeReturn,
-                lowerError: FfiConverterTypePhasefrontError_lower
+                lowerError: FfiConverterTypeListenerError_lower
             )
         },
         onQualityChanged: { (
@@ -2130,7 +2132,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 callStatus: uniffiCallStatus,
                 makeCall: makeCall,
                 writeReturn: writeReturn,
-                lowerError: FfiConverterTypePhasefrontError_lower
+                lowerError: FfiConverterTypeListenerError_lower
             )
         }
     )
@@ -2881,6 +2883,10 @@ public struct Display: Equatable, Hashable {
      * Bits of a modulator level.
      */
     public var bits: UInt32
+    /**
+     * Radius of the aperture in the Fourier plane; 1 is the whole first order.
+     */
+    public var apertureRadius: Double
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -2911,7 +2917,10 @@ public struct Display: Equatable, Hashable {
          */offsetMm: Double = Double(0.0), 
         /**
          * Bits of a modulator level.
-         */bits: UInt32 = UInt32(8)) {
+         */bits: UInt32 = UInt32(8), 
+        /**
+         * Radius of the aperture in the Fourier plane; 1 is the whole first order.
+         */apertureRadius: Double = Double(1.0)) {
         self.width = width
         self.height = height
         self.pitchUm = pitchUm
@@ -2921,6 +2930,7 @@ public struct Display: Equatable, Hashable {
         self.volumeDepthMm = volumeDepthMm
         self.offsetMm = offsetMm
         self.bits = bits
+        self.apertureRadius = apertureRadius
     }
 
     
@@ -2947,7 +2957,8 @@ public struct FfiConverterTypeDisplay: FfiConverterRustBuffer {
                 blueNm: FfiConverterDouble.read(from: &buf), 
                 volumeDepthMm: FfiConverterDouble.read(from: &buf), 
                 offsetMm: FfiConverterDouble.read(from: &buf), 
-                bits: FfiConverterUInt32.read(from: &buf)
+                bits: FfiConverterUInt32.read(from: &buf), 
+                apertureRadius: FfiConverterDouble.read(from: &buf)
         )
     }
 
@@ -2961,6 +2972,7 @@ public struct FfiConverterTypeDisplay: FfiConverterRustBuffer {
         FfiConverterDouble.write(value.volumeDepthMm, into: &buf)
         FfiConverterDouble.write(value.offsetMm, into: &buf)
         FfiConverterUInt32.write(value.bits, into: &buf)
+        FfiConverterDouble.write(value.apertureRadius, into: &buf)
     }
 }
 
@@ -3950,7 +3962,7 @@ public struct QualityChange: Equatable, Hashable {
      */
     public var fromRung: UInt32
     /**
-     * The rung now.
+     * The rung now; the one before where the step was refused.
      */
     public var toRung: UInt32
     /**
@@ -3965,7 +3977,7 @@ public struct QualityChange: Equatable, Hashable {
          * The rung before.
          */fromRung: UInt32, 
         /**
-         * The rung now.
+         * The rung now; the one before where the step was refused.
          */toRung: UInt32, 
         /**
          * Why.
@@ -4021,7 +4033,8 @@ public func FfiConverterTypeQualityChange_lower(_ value: QualityChange) -> RustB
 
 
 /**
- * One quality: a method and a resolution. A hologram smaller than the modulator is shown in its middle.
+ * One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
+ * shown in its middle.
  */
 public struct Rung {
     /**
@@ -4036,6 +4049,14 @@ public struct Rung {
      * Height of the hologram, pixels.
      */
     public var height: UInt32
+    /**
+     * Local steps of this rung; none for the session's.
+     */
+    public var localSteps: UInt32?
+    /**
+     * Steps at the midpoint of this rung; none for the session's.
+     */
+    public var midpointSteps: UInt32?
 
     // Default memberwise initializers are never public by default, so we
     // declare one manually.
@@ -4048,10 +4069,18 @@ public struct Rung {
          */width: UInt32, 
         /**
          * Height of the hologram, pixels.
-         */height: UInt32) {
+         */height: UInt32, 
+        /**
+         * Local steps of this rung; none for the session's.
+         */localSteps: UInt32? = nil, 
+        /**
+         * Steps at the midpoint of this rung; none for the session's.
+         */midpointSteps: UInt32? = nil) {
         self.method = method
         self.width = width
         self.height = height
+        self.localSteps = localSteps
+        self.midpointSteps = midpointSteps
     }
 
     
@@ -4072,7 +4101,9 @@ public struct FfiConverterTypeRung: FfiConverterRustBuffer {
             try Rung(
                 method: FfiConverterTypeMethod.read(from: &buf), 
                 width: FfiConverterUInt32.read(from: &buf), 
-                height: FfiConverterUInt32.read(from: &buf)
+                height: FfiConverterUInt32.read(from: &buf), 
+                localSteps: FfiConverterOptionUInt32.read(from: &buf), 
+                midpointSteps: FfiConverterOptionUInt32.read(from: &buf)
         )
     }
 
@@ -4080,6 +4111,8 @@ public struct FfiConverterTypeRung: FfiConverterRustBuffer {
         FfiConverterTypeMethod.write(value.method, into: &buf)
         FfiConverterUInt32.write(value.width, into: &buf)
         FfiConverterUInt32.write(value.height, into: &buf)
+        FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
+        FfiConverterOptionUInt32.write(value.midpointSteps, into: &buf)
     }
 }
 
@@ -4138,6 +4171,11 @@ public struct SessionOptions {
      */
     public var localSteps: UInt32?
     /**
+     * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
+     * video, where it goes on from the frame before.
+     */
+    public var midpointSteps: UInt32
+    /**
      * Which metres are shown at the ends of the volume.
      */
     public var depthRange: DepthRange
@@ -4146,9 +4184,14 @@ public struct SessionOptions {
      */
     public var leastConfidence: Float
     /**
-     * Threads to compute with; none for as many as the device has.
+     * Threads to compute with, at most 256; none for as many as the device has.
      */
     public var threads: UInt32?
+    /**
+     * Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
+     * of them.
+     */
+    public var mostPixels: UInt64
     /**
      * Where frames are computed.
      */
@@ -4184,14 +4227,22 @@ public struct SessionOptions {
          * suits the encoding: 1, and 0 with a pre-filter.
          */localSteps: UInt32? = nil, 
         /**
+         * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
+         * video, where it goes on from the frame before.
+         */midpointSteps: UInt32 = UInt32(0), 
+        /**
          * Which metres are shown at the ends of the volume.
          */depthRange: DepthRange, 
         /**
          * Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
          */leastConfidence: Float, 
         /**
-         * Threads to compute with; none for as many as the device has.
+         * Threads to compute with, at most 256; none for as many as the device has.
          */threads: UInt32?, 
+        /**
+         * Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
+         * of them.
+         */mostPixels: UInt64 = UInt64(33554432), 
         /**
          * Where frames are computed.
          */backend: Backend) {
@@ -4203,9 +4254,11 @@ public struct SessionOptions {
         self.brightness = brightness
         self.dark = dark
         self.localSteps = localSteps
+        self.midpointSteps = midpointSteps
         self.depthRange = depthRange
         self.leastConfidence = leastConfidence
         self.threads = threads
+        self.mostPixels = mostPixels
         self.backend = backend
     }
 
@@ -4233,9 +4286,11 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
                 dark: FfiConverterOptionFloat.read(from: &buf), 
                 localSteps: FfiConverterOptionUInt32.read(from: &buf), 
+                midpointSteps: FfiConverterUInt32.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
                 leastConfidence: FfiConverterFloat.read(from: &buf), 
                 threads: FfiConverterOptionUInt32.read(from: &buf), 
+                mostPixels: FfiConverterUInt64.read(from: &buf), 
                 backend: FfiConverterTypeBackend.read(from: &buf)
         )
     }
@@ -4249,9 +4304,11 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
         FfiConverterOptionFloat.write(value.dark, into: &buf)
         FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
+        FfiConverterUInt32.write(value.midpointSteps, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
         FfiConverterFloat.write(value.leastConfidence, into: &buf)
         FfiConverterOptionUInt32.write(value.threads, into: &buf)
+        FfiConverterUInt64.write(value.mostPixels, into: &buf)
         FfiConverterTypeBackend.write(value.backend, into: &buf)
     }
 }
@@ -5349,6 +5406,87 @@ public func FfiConverterTypeLayout_lower(_ value: Layout) -> RustBuffer {
 
 
 /**
+ * What a listener threw, whatever it was. An error that comes in must not be flat: a flat one only goes out, and
+ * taking it in would be a panic on the session's thread.
+ */
+public 
+enum ListenerError: Swift.Error, Equatable, Hashable {
+
+    
+    
+    /**
+     * With its own words.
+     */
+    case Threw(
+        /**
+         * What it said.
+         */reason: String
+    )
+
+    
+
+    
+
+    
+}
+
+#if compiler(>=6)
+extension ListenerError: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeListenerError: FfiConverterRustBuffer {
+    typealias SwiftType = ListenerError
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> ListenerError {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+
+        
+
+        
+        case 1: return .Threw(
+            reason: try FfiConverterString.read(from: &buf)
+            )
+
+         default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: ListenerError, into buf: inout [UInt8]) {
+        switch value {
+
+        
+
+        
+        
+        case let .Threw(reason):
+            writeInt(&buf, Int32(1))
+            FfiConverterString.write(reason, into: &buf)
+            
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeListenerError_lift(_ buf: RustBuffer) throws -> ListenerError {
+    return try FfiConverterTypeListenerError.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeListenerError_lower(_ value: ListenerError) -> RustBuffer {
+    return FfiConverterTypeListenerError.lower(value)
+}
+
+
+/**
  * How much a message matters.
  */
 
@@ -5800,6 +5938,10 @@ public enum QualityReason: Equatable, Hashable {
      */
     case asked
     /**
+     * The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+     */
+    case refused
+    /**
      * For a reason that this version of the bindings does not know.
      */
     case other
@@ -5832,7 +5974,9 @@ public struct FfiConverterTypeQualityReason: FfiConverterRustBuffer {
         
         case 4: return .asked
         
-        case 5: return .other
+        case 5: return .refused
+        
+        case 6: return .other
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
@@ -5858,8 +6002,12 @@ public struct FfiConverterTypeQualityReason: FfiConverterRustBuffer {
             writeInt(&buf, Int32(4))
         
         
-        case .other:
+        case .refused:
             writeInt(&buf, Int32(5))
+        
+        
+        case .other:
+            writeInt(&buf, Int32(6))
         
         }
     }
@@ -6683,7 +6831,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 63189) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 24090) {
+    if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 28371) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_network_info() != 5350) {
@@ -6707,7 +6855,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 56019) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 25586) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 51292) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 36884) {
@@ -6719,16 +6867,16 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_warm_up() != 47343) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_hologram() != 47012) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_hologram() != 31692) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 18281) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 43842) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 44190) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 55596) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 37847) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 25946) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
