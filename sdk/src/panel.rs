@@ -145,7 +145,7 @@ impl PanelPlan {
     /// Plans (3, H, W) = `shape` phases for `display`; None where `panel` adds nothing.
     ///
     /// # Errors
-    /// As [`Panel::check`].
+    /// A map for another modulator; a carrier and a lens that turn the phase by over half a turn from pixel to pixel.
     pub fn new(panel: &Panel, display: &Display, shape: (usize, usize)) -> Result<Option<Self>> {
         panel.check(display)?;
         if panel.is_plain() {

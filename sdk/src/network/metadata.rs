@@ -190,7 +190,7 @@ impl TrainedDisplay {
         let (trained, given) = (self.offset_m, display.offset_m());
         if (trained - given * finer * longer).abs() > OFFSET_TOLERANCE_M {
             return Err(Error::Network(format!(
-                "the pre-filter was trained for an offset that is {:.3} mm on this display, which has {:.3} mm; take one for this offset, or another encoder",
+                "the pre-filter was trained for an offset of {:.3} mm on this display, which has {:.3} mm; take one for this offset, or another encoder",
                 trained / (finer * longer) * 1e3,
                 given * 1e3
             )));
