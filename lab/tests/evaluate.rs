@@ -379,7 +379,7 @@ fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     assert!(psnr[0] > psnr[2] && psnr[1] > psnr[2] + 3.0, "{psnr:?}");
     let deep = Display::from_toml("volume_depth_mm = 12").unwrap();
     let refused = Method::network("8", &network, SIZE, &deep).err().unwrap();
-    assert!(refused.to_string().contains("volume depth"), "{refused}");
+    assert!(refused.to_string().contains("2.00 times the range"), "{refused}");
 }
 
 #[test]
