@@ -76,7 +76,7 @@ pub(crate) struct EncoderFlags {
     /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
     #[arg(long, value_name = "N")]
     local_steps: Option<usize>,
-    /// Steps of correction at the midpoint after them, for stills; 3 bring nearly all
+    /// Steps of correction at the midpoint after them, for stills; 1 brings most at the midpoint, 10 all
     #[arg(long, value_name = "N", default_value_t = 0)]
     midpoint_steps: usize,
 }
