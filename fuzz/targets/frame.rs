@@ -71,7 +71,7 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         ColourFormat::Yuv420(yuv),
     ]);
     let (width, height) = (numbers.size(), numbers.size());
-    let strides: Vec<_> = (0..numbers.byte() % 4).map(|_| (4 * numbers.size(), numbers.size())).collect();
+    let strides: Vec<_> = (0..numbers.byte() % 4).map(|_| (numbers.size().wrapping_mul(4), numbers.size())).collect();
     let depth_format = numbers.of(&[
         DepthFormat::MetresF32,
         DepthFormat::MetresF16,
@@ -83,7 +83,7 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         DepthFormat::NormalizedU16,
     ]);
     let (depth_width, depth_height) = (numbers.size(), numbers.size());
-    let depth_strides = (4 * numbers.size(), numbers.size());
+    let depth_strides = (numbers.size().wrapping_mul(4), numbers.size());
     let confidence = numbers.byte();
     let orientation = Orientation {
         rotation: numbers.of(&[Rotation::None, Rotation::Clockwise90, Rotation::Half, Rotation::Clockwise270]),
