@@ -347,6 +347,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let mut to = session::SessionOptions::new(target.clone(), method(best));
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
+        let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
         let usual = phasefront::EncoderOptions::from(match &options.encoding {
             Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
@@ -358,7 +359,7 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         });
         to.encoder = phasefront::EncoderOptions {
             dark: options.dark.unwrap_or(usual.dark),
-            local_steps: options.local_steps.map_or(usual.local_steps, |steps| steps as usize),
+            local_steps: steps(options.local_steps, usual.local_steps),
             midpoint_steps: options.midpoint_steps as usize,
             ..usual
         };
@@ -367,7 +368,6 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
             Brightness::FrameMax => phasefront::Brightness::FrameMax,
         };
-        let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
         to.ladder = (options.ladder.iter())
             .map(|rung| session::Rung {
                 method: method(rung),

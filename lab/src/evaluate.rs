@@ -572,6 +572,14 @@ pub fn evaluate(
         .collect())
 }
 
+/// z of what one hologram for `display` is judged by, metres: the midpoint, and a stack of four depths.
+pub fn judged_z_m(display: &Display) -> Vec<f64> {
+    let depths = (0..4).map(|i| (f64::from(i) + 0.5) / 4.0);
+    std::iter::once(0.0)
+        .chain(depths.map(|depth| display.z_of_depth(depth)))
+        .collect()
+}
+
 /// How close `views` come to `truth`, all light counted as shown: (3, H, W) each, the midpoint first, the focal stack
 /// after it, `margin` pixels at the border left out.
 ///

@@ -10,9 +10,8 @@ use crate::error::Result;
 use crate::evaluate::{self, Figures};
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::target::Response;
 use phasefront::unstable::encode::Encoder;
-use phasefront::unstable::refocus::Refocus;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::wave::aperture::Opening;
 use phasefront::unstable::wave::asm::{Padding, Propagator};
 use phasefront::{EncoderOptions, Target};
@@ -79,8 +78,7 @@ impl<'a> Multiplex<'a> {
         let mut maps = Vec::with_capacity(count);
         for n in 0..count {
             let mut field = match n {
-                0 => wave.to_vec(),
-                _ if !differ.feedback => wave.to_vec(),
+                _ if n == 0 || !differ.feedback => wave.to_vec(),
                 _ => {
                     let mut field: Vec<Complex32> = (middle.iter().zip(&sum))
                         .map(|(value, sum)| {
@@ -112,7 +110,7 @@ impl<'a> Multiplex<'a> {
             }
             let map = Map { levels, scale: used };
             if differ.feedback && n + 1 < count {
-                let mut shown = self.shown(&map, response);
+                let mut shown = self.shown(&map);
                 self.pass(there, &mut shown);
                 sum.iter_mut()
                     .zip(&shown)
@@ -124,11 +122,11 @@ impl<'a> Multiplex<'a> {
     }
 
     /// The light behind the modulator.
-    fn shown(&self, map: &Map, response: &Response) -> Vec<Complex32> {
-        let levels = map.levels.iter().enumerate();
-        levels
-            .map(|(at, level)| Complex32::from_polar(map.scale, response.phase(*level, at)))
-            .collect()
+    fn shown(&self, map: &Map) -> Vec<Complex32> {
+        let mut field = vec![Complex32::ZERO; map.levels.len()];
+        let levels = map.levels.as_slice().expect("standard layout");
+        phase_only_field(levels, &self.target.response, map.scale, &mut field);
+        field
     }
 
     fn pass(&self, way: &[Propagator; 3], field: &mut [Complex32]) {
@@ -146,26 +144,21 @@ impl<'a> Multiplex<'a> {
     pub fn judge(&self, wave: &Array3<Complex32>, maps: &[Map], counts: &[usize]) -> Result<Vec<Figures>> {
         let (height, width) = self.shape;
         let display = &self.target.display;
-        let depths = (0..4).map(|i| display.z_of_depth((f64::from(i) + 0.5) / 4.0));
-        let z_m: Vec<f64> = std::iter::once(0.0).chain(depths).collect();
+        let z_m = evaluate::judged_z_m(display);
         let opening = Opening::centred(display.aperture_radius());
         let plan = Refocus::new(height, width, display, &z_m, Some(opening))?;
-        let stack = |field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
+        let stack = |plan: &Refocus, field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
             let views = plan.focal_stack(field, &z_m)?.into_iter();
             Ok(views
                 .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the wave's shape"))
                 .collect())
         };
         let free = Refocus::new(height, width, display, &z_m, None)?;
-        let truth: Vec<Array3<f32>> = (free
-            .focal_stack(wave.as_slice().expect("standard layout"), &z_m)?
-            .into_iter())
-        .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the wave's shape"))
-        .collect();
+        let truth = stack(&free, wave.as_slice().expect("standard layout"))?;
         let mut sums = vec![Array3::<f32>::zeros((3, height, width)); z_m.len()];
         let mut figures = Vec::new();
         for (n, map) in maps.iter().enumerate() {
-            let views = stack(&self.shown(map, &self.target.response))?;
+            let views = stack(&plan, &self.shown(map))?;
             for (sum, view) in sums.iter_mut().zip(views) {
                 *sum += &(&view * &view);
             }

@@ -22,7 +22,7 @@ const SCENES_TO: &str = "</script>";
 const PLACE: &str = "__SCENES__";
 
 /// The widest that a view is packed.
-pub const WIDEST: u32 = 1280;
+const WIDEST: u32 = 1280;
 /// Widths and qualities of WebP that are tried, the best first.
 const LADDER: [(u32, f32); 9] = [
     (WIDEST, 85.0),
@@ -171,6 +171,11 @@ impl Phase {
 
 fn url(kind: &str, bytes: &[u8]) -> String {
     format!("data:image/{kind};base64,{}", STANDARD.encode(bytes))
+}
+
+/// The picture of a view's amplitudes, (3, H, W), no wider than pages show them.
+pub fn picture(view: ArrayView3<'_, f32>) -> RgbImage {
+    pictures::at_width(pictures::of_amplitude(view), WIDEST)
 }
 
 /// `views` as data URLs that together have at most `most` bytes, as large and as good as that allows.

@@ -156,8 +156,8 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
+        let start = Instant::now();
         if scratch.phases.is_empty() {
-            let start = Instant::now();
             let scale = self.brightness.scale(field, past, &mut scratch.percentile);
             let scale = (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder);
             return Modulation {
@@ -165,7 +165,6 @@ impl Modulator {
                 encode: start.elapsed(),
             };
         }
-        let start = Instant::now();
         let mut phases = std::mem::take(&mut scratch.phases);
         let scale = self.phases_after(past, field, &mut phases, scratch).scale;
         if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {

@@ -8,7 +8,6 @@ use crate::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
-use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// What a panel adds. The default is nothing.
@@ -251,9 +250,7 @@ fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> V
                     flatness.maps[of_colour + (y + corner.0) * modulator.1 + x + corner.1]
                 });
                 let turns = ((tilt - lens).rem_euclid(1.0) * 65536.0).round() as u32;
-                all.push(turns as u16);
-                let last = all.len() - 1;
-                all[last] = all[last].wrapping_add(flat);
+                all.push((turns as u16).wrapping_add(flat));
             }
         }
     }
@@ -309,16 +306,11 @@ impl Nearest {
     }
 }
 
-/// The largest angle of a carrier, along x or y, that pixels of `display` can show, radians.
-pub fn largest_carrier_rad(display: &Display) -> f64 {
-    let shortest_m = display.wavelengths_m().into_iter().fold(f64::INFINITY, f64::min);
-    (shortest_m / (2.0 * display.pitch_m())).min(1.0).asin().min(PI / 2.0)
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use std::f64::consts::PI;
 
     fn display() -> Display {
         Display::from_toml("width = 40\nheight = 24").unwrap()
@@ -432,7 +424,8 @@ mod tests {
 
     #[test]
     fn what_pixels_cannot_show_is_refused() {
-        let most = largest_carrier_rad(&display());
+        // Half a turn from pixel to pixel in blue.
+        let most = (450e-9_f64 / (2.0 * display().pitch_m())).asin();
         let with = |carrier_rad, lens_m, flatness| Panel {
             carrier_rad,
             lens_m,

@@ -69,8 +69,7 @@ pub(crate) struct EncoderFlags {
     #[arg(long, value_name = "FILE")]
     prefilter: Option<String>,
     /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0
-    /// with
-    /// --encoder deep]
+    /// with --encoder deep]
     #[arg(long, value_name = "D")]
     dark: Option<f32>,
     /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]

@@ -54,8 +54,7 @@ pub(crate) struct Making {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth", "photo", "depth_network", "fit"])]
     ldi: Option<PathBuf>,
     /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
-    /// and no
-    /// --network]
+    /// and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
     /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with
@@ -182,7 +181,7 @@ pub(crate) struct Made {
 
 impl Made {
     /// The levels with all their bits.
-    fn hologram(&self, info: HologramInfo) -> files::Hologram {
+    pub(crate) fn hologram(&self, info: HologramInfo) -> files::Hologram {
         match &self.words {
             Some(words) => files::Hologram::Words(words.clone(), info),
             None => files::Hologram::PhaseOnly(self.levels.clone(), info),
@@ -617,15 +616,10 @@ impl Judged {
     }
 }
 
-/// Depths of the stack that a hologram is judged by, beside the midpoint.
-const STACK: usize = 4;
-
 pub(crate) fn judge(display: &DisplayFile, made: &Made) -> Result<Judged> {
     let (levels, field) = infos(display, made);
     let wave = made.field.clone().expect("kept for this");
-    let depths = (0..STACK).map(|i| (i as f64 + 0.5) / STACK as f64);
-    let depths = depths.map(|depth| display.target.display.z_of_depth(depth));
-    let z_m: Vec<f64> = std::iter::once(0.0).chain(depths).collect();
+    let z_m = evaluate::judged_z_m(&display.target.display);
     let wave = files::Hologram::Complex(wave, field).views_on(display, &z_m)?;
     let shown = made.hologram(levels).views_on(display, &z_m)?;
     let figures = evaluate::judge(&shown, &wave, 0)?;

@@ -13,7 +13,7 @@ use phasefront_lab::evaluate::{self, Figures};
 use phasefront_lab::files::{self, DisplayFile, Hologram};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::viewer::{self, Depth, Scene};
-use phasefront_lab::{Error, Result, models, pictures};
+use phasefront_lab::{Error, Result, models};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -49,8 +49,7 @@ pub(crate) struct Judge {
     output: Option<PathBuf>,
 }
 
-/// Depths of the focal stack beside the midpoint, and of a page.
-const STACK: usize = 4;
+/// Views of a page.
 const PAGE_VIEWS: usize = 9;
 /// Bytes of all views of a page.
 const PAGE_BYTES: usize = 4_000_000;
@@ -98,9 +97,7 @@ impl Judge {
         let image = Image::Rgbd(frame);
         let mut making = Making::of(self.display.clone());
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), sharp, &mut making)?;
-        let z_m: Vec<f64> = std::iter::once(0.0)
-            .chain((0..STACK).map(|i| display.z_of_depth((i as f64 + 0.5) / STACK as f64)))
-            .collect();
+        let z_m = evaluate::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
         let ways = self.ways(display);
         let bar = progress_bar(ways.len() as u64, "ways");
@@ -109,7 +106,7 @@ impl Judge {
             making.way(Method::Core(way.method), way.network.map(str::to_owned), way.encoder);
             let made = making.make(&file, &image)?;
             let (info, _) = infos(&file, &made);
-            let shown = Hologram::PhaseOnly(made.levels.clone(), info).views_on(&file, &z_m)?;
+            let shown = made.hologram(info).views_on(&file, &z_m)?;
             let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
             rows.push(Row {
                 method: if way.network.is_some() {
@@ -293,9 +290,7 @@ fn write_page(
     let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
         let (height, width) = hologram.shape();
         let views = hologram.views_on(file, &z_m)?;
-        let views: Vec<_> = (views.iter())
-            .map(|view| pictures::at_width(pictures::of_amplitude(view.view()), viewer::WIDEST))
-            .collect();
+        let views: Vec<_> = (views.iter()).map(|view| viewer::picture(view.view())).collect();
         Ok(Scene {
             title,
             width,
@@ -329,11 +324,7 @@ fn write_page(
             ("Brightness".into(), format!("{brightness:.3} of what it is judged by")),
         ];
         let (info, _) = infos(file, &row.made);
-        scenes.push(scene(
-            row.name(),
-            &Hologram::PhaseOnly(row.made.levels.clone(), info),
-            figures,
-        )?);
+        scenes.push(scene(row.name(), &row.made.hologram(info), figures)?);
     }
     viewer::write(path, &scenes).map(|_| ())
 }

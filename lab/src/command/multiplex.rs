@@ -24,7 +24,7 @@ pub(crate) struct MultiplexCommand {
     #[arg(long, value_enum, default_value_t = CoreMethod::Sweep)]
     method: CoreMethod,
     /// A network that comes along, or an ONNX file [default: 8]
-    #[arg(long, value_name = "ddpm-8|8|15|seeded-6|FILE")]
+    #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a network which comes along computes in
     #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]

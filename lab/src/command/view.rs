@@ -9,7 +9,7 @@ use ndarray::Array2;
 use phasefront::Display;
 use phasefront_lab::files::{self, DisplayFile, Hologram, HologramInfo};
 use phasefront_lab::viewer::{self, Depth, Phase, Scene};
-use phasefront_lab::{Error, Result, pictures};
+use phasefront_lab::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -130,7 +130,7 @@ impl View {
         figures.extend(judged_figures(&judged));
         let title = self.making.source().map_or("hologram".into(), |path| self.title(path));
         let phase = Some(Phase::new(made.levels.view())?);
-        let shown = Hologram::PhaseOnly(made.levels, levels);
+        let shown = made.hologram(levels);
         let wave = Hologram::Complex(made.field.expect("kept for this"), field);
         Ok(Parts {
             title,
@@ -264,9 +264,7 @@ fn views(hologram: &Hologram, file: &DisplayFile, z_m: &[f64], bar: &ProgressBar
     for z_m in z_m.chunks(CHUNK) {
         let views = hologram.views_on(file, z_m)?;
         bar.inc(views.len() as u64);
-        let small =
-            |view: &ndarray::Array3<f32>| pictures::at_width(pictures::of_amplitude(view.view()), viewer::WIDEST);
-        all.extend(views.iter().map(small));
+        all.extend(views.iter().map(|view| viewer::picture(view.view())));
     }
     Ok(all)
 }

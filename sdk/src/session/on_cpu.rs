@@ -25,8 +25,7 @@ pub(super) struct OnCpu {
 impl OnCpu {
     pub(super) fn new(options: &SessionOptions, rung: &Rung) -> Result<Self> {
         let (height, width) = (rung.height, rung.width);
-        let method = rung.method.clone();
-        let pipeline = Pipeline::new((height, width), method, &options.target, rung.encoder(options))?;
+        let pipeline = Self::plan(options, rung)?;
         let bits = options.target.display.bits();
         Ok(OnCpu {
             scratch: pipeline.scratch(),
@@ -45,13 +44,12 @@ impl OnCpu {
     /// # Errors
     /// As [`Self::new`], for less memory.
     pub(super) fn check(options: &SessionOptions, rung: &Rung) -> Result<()> {
-        Pipeline::new(
-            (rung.height, rung.width),
-            rung.method.clone(),
-            &options.target,
-            rung.encoder(options),
-        )
-        .map(|_| ())
+        Self::plan(options, rung).map(|_| ())
+    }
+
+    fn plan(options: &SessionOptions, rung: &Rung) -> Result<Pipeline> {
+        let (shape, method) = ((rung.height, rung.width), rung.method.clone());
+        Pipeline::new(shape, method, &options.target, rung.encoder(options))
     }
 
     pub(super) fn report(&self) -> BackendReport {

@@ -37,12 +37,11 @@ impl Opening {
             kx as f64
         };
         let fx = signed / width as f64 - 0.5 * self.shift;
-        for (ky, value) in column.iter_mut().enumerate() {
-            let fy = ky.min(height - ky) as f64 / height as f64;
-            if !passes(fx, fy, self.radius) {
-                *value = Complex32::ZERO;
-            }
-        }
+        // Rows pass up to one frequency.
+        let passing = (0..=height / 2).take_while(|ky| passes(fx, *ky as f64 / height as f64, self.radius));
+        let passing = passing.count();
+        let negative = (height + 1 - passing).clamp(passing, height);
+        column[passing..negative].fill(Complex32::ZERO);
     }
 
     fn check(self) -> Result<()> {

@@ -10,6 +10,8 @@
 //! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
 //! phase zero here, and both agree at z = 0.
 
+use super::aperture::Opening;
+#[cfg(feature = "gpu")]
 use super::aperture::passes;
 use super::fft::{ConvolveScratch, Fft2, fast_size};
 use super::zernike::Aberration;
@@ -386,14 +388,9 @@ impl Propagator {
     /// # Panics
     /// As [`Self::propagate`].
     pub fn propagate_through(&self, plane: &mut [Complex32], radius: f64, scratch: &mut ConvolveScratch) {
-        let (height, width) = self.padded_shape();
+        let (shape, opening) = (self.padded_shape(), Opening::centred(radius));
         let filter = |x: usize, column: &mut [Complex32]| {
-            let fx = x.min(width - x) as f64 / width as f64;
-            // Rows pass up to one frequency.
-            let passing = (0..=height / 2).take_while(|y| passes(fx, *y as f64 / height as f64, radius));
-            let passing = passing.count();
-            let negative = (height + 1 - passing).clamp(passing, height);
-            column[passing..negative].fill(Complex32::ZERO);
+            opening.stop(x, shape, column);
             self.transfer.apply(x, column);
         };
         self.fft.convolve(plane, filter, scratch);
