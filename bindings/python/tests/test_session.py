@@ -219,11 +219,13 @@ def test_modes_are_not_mixed(options):
         (numpy.zeros((0, 64, 3), "u1"), numpy.ones((4, 4), "f4"), "64×0"),
         (numpy.zeros((48, 64, 3), "u1"), numpy.ones((0, 0), "f4"), "depth"),
         (numpy.zeros((48, 64, 2), "u1"), numpy.ones((4, 4), "f4"), "(H, W, 4)"),
-        (numpy.zeros((48, 64), "u1"), numpy.ones((4, 4), "f4"), "(48, 64)"),
-        (numpy.zeros((48, 64, 3), "f4"), numpy.ones((4, 4), "f4"), "float32; uint8"),
-        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 4), "i4"), "int32"),
+        (numpy.zeros(48, "u1"), numpy.ones((4, 4), "f4"), "(48,)"),
+        (numpy.zeros((48, 64, 3), "f4"), numpy.ones((4, 4), "f4"), "(255 * colour).round().astype(numpy.uint8)"),
+        (numpy.zeros((48, 64, 3), "u2"), numpy.ones((4, 4), "f4"), "(colour >> 8).astype(numpy.uint8)"),
+        (numpy.zeros((48, 64), "f8"), numpy.ones((4, 4), "f4"), "float64; uint8"),
+        (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 4), "i4"), "int32; metres are float32"),
         (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 4), ">f4"), "float32"),
-        (numpy.zeros((48, 64, 3), "u1"), [[1.0]], "depth"),
+        (numpy.zeros((48, 64, 3), "u1"), [["near"]], "depth holds"),
         (numpy.zeros((48, 64, 3), "u1"), numpy.ones((4, 40), "f4"), "aspect"),
         ((numpy.zeros((48, 64), "u1"),), numpy.ones((4, 4), "f4"), "NV12"),
     ],
@@ -234,6 +236,21 @@ def test_unusable_frames_are_named(options, colour, depth, words):
             session.process(Frame(colour, depth))
         assert words in str(error.value)
         session.process(still())
+
+
+def test_grey_and_float64_are_taken(options):
+    y, x = numpy.mgrid[0:48, 0:64]
+    grey = (3 * x + y).astype(numpy.uint8)
+    metres = numpy.where(x < 20, 0.5, 1.0 + x / 64)
+    with Session(options) as session:
+        usual = session.process(Frame(numpy.stack(3 * [grey], axis=2), metres.astype(numpy.float32))).levels
+        for colour, depth in [(grey, metres), (grey[:, :], numpy.asfortranarray(metres))]:
+            numpy.testing.assert_array_equal(session.process(Frame(colour, depth)).levels, usual)
+        # What 32 bits do not hold is no reading.
+        metres[0, 0], infinite = 1e300, metres.astype(numpy.float32, copy=True)
+        infinite[0, 0] = numpy.inf
+        far, none = (session.process(Frame(grey, depth)).levels.tobytes() for depth in (metres, infinite))
+        assert far == none
 
 
 def test_arrays_of_two_gibibytes_are_refused():

@@ -1,0 +1,184 @@
+"""Frames: arrays of colour and depth, described for the library."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy
+from numpy.typing import ArrayLike
+
+from . import _ffi
+from ._ffi import Cameras, ColourFormat, ConfidenceFormat, DepthFormat, Orientation, PhasefrontError, Rotation, YuvMatrix
+from ._memory import MOST_BYTES, Memory
+
+_Array = numpy.ndarray[Any, Any]
+
+_DEPTH_FORMATS = {
+    "float32": DepthFormat.METRES_F32,
+    "float16": DepthFormat.METRES_F16,
+    "uint16": DepthFormat.MILLIMETRES_U16,
+    "uint8": DepthFormat.NORMALIZED_U8,
+}
+_DEPTH_TYPES = {
+    DepthFormat.METRES_F32: "float32",
+    DepthFormat.METRES_F16: "float16",
+    DepthFormat.DISPARITY_F32: "float32",
+    DepthFormat.DISPARITY_F16: "float16",
+    DepthFormat.MILLIMETRES_U16: "uint16",
+    DepthFormat.ANDROID_DEPTH16: "uint16",
+    DepthFormat.NORMALIZED_U8: "uint8",
+    DepthFormat.NORMALIZED_U16: "uint16",
+}
+_CHANNELS = {
+    ColourFormat.RGB: [("colour", 3)],
+    ColourFormat.RGBA: [("colour", 4)],
+    ColourFormat.BGRA: [("colour", 4)],
+    ColourFormat.NV12: [("luma", 1), ("chroma", 2)],
+    ColourFormat.YUV420: [("luma", 1), ("U chroma", 1), ("V chroma", 1)],
+}
+
+
+def _array(what: str, values: ArrayLike) -> _Array:
+    try:
+        return numpy.asarray(values)
+    except (TypeError, ValueError) as error:
+        raise PhasefrontError.Frame(f"frame: {what} is no array: {error}") from None
+
+
+def _plane(what: str, array: _Array, dtype: str, pixel: int) -> tuple[Memory, _ffi.PlaneInfo, int, int]:
+    """The memory of an image of (H, W) or (H, W, pixel) values, its strides, its width and height."""
+    if array.dtype != dtype or array.dtype.byteorder == ">":
+        raise PhasefrontError.Frame(f"frame: {what} holds {array.dtype}; {dtype} is needed{_remedy(what, array, dtype)}")
+    dimensions = 2 if pixel == 1 else 3
+    if array.ndim != dimensions or (pixel > 1 and array.shape[2] != pixel):
+        right = "(H, W)" if pixel == 1 else f"(H, W, {pixel})"
+        raise PhasefrontError.Frame(f"frame: {what} is {array.shape}; {right} is right")
+    # Row by row, as cameras give it; what is turned or mirrored is copied.
+    rows, pixels = array.strides[:2]
+    value = pixel * array.itemsize
+    is_plain = pixels >= value and rows >= (array.shape[1] - 1) * pixels + value
+    if not (is_plain and (pixel == 1 or array.strides[2] == array.itemsize)):
+        array = numpy.ascontiguousarray(array)
+        rows, pixels = array.strides[:2]
+    memory = Memory(array)
+    if memory.size > MOST_BYTES or rows >= 2**32:
+        raise PhasefrontError.Frame(
+            f"frame: {what} is {array.shape} over {memory.size} bytes; {MOST_BYTES} bytes are the most"
+        )
+    return memory, _ffi.PlaneInfo(row_stride=rows, pixel_stride=pixels), array.shape[1], array.shape[0]
+
+
+def _remedy(what: str, array: _Array, dtype: str) -> str:
+    """What makes bytes of an image's numbers."""
+    if dtype == "uint8" and array.dtype.kind == "f":
+        return f"; where 1 is the most, (255 * {what}).round().astype(numpy.uint8) makes it so"
+    if dtype == "uint8" and array.dtype == "uint16":
+        return f"; ({what} >> 8).astype(numpy.uint8) makes it so"
+    return ""
+
+
+def _colour(colour: ArrayLike, colour_format: ColourFormat | None) -> tuple[list[_Array], ColourFormat]:
+    """The planes of a colour image, and their format."""
+    planar = isinstance(colour, (tuple, list))
+    if planar and colour_format is None:
+        raise PhasefrontError.Frame("frame: colour comes in planes; say whether it is ColourFormat.NV12 or YUV420")
+    images = [_array("colour", plane) for plane in colour] if isinstance(colour, (tuple, list)) else [_array("colour", colour)]
+    if colour_format is None:
+        grey = images[0].ndim == 2
+        if grey:
+            images = [numpy.stack(3 * [images[0]], axis=2)]
+        rgb = images[0].ndim == 3 and images[0].shape[2] == 3
+        colour_format = ColourFormat.RGB if rgb else ColourFormat.RGBA
+    if len(images) != len(_CHANNELS[colour_format]):
+        needed = len(_CHANNELS[colour_format])
+        raise PhasefrontError.Frame(f"frame: {len(images)} colour planes are given; {colour_format.name} has {needed}")
+    return images, colour_format
+
+
+def _depth(depth: ArrayLike, depth_format: DepthFormat | None) -> tuple[_Array, DepthFormat]:
+    """A depth image, and its format. Numbers of 64 bits are rounded to 32; what is then infinite is no reading."""
+    array = _array("depth", depth)
+    if array.dtype == "float64":
+        with numpy.errstate(over="ignore"):
+            array = array.astype(numpy.float32)
+    if depth_format is None:
+        depth_format = _DEPTH_FORMATS.get(str(array.dtype))
+    if depth_format is None:
+        raise PhasefrontError.Frame(
+            f"frame: depth holds {array.dtype}; metres are float32, float16 or float64: depth.astype(numpy.float32); "
+            "millimetres are uint16: depth.astype(numpy.uint16)"
+        )
+    return array, depth_format
+
+
+class Frame:
+    """Colour and depth of one moment.
+
+    Args:
+        colour: uint8: (H, W) for grey, (H, W, 3) for RGB, (H, W, 4) for RGBA or BGRA; for NV12 the pair of luma (H, W) and
+            chroma (H/2, W/2, 2), for YUV 420 the three planes; halves are rounded up.
+        depth: (h, w): metres in float32, float16 or float64, millimetres in uint16, or normalized in uint8 (0 nearest, 255
+            farthest), unless `depth_format` says otherwise. What is not finite or not over 0 is no reading, but for
+            normalized depth.
+        timestamp_ns: When it was taken, in nanoseconds of any clock that runs forward. Image sessions do not look at it.
+        colour_format: How colour lies in memory; needed for BGRA and for planes.
+        depth_format: What the depth's numbers mean, where the usual is wrong.
+        confidence: How sure the depth is, uint8, (h, w).
+        confidence_format: What its numbers mean.
+        matrix: Between luma, chroma and colour; other formats do not look at it.
+        video_range: Whether luma runs over 16 to 235, not 0 to 255; other formats do not look at it.
+        orientation: How the sensor's picture becomes the one that is shown; upright unless it is said.
+        cameras: How colour and depth camera stand to each other, where they are apart.
+
+    Arrays are read during the call that takes the frame, where they lie; grey images, depth in float64 and arrays that are
+    turned or mirrored are copied. Raises `PhasefrontError.Frame` for arrays of other types or shapes.
+    """
+
+    def __init__(
+        self,
+        colour: ArrayLike,
+        depth: ArrayLike,
+        *,
+        timestamp_ns: int = 0,
+        colour_format: ColourFormat | None = None,
+        depth_format: DepthFormat | None = None,
+        confidence: ArrayLike | None = None,
+        confidence_format: ConfidenceFormat = ConfidenceFormat.U8,
+        matrix: YuvMatrix = YuvMatrix.BT601,
+        video_range: bool = False,
+        orientation: Orientation | None = None,
+        cameras: Cameras | None = None,
+    ):
+        images, colour_format = _colour(colour, colour_format)
+        channels = _CHANNELS[colour_format]
+        planes = [_plane(what, image, "uint8", pixel) for (what, pixel), image in zip(channels, images)]
+        self._colour = [plane[0] for plane in planes] + [Memory()] * (3 - len(planes))
+
+        array, depth_format = _depth(depth, depth_format)
+        self._depth, plane, width, height = _plane("depth", array, _DEPTH_TYPES[depth_format], 1)
+        depth_info = _ffi.DepthInfo(format=depth_format, width=width, height=height, plane=plane)
+
+        self._confidence, confidence_info = Memory(), None
+        if confidence is not None:
+            array = _array("confidence", confidence)
+            self._confidence, plane, width, height = _plane("confidence", array, "uint8", 1)
+            confidence_info = _ffi.ConfidenceInfo(format=confidence_format, width=width, height=height, plane=plane)
+
+        self._info = _ffi.FrameInfo(
+            timestamp_ns=timestamp_ns,
+            colour=_ffi.ColourInfo(
+                format=colour_format,
+                width=planes[0][2],
+                height=planes[0][3],
+                planes=[plane[1] for plane in planes],
+                matrix=matrix,
+                video_range=video_range,
+            ),
+            depth=depth_info,
+            confidence=confidence_info,
+            orientation=orientation or Orientation(rotation=Rotation.UPRIGHT, mirrored=False),
+            cameras=cameras,
+        )
+
+    def _arguments(self) -> tuple[Any, ...]:
+        return (*self._colour, self._depth, self._confidence, self._info)

@@ -1,0 +1,105 @@
+"""Results: holograms, what is seen of them, and their files."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy
+from numpy.typing import NDArray
+
+from . import _ffi, _png
+from ._ffi import Display, Encoding, HologramInfo, Layout, PhasefrontError, Placement
+from ._memory import array_at
+from ._target import Target
+
+
+@dataclass(frozen=True)
+class Purpose:
+    """What a session's holograms are made for, and how they are encoded."""
+
+    target: _ffi.Target
+    encoding: Encoding
+
+    def told(self, scale: float) -> str:
+        """What travels with a hologram's file, as the command `phasefront` writes it."""
+        target = self.target
+        display = target.display()
+        told: dict[str, object] = {"display": _display(display), "encoder": _encoder(self.encoding), "scale": scale}
+        if isinstance(target, Target) and target._table is not None:
+            told["lut"] = list(target._table)
+        if not isinstance(target, Target) or target._calibrated:
+            told["calibrated"] = ["the display's calibration"]
+        return json.dumps(told)
+
+
+def _display(display: Display) -> dict[str, object]:
+    """A display as its TOML form has it."""
+    fields = dict(vars(display))
+    return fields | {"wavelengths_nm": [fields.pop(f"{colour}_nm") for colour in ("red", "green", "blue")]}
+
+
+def _encoder(encoding: Encoding) -> str:
+    """An encoding's name on the command line."""
+    names = [("double", Encoding.DOUBLE_PHASE), ("anti-alias", Encoding.ANTI_ALIAS), ("band-limit", Encoding.BAND_LIMIT)]
+    return next((name for name, kind in names if isinstance(encoding, kind)), "deep")
+
+
+class Hologram:
+    """The hologram of one frame. Its memory goes back to the session when it and all its arrays are gone."""
+
+    #: What is known of it.
+    info: HologramInfo
+
+    def __init__(self, raw: _ffi.RawHologram, purpose: Purpose):
+        self._raw, self._purpose = raw, purpose
+        self.info = raw.info()
+
+    @property
+    def levels(self) -> NDArray[numpy.uint8]:
+        """The modulator levels in place, uint8, (3, H, W): red, green, blue. Read only."""
+        return array_at(self._raw, self._raw.plane_address(0), (3, self.info.height, self.info.width))
+
+    def z_at(self, x: float, y: float) -> float:
+        """z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm."""
+        return self._raw.z_at(x, y)
+
+    def preview(self, z_mm: float, width: int, height: int) -> NDArray[numpy.uint8]:
+        """What an eye focused at `z_mm` sees: red, green, blue, alpha, uint8, (height, width, 4). Read only.
+
+        Raises `PhasefrontError.Setting` for an image that is empty or too large, or a z too far away.
+        """
+        if width < 1 or height < 1:
+            raise PhasefrontError.Setting(f"a preview of {width}×{height} is empty; each side must be at least 1")
+        image = self._raw.preview(z_mm, width, height)
+        return array_at(image, image.address(), (height, width, 4))
+
+    def output(self, placement: Placement | None = None, image: int = 0) -> NDArray[numpy.uint8]:
+        """Image `image` of those that the modulator's driver takes, of the modulator's resolution, levels as they are;
+        uint8, (H, W, bytes of a pixel). All layouts but grey have one; RGB is usual. Read only.
+
+        Raises `PhasefrontError.Setting` for an image that the layout has not.
+        """
+        output = self._raw.output(placement or Placement(layout=Layout.RGB), image)
+        return array_at(output, output.address(), (output.height(), output.width(), output.pixel_bytes()))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the levels as a PNG that carries what they are for, as the command `phasefront hologram` does:
+        `phasefront refocus` and `phasefront view` take it. A hologram for a calibration's file needs that display's
+        `--display` there.
+
+        Raises `PhasefrontError.File` for a file that cannot be written, or whose name does not end in .png, and
+        `PhasefrontError.Setting` for a display of over 8 bits, whose levels a byte does not hold.
+        """
+        file = Path(path)
+        if file.suffix.lower() != ".png":
+            raise PhasefrontError.File(f"{file}: the name must end in .png")
+        bits = self._purpose.target.display().bits
+        if bits > 8:
+            raise PhasefrontError.Setting(f"save writes levels of up to 8 bits; the display has {bits}; take output()")
+        try:
+            _png.write(file, self.levels.transpose(1, 2, 0), "phasefront", self._purpose.told(self.info.scale))
+        except OSError as error:
+            raise PhasefrontError.File(f"{file}: cannot be written: {error.strerror}") from None

@@ -1,0 +1,37 @@
+"""PNG files of 8-bit RGB with a text in them. By hand, so that NumPy stays all that is needed."""
+
+from __future__ import annotations
+
+import os
+import struct
+import tempfile
+import zlib
+from pathlib import Path
+
+import numpy
+from numpy.typing import NDArray
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def write(path: Path, image: NDArray[numpy.uint8], keyword: str, text: str) -> None:
+    """Writes `image`, (H, W, 3), with `text` under `keyword`, both Latin-1. The file is there whole or not at all."""
+    height, width, _ = image.shape
+    rows = numpy.zeros((height, 1 + 3 * width), numpy.uint8)  # each begins with its filter: none
+    rows[:, 1:] = image.reshape(height, -1)
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+        (b"tEXt", keyword.encode("latin-1") + b"\0" + text.encode("latin-1")),
+        (b"IDAT", zlib.compress(rows.data)),
+        (b"IEND", b""),
+    ]
+    handle, beside = tempfile.mkstemp(prefix=".phasefront-", dir=path.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*chunk) for chunk in chunks))
+        os.replace(beside, path)
+    except BaseException:
+        os.unlink(beside)
+        raise

@@ -1,0 +1,93 @@
+"""Holograms as files: what the command reads again."""
+
+import json
+import os
+import pathlib
+import struct
+import subprocess
+import zlib
+
+import numpy
+import pytest
+from conftest import still
+
+import phasefront
+from phasefront import Encoding, PhasefrontError, Session, Target, session_options
+
+COMMAND = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", "target")) / "release" / "phasefront"
+
+
+def chunks(path):
+    """The chunks of a PNG by their kind."""
+    data, found, at = path.read_bytes(), {}, 8
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at : at + 8])
+        content = data[at + 8 : at + 8 + length]
+        assert struct.unpack(">I", data[at + 8 + length :][:4]) == (zlib.crc32(kind + content),)
+        found[kind.decode()] = content
+        at += 12 + length
+    return found
+
+
+def told(path):
+    keyword, text = chunks(path)["tEXt"].split(b"\0")
+    assert keyword == b"phasefront"
+    return json.loads(text)
+
+
+def saved(path, **options):
+    with Session(session_options(**options)) as session:
+        hologram = session.process(still())
+        hologram.save(path)
+    return hologram
+
+
+def test_a_file_has_the_levels_and_what_they_are_for(display, tmp_path):
+    hologram = saved(tmp_path / "hologram.png", target=display)
+    png = chunks(tmp_path / "hologram.png")
+    assert struct.unpack(">IIBB", png["IHDR"][:10]) == (64, 48, 8, 2)
+    rows = numpy.frombuffer(zlib.decompress(png["IDAT"]), numpy.uint8).reshape(48, 1 + 3 * 64)
+    numpy.testing.assert_array_equal(rows[:, 1:].reshape(48, 64, 3), hologram.levels.transpose(1, 2, 0))
+    info = told(tmp_path / "hologram.png")
+    assert info["display"]["wavelengths_nm"] == [638, 520, 450] and info["display"]["width"] == 64
+    assert info["encoder"] == "anti-alias" and info["scale"] == pytest.approx(hologram.info.scale)
+    assert info.keys() == {"display", "encoder", "scale"}
+    assert os.listdir(tmp_path) == ["hologram.png"]
+
+
+def test_a_table_travels_and_a_calibration_is_named(display, tmp_path):
+    table = bytes(range(255, -1, -1))
+    saved(str(tmp_path / "table.png"), target=Target.with_look_up_table(display, table), encoding=Encoding.DOUBLE_PHASE())
+    info = told(tmp_path / "table.png")
+    assert bytes(info["lut"]) == table and info["encoder"] == "double" and "calibrated" not in info
+    # As one of a calibration's file.
+    calibrated = Target.of_display(display)
+    del calibrated._calibrated
+    saved(tmp_path / "calibrated.png", target=calibrated)
+    assert told(tmp_path / "calibrated.png")["calibrated"]
+
+
+def test_what_cannot_be_written_is_named(display, tmp_path):
+    with pytest.raises(PhasefrontError.File, match="must end in .png"):
+        saved(tmp_path / "hologram.jpg", target=display)
+    with pytest.raises(PhasefrontError.File, match="nowhere"):
+        saved(tmp_path / "nowhere" / "hologram.png", target=display)
+    (tmp_path / "folder.png").mkdir()
+    with pytest.raises(PhasefrontError.File, match="folder.png"):
+        saved(tmp_path / "folder.png", target=display)
+    with pytest.raises(PhasefrontError.Setting, match="the display has 10"):
+        saved(tmp_path / "deep.png", target=phasefront.Display(width=64, height=48, bits=10))
+    assert os.listdir(tmp_path) == ["folder.png"]
+
+
+@pytest.mark.skipif(not COMMAND.exists(), reason=f"the command is not built: {COMMAND}")
+def test_the_command_sees_what_a_preview_shows(tmp_path):
+    target = Target.with_look_up_table(phasefront.Display(width=64, height=48, offset_mm=2), bytes(range(256)))
+    hologram = saved(tmp_path / "hologram.png", target=target)
+    view = [COMMAND, "refocus", "hologram.png", "--z-mm", "1", "--json", "-o", "view.png"]
+    run = subprocess.run(view, cwd=tmp_path, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    matplotlib = pytest.importorskip("matplotlib.image")
+    seen = matplotlib.imread(tmp_path / "view.png")[..., :3]
+    shown = hologram.preview(1, 64, 48)[..., :3] / 255
+    assert numpy.corrcoef(seen.ravel(), shown.ravel())[0, 1] > 0.9

@@ -1,0 +1,67 @@
+"""What the pages print runs, and holds to its types."""
+
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[3]
+GUIDE = ROOT / "docs" / "python.md"
+NOTEBOOK = ROOT / "docs" / "python.ipynb"
+
+
+def snippets(page):
+    return re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+
+
+def test_the_readme_runs():
+    (code,) = snippets(ROOT / "README.md")
+    scope = {}
+    exec(code, scope)
+    assert scope["levels"].shape == (3, 480, 640)
+
+
+@pytest.mark.parametrize("code", snippets(GUIDE))
+def test_the_guide_runs(code, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    exec(code, {"__name__": "guide"})
+
+
+def test_the_guides_video_is_made(tmp_path):
+    import numpy
+
+    (code,) = [code for code in snippets(GUIDE) if "def video" in code]
+    scope = {"__name__": "guide"}
+    exec(code, scope)
+    frame = numpy.full((48, 64, 3), 99, numpy.uint8), numpy.ones((24, 32), numpy.float32)
+    shapes = [hologram.levels.shape for hologram in scope["video"]([frame] * 2, 30.0)]
+    assert shapes == [(3, 1080, 1920)] * 2
+
+
+def test_a_type_checker_follows_the_pages(tmp_path):
+    pytest.importorskip("mypy")
+    for i, code in enumerate(snippets(GUIDE) + snippets(ROOT / "README.md")):
+        (tmp_path / f"snippet_{i}.py").write_text(code)
+    wrong = "import phasefront\nphasefront.session_options(dark='much', no_option=1)\nphasefront.Display(width='1')\n"
+    (tmp_path / "wrong.py").write_text(wrong)
+    # Not in this folder, where the package lies without what is generated.
+    mypy = [sys.executable, "-P", "-m", "mypy", "--strict", "."]
+    told = subprocess.run(mypy, cwd=tmp_path, capture_output=True, text=True)
+    found = [line for line in told.stdout.splitlines() if ": error:" in line]
+    assert len(found) == 3 and all(line.startswith("wrong.py") for line in found), told.stdout + told.stderr
+
+
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    pytest.importorskip("matplotlib")
+    monkeypatch.setenv("PYTHONSAFEPATH", "1")
+    monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path))
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    assert all(not cell.get("outputs") and not cell.get("execution_count") for cell in notebook.cells)
+    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", []) if "image/png" in output.get("data", {})]
+    assert len(shown) >= 3
+    assert (tmp_path / "hologram.png").exists()
