@@ -15,6 +15,7 @@ public enum SessionEvent: Sendable {
 /// The events of a live stream, for one reader. Two holograms wait for it at most: the oldest gives way to a newer one
 /// and is told as dropped, as ``DropReason/unread``, so a slow reader falls behind by little and memory stays flat.
 public final class SessionEvents: AsyncSequence, Sendable {
+    /// What is read: one event after another.
     public typealias Element = SessionEvent
 
     private static let mostHolograms = 2
@@ -77,12 +78,15 @@ public final class SessionEvents: AsyncSequence, Sendable {
         }
     }
 
+    /// Reads the events.
     public struct Iterator: AsyncIteratorProtocol {
         let events: SessionEvents
 
+        /// The next event, which is waited for; nil when the session is closed or the task cancelled.
         public mutating func next() async -> SessionEvent? { await events.next() }
     }
 
+    /// A reader. A second one takes the first one's place.
     public func makeAsyncIterator() -> Iterator { Iterator(events: self) }
 }
 

@@ -38,6 +38,7 @@ public struct ColourImage: Sendable {
     /// Whether luma runs over 16...235 and chroma over 16...240; other formats do not look at it.
     public var videoRange: Bool
 
+    /// An image of planes that lie anywhere.
     public init(
         format: ColourFormat, width: Int, height: Int, planes: [Plane], matrix: YuvMatrix = .bt601,
         videoRange: Bool = false
@@ -70,6 +71,7 @@ public struct ConfidenceMap: Sendable {
     /// Its plane.
     public var plane: Plane
 
+    /// A map whose plane lies anywhere.
     public init(format: ConfidenceFormat, width: Int, height: Int, plane: Plane) {
         self.format = format
         self.width = width
@@ -91,6 +93,7 @@ public struct DepthImage: Sendable {
     /// How sure its readings are, where that is known.
     public var confidence: ConfidenceMap?
 
+    /// An image whose plane lies anywhere.
     public init(
         format: DepthFormat, width: Int, height: Int, plane: Plane, confidence: ConfidenceMap? = nil
     ) {
@@ -137,6 +140,7 @@ public struct Frame: Sendable {
     /// How the pixels of depth and colour correspond; nil where both show the same field of view.
     public var cameras: Cameras?
 
+    /// A frame of both, upright and of one field of view unless it is said.
     public init(
         timestampNs: UInt64, colour: ColourImage, depth: DepthImage, orientation: Orientation = .upright,
         cameras: Cameras? = nil

@@ -2,7 +2,12 @@ import Foundation
 
 /// A colour of a hologram.
 public enum Colour: UInt32, CaseIterable, Sendable {
-    case red, green, blue
+    /// The red laser's.
+    case red
+    /// The green laser's.
+    case green
+    /// The blue laser's.
+    case blue
 }
 
 /// The hologram of one frame: modulator levels of three colours, and what is known of them. Its memory goes back to the

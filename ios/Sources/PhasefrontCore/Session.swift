@@ -90,8 +90,8 @@ public final class Session: Sendable {
 }
 
 extension SessionOptions {
-    /// What is usual for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the pair of
-    /// networks that is built in for it, by the plane sweep where there is none. Change what is not.
+    /// What is usual for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the network
+    /// that is built in, by the plane sweep where that was not trained for it. Change what is not.
     ///
     /// - Throws: ``PhasefrontError/Display(message:)`` for a display that cannot be.
     public init(display: Display = Display(), method: Method? = nil) throws {
@@ -124,6 +124,8 @@ extension PhasefrontError: LocalizedError, CustomStringConvertible {
         }
     }
 
+    /// The message.
     public var errorDescription: String? { message }
+    /// The message.
     public var description: String { message }
 }
