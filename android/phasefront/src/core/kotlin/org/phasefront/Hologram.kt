@@ -4,7 +4,16 @@ import com.sun.jna.Pointer
 import java.nio.ByteBuffer
 
 /** A colour of a hologram. */
-public enum class Colour { RED, GREEN, BLUE }
+public enum class Colour {
+    /** The red laser's. */
+    RED,
+
+    /** The green laser's. */
+    GREEN,
+
+    /** The blue laser's. */
+    BLUE,
+}
 
 /**
  * The hologram of one frame: modulator levels of three colours, and what is known of them. Close it, so that its memory

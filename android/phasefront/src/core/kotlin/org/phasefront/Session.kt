@@ -126,8 +126,8 @@ public sealed interface SessionEvent {
 }
 
 /**
- * What is usual for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the pair of networks
- * that is built in for it, by the plane sweep where there is none. Change what is not with `copy`.
+ * What is usual for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the network that is
+ * built in, by the plane sweep where that was not trained for it. Change what is not with `copy`.
  *
  * @throws PhasefrontException.Display for a display that cannot be.
  */
