@@ -68,7 +68,7 @@ impl From<uniffi::UnexpectedUniFFICallbackError> for ListenerError {
 }
 
 /// What `call` gives, a panic in it made an error.
-pub(crate) fn guard<T>(call: impl FnOnce() -> Result<T, PhasefrontError>) -> Result<T, PhasefrontError> {
+pub fn guard<T>(call: impl FnOnce() -> Result<T, PhasefrontError>) -> Result<T, PhasefrontError> {
     catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
         let message = (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
             .or_else(|| payload.downcast_ref::<String>().cloned())

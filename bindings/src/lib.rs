@@ -1,4 +1,4 @@
-//! Phasefront for Swift, Kotlin and Python. This crate only translates: what a call does, is the core's.
+//! Phasefront for Swift, Kotlin and Python, and under `bindings/c` for C. This crate only translates: what a call does, is the core's.
 //!
 //! The packages in `ios/`, `android/` and `bindings/python/` put a layer by hand over what is generated from here, so
 //! that it feels native there; the objects named `Raw…` are for them alone. Rules of this border:
@@ -20,6 +20,8 @@ mod statistics;
 mod target;
 
 pub use display::{Display, display_from_toml};
+#[doc(hidden)]
+pub use error::guard;
 pub use error::{ListenerError, PhasefrontError};
 pub use frame::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,

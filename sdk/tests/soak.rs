@@ -160,10 +160,7 @@ fn run(frames: u64, seed: u64) -> Heard {
     assert_eq!(s.submitted, s.processed + s.failed + s.refused + s.dropped.total());
     let told = [&heard.made, &heard.dropped, &heard.failed].map(|count| count.load(Ordering::Relaxed));
     assert_eq!(told, [s.processed, s.dropped.total(), s.failed]);
-    assert!(
-        s.listener_panics > 0 && s.refused > 0 && s.failed > 0,
-        "no fault was met: {s:?}"
-    );
+    assert!(s.listener_panics > 0 && s.refused > 0, "no fault was met: {s:?}");
     drop(session);
     Arc::into_inner(heard).unwrap_or_default()
 }
@@ -175,6 +172,8 @@ fn nothing_grows_and_nothing_is_lost_under_load_and_faults() {
     (0..2).for_each(|seed| _ = run(1000, seed));
     let before = Held::now();
     let heard = run(frames, 2);
+    // A short run may drop each of its few frames that show nothing.
+    assert!(heard.failed.load(Ordering::Relaxed) > 0, "no frame failed");
     let mut after = Held::now();
     // Threads end a moment after their pool.
     for _ in 0..100 {

@@ -1,0 +1,49 @@
+//! Phasefront for C, and for what speaks C: C++, C#, Unity, Unreal, Flutter, Qt. It only translates to `phasefront-ffi`,
+//! which serves the other languages. `include/phasefront.h` is made from here by cbindgen, and says the rules of this
+//! border. What is a number in C is checked before it is an enum here.
+//!
+//! # Safety
+//! Of every call: pointers are NULL, which is refused, or point to what their type says, as many of it as the length
+//! beside them says, for as long as the call takes; objects were given by this library and are not yet freed.
+#![allow(clippy::missing_safety_doc)]
+
+mod frame;
+mod hologram;
+mod log;
+mod network;
+mod options;
+mod pointer;
+mod session;
+mod status;
+mod target;
+
+pub use frame::{
+    PfCameras, PfColour, PfColourFormat, PfConfidence, PfConfidenceFormat, PfDepth, PfDepthFormat, PfFrame,
+    PfIntrinsics, PfPlane, PfRotation, PfYuvMatrix,
+};
+pub use hologram::{
+    PfFrameTimes, PfHologram, PfHologramInfo, PfImage, PfImageInfo, PfLayout, PfPlacement, pf_hologram_free,
+    pf_hologram_info, pf_hologram_levels, pf_hologram_output, pf_hologram_preview, pf_hologram_z_at, pf_image_free,
+    pf_image_info,
+};
+pub use log::{PfLogLevel, PfOnLog, pf_set_log_listener};
+pub use network::{PfNetwork, pf_network_built_in, pf_network_free, pf_network_from_bytes, pf_network_from_file};
+pub use options::{
+    PfBackend, PfMethod, PfOptions, PfRung, pf_options_clear_ladder, pf_options_free, pf_options_new,
+    pf_options_push_rung, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
+    pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_steady,
+    pf_options_set_dark, pf_options_set_deep, pf_options_set_depth_range, pf_options_set_double_phase,
+    pf_options_set_least_confidence, pf_options_set_local_steps, pf_options_set_midpoint_steps,
+    pf_options_set_most_pixels, pf_options_set_target_rate_hz, pf_options_set_threads,
+};
+pub use session::{
+    PfDropReason, PfListener, PfQualityChange, PfQualityReason, PfRunningMode, PfSession, PfStatistics, PfThermal,
+    pf_session_fix_rung, pf_session_free, pf_session_new, pf_session_pause, pf_session_process, pf_session_reset,
+    pf_session_resume, pf_session_set_thermal, pf_session_statistics, pf_session_step_by_itself, pf_session_submit,
+    pf_session_warm_up,
+};
+pub use status::{PfStatus, pf_last_error, pf_version};
+pub use target::{
+    PfTarget, pf_target_free, pf_target_from_bytes, pf_target_from_file, pf_target_from_toml, pf_target_size,
+    pf_target_with_look_up_table,
+};

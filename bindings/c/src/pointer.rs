@@ -1,0 +1,101 @@
+//! What C points at, checked as far as a pointer can be.
+
+use crate::status::Result;
+use phasefront_ffi::{PhasefrontError, guard};
+use std::ffi::{CStr, c_char};
+
+fn null(name: &str) -> PhasefrontError {
+    PhasefrontError::Setting(format!("{name} is NULL; point it at what the call takes"))
+}
+
+/// What `pointer` points at.
+///
+/// # Safety
+/// It is NULL, or valid for reads as long as `'a`.
+pub(crate) unsafe fn read<'a, T>(pointer: *const T, name: &str) -> Result<&'a T> {
+    // SAFETY: the caller's promise.
+    unsafe { pointer.as_ref() }.ok_or_else(|| null(name))
+}
+
+/// What `pointer` points at, to be changed.
+///
+/// # Safety
+/// It is NULL, or valid for reads and writes as long as `'a`, by nobody else.
+pub(crate) unsafe fn change<'a, T>(pointer: *mut T, name: &str) -> Result<&'a mut T> {
+    // SAFETY: the caller's promise.
+    unsafe { pointer.as_mut() }.ok_or_else(|| null(name))
+}
+
+/// Writes what `make` gives to `to`; nothing is made where there is no place for it.
+///
+/// # Safety
+/// `to` is NULL, or valid for a write; what lies there before need not be initialized.
+pub(crate) unsafe fn give<T>(to: *mut T, name: &str, make: impl FnOnce() -> Result<T>) -> Result<()> {
+    if to.is_null() {
+        return Err(null(name));
+    }
+    let value = make()?;
+    // SAFETY: the caller's promise.
+    unsafe { to.write(value) };
+    Ok(())
+}
+
+/// An object that is the caller's until [`free`].
+pub(crate) fn object<T>(value: T) -> *mut T {
+    Box::into_raw(Box::new(value))
+}
+
+/// Ends an object.
+///
+/// # Safety
+/// It is NULL, or was given by [`object`] and not freed before.
+pub(crate) unsafe fn free<T>(pointer: *mut T) {
+    if !pointer.is_null() {
+        // SAFETY: the caller's promise. What its end does wrong stays here.
+        let value = unsafe { Box::from_raw(pointer) };
+        let _ = guard(|| {
+            drop(value);
+            Ok(())
+        });
+    }
+}
+
+/// The bytes at `data`; none at NULL where there are none.
+///
+/// # Safety
+/// It is NULL, or valid for `length` bytes as long as `'a`.
+pub(crate) unsafe fn bytes<'a>(data: *const u8, length: usize, name: &str) -> Result<&'a [u8]> {
+    match (data.is_null(), length) {
+        (true, 0) => Ok(&[]),
+        (true, _) => Err(null(name)),
+        // SAFETY: the caller's promise.
+        (false, 0..=0x7fff_ffff_ffff_ffff) => Ok(unsafe { std::slice::from_raw_parts(data, length) }),
+        _ => Err(PhasefrontError::Setting(format!(
+            "{name} has {length} bytes, more than there can be"
+        ))),
+    }
+}
+
+/// The text at `text`.
+///
+/// # Safety
+/// It is NULL, or points at bytes that end with a zero and live as long as `'a`.
+pub(crate) unsafe fn text<'a>(text: *const c_char, name: &str) -> Result<&'a str> {
+    if text.is_null() {
+        return Err(null(name));
+    }
+    // SAFETY: the caller's promise.
+    unsafe { CStr::from_ptr(text) }
+        .to_str()
+        .map_err(|_| PhasefrontError::Setting(format!("{name} is no UTF-8; give it as that")))
+}
+
+/// The one of `all` that C calls `number`.
+pub(crate) fn pick<T: Copy>(all: &[T], number: u32, name: &str) -> Result<T> {
+    all.get(number as usize).copied().ok_or_else(|| {
+        PhasefrontError::Setting(format!(
+            "{name} is {number}; it is 0 to {}",
+            all.len().saturating_sub(1)
+        ))
+    })
+}

@@ -1,0 +1,191 @@
+// What C gets wrong is an error of one line, never a crash; what a live session's listener hears.
+#include "phasefront.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+// `status` is `wanted`, and the line about it has `word`.
+static void refused(PfStatus status, PfStatus wanted, const char *word) {
+    const char *line = pf_last_error();
+    if (status != wanted || strstr(line, word) == NULL || strchr(line, '\n') != NULL) {
+        fprintf(stderr, "%d, not %d: %s (not about %s)\n", status, wanted, line, word);
+        exit(1);
+    }
+}
+
+static void ok(PfStatus status) {
+    if (status != PF_STATUS_OK) {
+        fprintf(stderr, "%s\n", pf_last_error());
+        exit(1);
+    }
+}
+
+enum { WIDTH = 48, HEIGHT = 36 };
+static uint8_t colour[WIDTH * HEIGHT * 3];
+static uint8_t depth[WIDTH * HEIGHT];
+
+static PfFrame frame_at(uint64_t timestamp_ns) {
+    return (PfFrame){.timestamp_ns = timestamp_ns,
+                     .colour = {.format = PF_COLOUR_FORMAT_RGB,
+                                .width = WIDTH,
+                                .height = HEIGHT,
+                                .planes = {{colour, sizeof colour, WIDTH * 3, 3}}},
+                     .depth = {.format = PF_DEPTH_FORMAT_NORMALIZED_U8,
+                               .width = WIDTH,
+                               .height = HEIGHT,
+                               .plane = {depth, sizeof depth, WIDTH, 1}}};
+}
+
+typedef struct Heard {
+    int holograms, dropped, failed;
+} Heard;
+
+static void on_hologram(void *context, PfHologram *hologram) {
+    PfHologramInfo info;
+    ok(pf_hologram_info(hologram, &info));
+    assert(info.width == WIDTH && info.height == HEIGHT);
+    pf_hologram_free(hologram);
+    ((Heard *)context)->holograms++;
+}
+static void on_dropped(void *context, uint64_t timestamp_ns, PfDropReason reason) {
+    (void)timestamp_ns;
+    assert(reason != PF_DROP_REASON_NOT);
+    ((Heard *)context)->dropped++;
+}
+static void on_failed(void *context, uint64_t timestamp_ns, const char *message) {
+    (void)timestamp_ns;
+    fprintf(stderr, "%s\n", message);
+    ((Heard *)context)->failed++;
+}
+
+static int logged = 0;
+static void on_log(void *context, PfLogLevel level, const char *message) {
+    assert(context == &logged && level <= PF_LOG_LEVEL_DEBUG && message[0] != 0);
+    logged++;
+}
+
+static void mistakes(PfTarget *target, PfOptions *options) {
+    PfTarget *no_target = NULL;
+    PfNetwork *no_network = NULL;
+    PfSession *no_session = NULL;
+    refused(pf_target_from_toml("width = 0", &no_target), PF_STATUS_DISPLAY, "width");
+    refused(pf_target_from_toml(NULL, &no_target), PF_STATUS_SETTING, "toml is NULL");
+    refused(pf_target_from_toml("\xff\xfe", &no_target), PF_STATUS_SETTING, "UTF-8");
+    refused(pf_target_from_toml("", NULL), PF_STATUS_SETTING, "target is NULL");
+    refused(pf_target_from_file("/none/such", &no_target), PF_STATUS_FILE, "/none/such");
+    refused(pf_target_from_bytes((const uint8_t *)"no", 2, &no_target), PF_STATUS_SETTING, "PFCALIB1");
+    refused(pf_target_with_look_up_table("", colour, 3, &no_target), PF_STATUS_SETTING, "256");
+    refused(pf_network_built_in("rgbd-9", &no_network), PF_STATUS_NETWORK, "rgbd-9");
+    refused(pf_network_from_bytes(NULL, 5, &no_network), PF_STATUS_SETTING, "onnx is NULL");
+    refused(pf_options_new(target, 7, NULL, &options), PF_STATUS_SETTING, "method is 7");
+    refused(pf_options_new(target, PF_METHOD_TRAINED, NULL, &options), PF_STATUS_SETTING, "network is NULL");
+    refused(pf_options_set_backend(options, 2), PF_STATUS_SETTING, "backend is 2");
+    PfRung rung = {.method = PF_METHOD_USUAL, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
+    refused(pf_options_push_rung(options, &rung), PF_STATUS_SETTING, "PF_METHOD_USUAL");
+    refused(pf_session_new(options, 3, NULL, &no_session), PF_STATUS_SETTING, "mode is 3");
+    refused(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, NULL, &no_session), PF_STATUS_SESSION, "listener");
+    PfHologram *hologram = NULL;
+    refused(pf_session_process(NULL, NULL, &hologram), PF_STATUS_SETTING, "NULL");
+    refused(pf_hologram_z_at(NULL, 0, 0, &(double){0}), PF_STATUS_SETTING, "hologram is NULL");
+    assert(no_target == NULL && no_network == NULL && no_session == NULL && hologram == NULL);
+    pf_target_free(NULL);
+    pf_network_free(NULL);
+    pf_options_free(NULL);
+    pf_session_free(NULL);
+    pf_hologram_free(NULL);
+    pf_image_free(NULL);
+}
+
+static void stills(const PfOptions *options) {
+    PfSession *session = NULL;
+    ok(pf_session_new(options, PF_RUNNING_MODE_IMAGE, NULL, &session));
+    PfFrame frame = frame_at(1);
+    PfHologram *hologram = NULL;
+    frame.colour.planes[0].length = 10;
+    refused(pf_session_process(session, &frame, &hologram), PF_STATUS_FRAME, "10 bytes");
+    frame = frame_at(1);
+    frame.depth.format = 99;
+    refused(pf_session_process(session, &frame, &hologram), PF_STATUS_SETTING, "depth.format is 99");
+    frame = frame_at(1);
+    frame.colour.planes[1] = frame.colour.planes[0];
+    refused(pf_session_process(session, &frame, &hologram), PF_STATUS_FRAME, "plane");
+    frame = frame_at(1);
+    ok(pf_session_process(session, &frame, &hologram));
+    // The hologram outlives its session.
+    pf_session_free(session);
+    double z_mm = 0;
+    ok(pf_hologram_z_at(hologram, 0.5, 0.5, &z_mm));
+    PfImage *seen = NULL, *driven = NULL;
+    ok(pf_hologram_preview(hologram, z_mm, 24, 18, &seen));
+    PfImageInfo info;
+    ok(pf_image_info(seen, &info));
+    assert(info.width == 24 && info.height == 18 && info.length == 24 * 18 * 4 && info.data[3] == 255);
+    PfPlacement placement = {.layout = PF_LAYOUT_GREY, .flip_x = true};
+    ok(pf_hologram_output(hologram, &placement, 2, &driven));
+    ok(pf_image_info(driven, &info));
+    const uint8_t *blue = NULL;
+    size_t length = 0;
+    ok(pf_hologram_levels(hologram, 2, &blue, &length));
+    assert(info.length == WIDTH * HEIGHT && length == info.length);
+    for (int x = 0; x < WIDTH; x++) assert(info.data[x] == blue[WIDTH - 1 - x]);
+    refused(pf_hologram_output(hologram, &placement, 3, &driven), PF_STATUS_SETTING, "no image 3");
+    refused(pf_hologram_levels(hologram, 3, &blue, &length), PF_STATUS_SETTING, "no plane 3");
+    pf_image_free(seen);
+    pf_image_free(driven);
+    pf_hologram_free(hologram);
+}
+
+static void live(const PfOptions *options) {
+    Heard heard = {0};
+    PfListener listener = {&heard, on_hologram, on_dropped, on_failed, NULL};
+    PfSession *session = NULL;
+    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, &listener, &session));
+    ok(pf_session_warm_up(session));
+    for (uint64_t i = 1; i <= 20; i++) {
+        PfFrame frame = frame_at(i * 1000000);
+        PfDropReason dropped;
+        ok(pf_session_submit(session, &frame, &dropped));
+    }
+    PfFrame late = frame_at(5);
+    PfDropReason dropped;
+    refused(pf_session_submit(session, &late, &dropped), PF_STATUS_TIMESTAMP, "5");
+    ok(pf_session_set_thermal(session, PF_THERMAL_FAIR));
+    refused(pf_session_set_thermal(session, 9), PF_STATUS_SETTING, "thermal is 9");
+    refused(pf_session_fix_rung(session, 9), PF_STATUS_SETTING, "no rung 9");
+    PfStatistics statistics;
+    do ok(pf_session_statistics(session, &statistics));
+    while (statistics.pending > 0);
+    ok(pf_session_pause(session));
+    ok(pf_session_resume(session));
+    assert(statistics.submitted >= 20 && statistics.refused == 1 && statistics.backend[0] != 0);
+    pf_session_free(session);
+    assert(heard.holograms >= 1 && heard.holograms + heard.dropped == 20 && heard.failed == 0);
+}
+
+int main(void) {
+    for (int i = 0; i < WIDTH * HEIGHT; i++) {
+        depth[i] = (uint8_t)(i % 251);
+        for (int c = 0; c < 3; c++) colour[3 * i + c] = (uint8_t)(i * (c + 3) % 256);
+    }
+    assert(strcmp(pf_version(), PHASEFRONT_VERSION) == 0);
+    ok(pf_set_log_listener(PF_LOG_LEVEL_INFO, on_log, &logged));
+    PfTarget *target = NULL;
+    ok(pf_target_from_toml("width = 48\nheight = 36", &target));
+    uint32_t width = 0, height = 0;
+    ok(pf_target_size(target, &width, &height));
+    assert(width == WIDTH && height == HEIGHT);
+    PfOptions *options = NULL;
+    ok(pf_options_new(target, PF_METHOD_USUAL, NULL, &options));
+    mistakes(target, options);
+    pf_target_free(target);
+    stills(options);
+    live(options);
+    pf_options_free(options);
+    assert(logged > 0);
+    ok(pf_set_log_listener(PF_LOG_LEVEL_INFO, NULL, NULL));
+    puts("mistakes are told, stills and live streams end");
+    return 0;
+}

@@ -1,0 +1,214 @@
+// The conformance suite, run from C: `conformance SUITE MODELS LEVELS` compares the levels of all frames with the file that
+// Rust left, bit for bit.
+#include "phasefront.h"
+
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void ok(PfStatus status, const char *what) {
+    if (status != PF_STATUS_OK) {
+        fprintf(stderr, "%s: %s\n", what, pf_last_error());
+        exit(1);
+    }
+}
+
+static uint8_t *read_file(const char *folder, const char *name, size_t *length) {
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        perror(path);
+        exit(1);
+    }
+    fseek(file, 0, SEEK_END);
+    *length = (size_t)ftell(file);
+    rewind(file);
+    uint8_t *bytes = malloc(*length + 1);
+    if (fread(bytes, 1, *length, file) != *length) {
+        perror(path);
+        exit(1);
+    }
+    bytes[*length] = 0;
+    fclose(file);
+    return bytes;
+}
+
+static const cJSON *of(const cJSON *object, const char *key) { return cJSON_GetObjectItemCaseSensitive(object, key); }
+static const char *text(const cJSON *object, const char *key) { return cJSON_GetStringValue(of(object, key)); }
+static double number(const cJSON *object, const char *key) { return cJSON_GetNumberValue(of(object, key)); }
+static bool is_null(const cJSON *object, const char *key) { return cJSON_IsNull(of(object, key)); }
+
+// The place of `name` among `count` names.
+static uint32_t pick(const char *name, const char *const *names, uint32_t count) {
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(name, names[i]) == 0) return i;
+    fprintf(stderr, "%s is not known\n", name);
+    exit(1);
+}
+
+static const char *const COLOURS[] = {"rgba", "bgra", "rgb", "nv12", "yuv420"};
+static const char *const MATRICES[] = {"bt601", "bt709"};
+static const char *const DEPTHS[] = {"metres-f32",      "metres-f16",      "disparity-f32", "disparity-f16",
+                                     "millimetres-u16", "android-depth16", "normalized-u8", "normalized-u16"};
+static const char *const CONFIDENCES[] = {"low-medium-high", "u8"};
+static const char *const MODES[] = {"image", "video"};
+
+static PfPlane plane(const cJSON *json, const uint8_t *memory) {
+    return (PfPlane){.data = memory + (size_t)number(json, "offset"),
+                     .length = (size_t)number(json, "length"),
+                     .row_stride = (uint32_t)number(json, "row_stride"),
+                     .pixel_stride = (uint32_t)number(json, "pixel_stride")};
+}
+
+static PfFrame frame_of(const cJSON *json, const uint8_t *memory) {
+    const cJSON *colour = of(json, "colour"), *depth = of(json, "depth");
+    PfFrame frame = {.timestamp_ns = (uint64_t)number(json, "timestamp_ns"),
+                     .colour = {.format = pick(text(colour, "format"), COLOURS, 5),
+                                .width = (uint32_t)number(colour, "width"),
+                                .height = (uint32_t)number(colour, "height"),
+                                .matrix = pick(text(colour, "matrix"), MATRICES, 2),
+                                .video_range = cJSON_IsTrue(of(colour, "video_range"))},
+                     .depth = {.format = pick(text(depth, "format"), DEPTHS, 8),
+                               .width = (uint32_t)number(depth, "width"),
+                               .height = (uint32_t)number(depth, "height"),
+                               .plane = plane(of(depth, "plane"), memory)},
+                     .rotation = (uint32_t)number(json, "rotation") / 90,
+                     .mirrored = cJSON_IsTrue(of(json, "mirrored"))};
+    int planes = cJSON_GetArraySize(of(colour, "planes"));
+    for (int i = 0; i < planes; i++) frame.colour.planes[i] = plane(cJSON_GetArrayItem(of(colour, "planes"), i), memory);
+    if (!is_null(json, "confidence")) {
+        const cJSON *confidence = of(json, "confidence");
+        frame.confidence = (PfConfidence){.format = pick(text(confidence, "format"), CONFIDENCES, 2),
+                                          .width = (uint32_t)number(confidence, "width"),
+                                          .height = (uint32_t)number(confidence, "height"),
+                                          .plane = plane(of(confidence, "plane"), memory)};
+    }
+    return frame;
+}
+
+static PfNetwork *network(const char *models, const char *file) {
+    char path[4096];
+    snprintf(path, sizeof path, "%s/%s", models, file);
+    PfNetwork *network = NULL;
+    ok(pf_network_from_file(path, &network), path);
+    return network;
+}
+
+static PfTarget *target_of(const cJSON *json, const char *suite) {
+    PfTarget *target = NULL;
+    if (!is_null(json, "calibration")) {
+        char path[4096];
+        snprintf(path, sizeof path, "%s/%s", suite, text(json, "calibration"));
+        ok(pf_target_from_file(path, &target), path);
+    } else if (!is_null(json, "lut")) {
+        uint8_t levels[256];
+        for (int i = 0; i < 256; i++) levels[i] = (uint8_t)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "lut"), i));
+        ok(pf_target_with_look_up_table(text(json, "display"), levels, sizeof levels, &target), "look-up table");
+    } else {
+        ok(pf_target_from_toml(text(json, "display"), &target), "display");
+    }
+    return target;
+}
+
+static void encode(PfOptions *options, const char *encoding, const char *models) {
+    if (strcmp(encoding, "double-phase") == 0) {
+        ok(pf_options_set_double_phase(options), encoding);
+    } else if (strcmp(encoding, "anti-alias") == 0) {
+        ok(pf_options_set_anti_alias(options, 0.7f, 3), encoding);
+    } else if (strcmp(encoding, "band-limit") == 0) {
+        ok(pf_options_set_band_limit(options, 1.0f), encoding);
+    } else {
+        PfNetwork *prefilter = network(models, encoding);
+        ok(pf_options_set_deep(options, prefilter), encoding);
+        pf_network_free(prefilter);
+    }
+}
+
+static PfOptions *options_of(const cJSON *json, const char *suite, const char *models) {
+    PfTarget *target = target_of(json, suite);
+    const char *method = text(json, "method");
+    PfNetwork *trained = NULL;
+    uint32_t number_of_method = PF_METHOD_TRAINED;
+    if (strcmp(method, "sweep") == 0) {
+        number_of_method = PF_METHOD_SWEEP;
+    } else if (strcmp(method, "network") == 0 || strcmp(method, "by-sharpness") == 0) {
+        ok(pf_network_built_in("rgbd-8", &trained), "rgbd-8");
+        if (strcmp(method, "network") != 0) number_of_method = PF_METHOD_BY_SHARPNESS;
+    } else {
+        trained = network(models, method);
+    }
+    PfOptions *options = NULL;
+    ok(pf_options_new(target, number_of_method, trained, &options), "options");
+    pf_network_free(trained);
+    pf_target_free(target);
+    encode(options, text(json, "encoding"), models);
+    if (!is_null(json, "brightness"))
+        ok(pf_options_set_brightness_fixed(options, (float)number(json, "brightness")), "brightness");
+    if (!is_null(json, "range")) {
+        float near_m = (float)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "range"), 0));
+        float far_m = (float)cJSON_GetNumberValue(cJSON_GetArrayItem(of(json, "range"), 1));
+        ok(pf_options_set_depth_range(options, near_m, far_m), "range");
+    }
+    return options;
+}
+
+// The levels that a case leaves, compared with `expected`; how many there were.
+static size_t run(const cJSON *json, const char *suite, const char *models, const uint8_t *memory,
+                  const uint8_t *expected, size_t left) {
+    PfOptions *options = options_of(json, suite, models);
+    PfSession *session = NULL;
+    ok(pf_session_new(options, pick(text(json, "mode"), MODES, 2), NULL, &session), text(json, "name"));
+    pf_options_free(options);
+    size_t done = 0;
+    const cJSON *one = NULL;
+    cJSON_ArrayForEach(one, of(json, "frames")) {
+        PfFrame frame = frame_of(one, memory);
+        PfHologram *hologram = NULL;
+        ok(pf_session_process(session, &frame, &hologram), text(json, "name"));
+        for (uint32_t colour = 0; colour < 3; colour++) {
+            const uint8_t *levels = NULL;
+            size_t length = 0;
+            ok(pf_hologram_levels(hologram, colour, &levels, &length), "levels");
+            if (left - done < length || memcmp(levels, expected + done, length) != 0) {
+                fprintf(stderr, "%s: not the bits that Rust has\n", text(json, "name"));
+                exit(1);
+            }
+            done += length;
+        }
+        pf_hologram_free(hologram);
+    }
+    pf_session_free(session);
+    return done;
+}
+
+int main(int count, char **arguments) {
+    if (count != 4) {
+        fprintf(stderr, "usage: conformance SUITE MODELS LEVELS\n");
+        return 2;
+    }
+    const char *suite = arguments[1];
+    size_t length = 0, memory_length = 0, expected_length = 0;
+    uint8_t *cases = read_file(suite, "cases.json", &length);
+    uint8_t *memory = read_file(suite, "frames.bin", &memory_length);
+    uint8_t *expected = read_file(arguments[3], "levels.bin", &expected_length);
+    cJSON *json = cJSON_Parse((const char *)cases);
+    size_t at = 0;
+    int ran = 0;
+    const cJSON *one = NULL;
+    cJSON_ArrayForEach(one, of(json, "cases")) {
+        at += run(one, suite, arguments[2], memory, expected + at, expected_length - at);
+        ran++;
+    }
+    if (ran == 0 || at != expected_length) {
+        fprintf(stderr, "%d cases have %zu levels; the suite has %zu\n", ran, at, expected_length);
+        return 1;
+    }
+    printf("%d cases, %zu levels: the bits that Rust has\n", ran, at);
+    cJSON_Delete(json);
+    free(cases);
+    free(memory);
+    free(expected);
+    return 0;
+}

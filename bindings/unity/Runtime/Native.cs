@@ -1,0 +1,169 @@
+// The C interface as C# sees it: bindings/c/include/phasefront.h says what each call does.
+using System;
+using System.Runtime.InteropServices;
+
+namespace Phasefront
+{
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativePlane
+    {
+        public IntPtr Data;
+        public UIntPtr Length;
+        public uint RowStride;
+        public uint PixelStride;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeColour
+    {
+        public uint Format;
+        public uint Width;
+        public uint Height;
+        public uint Matrix;
+        [MarshalAs(UnmanagedType.U1)] public bool VideoRange;
+        public NativePlane Plane0;
+        public NativePlane Plane1;
+        public NativePlane Plane2;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeDepth
+    {
+        public uint Format;
+        public uint Width;
+        public uint Height;
+        public NativePlane Plane;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeFrame
+    {
+        public ulong TimestampNs;
+        public NativeColour Colour;
+        public NativeDepth Depth;
+        public NativeDepth Confidence;
+        public uint Rotation;
+        [MarshalAs(UnmanagedType.U1)] public bool Mirrored;
+        public IntPtr Cameras;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeRung
+    {
+        public uint Method;
+        public IntPtr Network;
+        public uint Width;
+        public uint Height;
+        public int LocalSteps;
+        public int MidpointSteps;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeImage
+    {
+        public IntPtr Data;
+        public UIntPtr Length;
+        public uint Width;
+        public uint Height;
+        public uint PixelBytes;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativePlacement
+    {
+        public uint Layout;
+        [MarshalAs(UnmanagedType.U1)] public bool FlipX;
+        [MarshalAs(UnmanagedType.U1)] public bool FlipY;
+        public int ShiftX;
+        public int ShiftY;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
+    internal struct NativeListener
+    {
+        public IntPtr Context;
+        public Native.OnHologram OnHologram;
+        public Native.OnDropped OnDropped;
+        public Native.OnFailed OnFailed;
+        public Native.OnQualityChanged OnQualityChanged;
+    }
+
+    // IL2CPP looks for an attribute of this name on what native code calls back.
+    [AttributeUsage(AttributeTargets.Method)]
+    internal sealed class MonoPInvokeCallbackAttribute : Attribute
+    {
+        public MonoPInvokeCallbackAttribute(Type type) { }
+    }
+
+    internal static class Native
+    {
+#if UNITY_IOS && !UNITY_EDITOR
+        private const string Library = "__Internal";
+#else
+        private const string Library = "phasefront_c";
+#endif
+        private const CallingConvention C = CallingConvention.Cdecl;
+
+        [UnmanagedFunctionPointer(C)] public delegate void OnHologram(IntPtr context, IntPtr hologram);
+        [UnmanagedFunctionPointer(C)] public delegate void OnDropped(IntPtr context, ulong timestampNs, DropReason reason);
+        [UnmanagedFunctionPointer(C)] public delegate void OnFailed(IntPtr context, ulong timestampNs, IntPtr message);
+        [UnmanagedFunctionPointer(C)] public delegate void OnQualityChanged(IntPtr context, ulong timestampNs, QualityChange change);
+
+        [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_version();
+        [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_last_error();
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_from_toml(byte[] toml, out IntPtr target);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_with_look_up_table(byte[] toml, byte[] levels, UIntPtr count, out IntPtr target);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_from_bytes(byte[] file, UIntPtr length, out IntPtr target);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_target_size(Target target, out uint width, out uint height);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_target_free(IntPtr target);
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_built_in(byte[] name, out IntPtr network);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_network_from_bytes(byte[] onnx, UIntPtr length, out IntPtr network);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_network_free(IntPtr network);
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_new(Target target, uint method, IntPtr network, out IntPtr options);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_options_free(IntPtr options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_clear_ladder(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_push_rung(SessionOptions options, ref NativeRung rung);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_target_rate_hz(SessionOptions options, double rateHz);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_double_phase(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_anti_alias(SessionOptions options, float sigma, uint width);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_band_limit(SessionOptions options, float k);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_deep(SessionOptions options, Network prefilter);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_steady(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_fixed(SessionOptions options, float scale);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_frame_max(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_dark(SessionOptions options, float dark);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_local_steps(SessionOptions options, uint steps);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_midpoint_steps(SessionOptions options, uint steps);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_depth_range(SessionOptions options, float nearM, float farM);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_least_confidence(SessionOptions options, float confidence);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_threads(SessionOptions options, uint threads);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_most_pixels(SessionOptions options, ulong pixels);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_backend(SessionOptions options, Backend backend);
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_new(SessionOptions options, RunningMode mode, IntPtr listener, out IntPtr session);
+        [DllImport(Library, CallingConvention = C, EntryPoint = "pf_session_new")] public static extern Status pf_session_new_live(SessionOptions options, RunningMode mode, ref NativeListener listener, out IntPtr session);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_session_free(IntPtr session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_process(Session session, ref NativeFrame frame, out IntPtr hologram);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_submit(Session session, ref NativeFrame frame, out DropReason dropped);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_warm_up(Session session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_reset(Session session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_pause(Session session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_resume(Session session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_set_thermal(Session session, Thermal thermal);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_rung(Session session, uint rung);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_step_by_itself(Session session);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(Session session, out Statistics statistics);
+
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_info(Hologram hologram, out HologramInfo info);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_levels(Hologram hologram, uint colour, out IntPtr levels, out UIntPtr length);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_z_at(Hologram hologram, double x, double y, out double zMm);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_preview(Hologram hologram, double zMm, uint width, uint height, out IntPtr image);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_output(Hologram hologram, ref NativePlacement placement, uint number, out IntPtr image);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_hologram_free(IntPtr hologram);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_image_info(IntPtr image, out NativeImage info);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_image_free(IntPtr image);
+    }
+}

@@ -1,0 +1,143 @@
+using System;
+using static Phasefront.PhasefrontException;
+
+namespace Phasefront
+{
+    /// <summary>What makes holograms.</summary>
+    public enum Method : uint
+    {
+        /// <summary>The network that is built in, or the plane sweep where it was not trained for the display.</summary>
+        Usual = 0,
+        /// <summary>A trained network.</summary>
+        Trained = 1,
+        /// <summary>The plane sweep, for any display: slower, and nothing needs to be trained.</summary>
+        Sweep = 2,
+        /// <summary>For each frame what suits its depth: the sweep where it is sharp, the network where it is ragged.</summary>
+        BySharpness = 3,
+    }
+
+    /// <summary>Where frames are computed.</summary>
+    public enum Backend : uint
+    {
+        /// <summary>On the CPU.</summary>
+        Cpu = 0,
+        /// <summary>On the GPU, where the library was built for it and there is one; else on the CPU.</summary>
+        Gpu = 1,
+    }
+
+    /// <summary>
+    /// What a session makes, and how. A new one has what is usual for its target; set what is not. Of one thread at a
+    /// time.
+    /// </summary>
+    public sealed class SessionOptions : NativeObject
+    {
+        private SessionOptions(IntPtr handle) : base(handle) { }
+
+        /// <summary>What is usual for <paramref name="target"/>.</summary>
+        public static SessionOptions For(Target target, Method method = Method.Usual, Network network = null)
+        {
+            return With(network, native =>
+            {
+                Check(Native.pf_options_new(target, (uint)method, native, out var options));
+                return new SessionOptions(options);
+            });
+        }
+
+        // The network may not end while C reads it.
+        private static T With<T>(Network network, Func<IntPtr, T> call)
+        {
+            if (network == null) return call(IntPtr.Zero);
+            var held = false;
+            try
+            {
+                network.DangerousAddRef(ref held);
+                return call(network.DangerousGetHandle());
+            }
+            finally
+            {
+                if (held) network.DangerousRelease();
+            }
+        }
+
+        /// <summary>Takes all rungs from the ladder; at least one is to be pushed then.</summary>
+        public void ClearLadder() => Check(Native.pf_options_clear_ladder(this));
+
+        /// <summary>
+        /// Adds a rung to the ladder, below those that are there: a method, a resolution, and how often what is shown is
+        /// corrected; below 0 as often as in the session.
+        /// </summary>
+        public void PushRung(Method method, Network network, int width, int height, int localSteps = -1, int midpointSteps = -1)
+        {
+            With(network, native =>
+            {
+                var rung = new NativeRung
+                {
+                    Method = (uint)method,
+                    Network = native,
+                    Width = (uint)width,
+                    Height = (uint)height,
+                    LocalSteps = localSteps,
+                    MidpointSteps = midpointSteps,
+                };
+                Check(Native.pf_options_push_rung(this, ref rung));
+                return true;
+            });
+        }
+
+        /// <summary>Frames a second that are aimed at; 0 takes frames as they come and never steps on the ladder.</summary>
+        public double TargetRateHz { set => Check(Native.pf_options_set_target_rate_hz(this, value)); }
+
+        /// <summary>Encodes by double phase on the field as it is.</summary>
+        public void DoublePhase() => Check(Native.pf_options_set_double_phase(this));
+
+        /// <summary>Encodes behind a small Gaussian blur (AA-DPM).</summary>
+        public void AntiAlias(float sigma = 0.7f, int width = 3) =>
+            Check(Native.pf_options_set_anti_alias(this, sigma, (uint)width));
+
+        /// <summary>Encodes with high diagonal frequencies cut (BL-DPM).</summary>
+        public void BandLimit(float k = 1) => Check(Native.pf_options_set_band_limit(this, k));
+
+        /// <summary>Encodes behind a pre-filter network (DDPM), trained together with the hologram network.</summary>
+        public void Deep(Network prefilter) => Check(Native.pf_options_set_deep(this, prefilter));
+
+        /// <summary>Full light stands near the frame's largest amplitude, moving smoothly. The default.</summary>
+        public void SteadyBrightness() => Check(Native.pf_options_set_brightness_steady(this));
+
+        /// <summary>Full light stands for this amplitude; what is brighter is clipped.</summary>
+        public void FixedBrightness(float scale) => Check(Native.pf_options_set_brightness_fixed(this, scale));
+
+        /// <summary>Full light stands for the frame's largest amplitude.</summary>
+        public void FrameMaxBrightness() => Check(Native.pf_options_set_brightness_frame_max(this));
+
+        /// <summary>Where the amplitude is below this share of full light, phases are drawn to 0.</summary>
+        public float Dark { set => Check(Native.pf_options_set_dark(this, value)); }
+
+        /// <summary>Steps of correction, 0 to 8.</summary>
+        public int LocalSteps { set => Check(Native.pf_options_set_local_steps(this, checked((uint)value))); }
+
+        /// <summary>Steps of correction at the midpoint, 0 to 100: 3 for stills, 1 for video.</summary>
+        public int MidpointSteps { set => Check(Native.pf_options_set_midpoint_steps(this, checked((uint)value))); }
+
+        /// <summary>Shows these metres at the ends of the volume.</summary>
+        public void DepthRange(float nearM, float farM) => Check(Native.pf_options_set_depth_range(this, nearM, farM));
+
+        /// <summary>Readings less sure than this, in 0 to 1, are none.</summary>
+        public float LeastConfidence { set => Check(Native.pf_options_set_least_confidence(this, value)); }
+
+        /// <summary>Threads to compute with, 1 to 256.</summary>
+        public int Threads { set => Check(Native.pf_options_set_threads(this, checked((uint)value))); }
+
+        /// <summary>Most pixels of a rung and of the modulator.</summary>
+        public long MostPixels { set => Check(Native.pf_options_set_most_pixels(this, checked((ulong)value))); }
+
+        /// <summary>Where frames are computed.</summary>
+        public Backend Backend { set => Check(Native.pf_options_set_backend(this, value)); }
+
+        /// <summary>Ends it.</summary>
+        protected override bool ReleaseHandle()
+        {
+            Native.pf_options_free(handle);
+            return true;
+        }
+    }
+}

@@ -1,0 +1,51 @@
+// Shows holograms of a camera's colour and depth textures on a screen that is the modulator: put it on an object with a
+// RawImage that fills the modulator's display, and call Submit for each frame.
+using System.Collections.Concurrent;
+using Phasefront;
+using UnityEngine;
+using UnityEngine.UI;
+
+public sealed class HologramView : MonoBehaviour, IListener
+{
+    [SerializeField] private RawImage modulator;
+    [SerializeField] private int width = 1920;
+    [SerializeField] private int height = 1080;
+
+    private readonly ConcurrentQueue<Hologram> made = new ConcurrentQueue<Hologram>();
+    private Session session;
+    private Texture2D texture;
+
+    private void OnEnable()
+    {
+        using (var target = Target.FromToml($"width = {width}\nheight = {height}"))
+        using (var options = SessionOptions.For(target))
+            session = Session.Open(options, RunningMode.LiveStream, this);
+        texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true);
+        modulator.texture = texture;
+    }
+
+    private void OnDisable()
+    {
+        session.Dispose();
+        while (made.TryDequeue(out var hologram)) hologram.Dispose();
+        Destroy(texture);
+    }
+
+    public DropReason Submit(Frame frame) => session.Submit(frame);
+
+    private void Update()
+    {
+        while (made.TryDequeue(out var hologram))
+            using (hologram)
+            {
+                // Unity's first row is the lowest.
+                texture.LoadRawTextureData(hologram.Output(Layout.Rgba, flipY: true).Bytes);
+                texture.Apply();
+            }
+    }
+
+    public void OnHologram(Hologram hologram) => made.Enqueue(hologram);
+    public void OnDropped(ulong timestampNs, DropReason reason) { }
+    public void OnFailed(ulong timestampNs, string message) => Debug.LogWarning(message);
+    public void OnQualityChanged(ulong timestampNs, QualityChange change) { }
+}

@@ -1,0 +1,276 @@
+// The package's tests, which need no Unity: `Tests SUITE MODELS LEVELS VERSION` runs the conformance suite, whose levels must be
+// the bits that Rust left, and what a listener hears.
+using System;
+using System.Collections;
+using System.Collections.Generic;
+using System.IO;
+using System.Linq;
+using System.Threading;
+using System.Web.Script.Serialization;
+using Phasefront;
+
+internal static class Tests
+{
+    private static readonly string[] Colours = { "rgba", "bgra", "rgb", "nv12", "yuv420" };
+    private static readonly string[] Matrices = { "bt601", "bt709" };
+    private static readonly string[] Depths =
+    {
+        "metres-f32", "metres-f16", "disparity-f32", "disparity-f16", "millimetres-u16", "android-depth16",
+        "normalized-u8", "normalized-u16",
+    };
+    private static readonly string[] Confidences = { "low-medium-high", "u8" };
+    private static readonly string[] Modes = { "image", "video" };
+
+    private static int Main(string[] arguments)
+    {
+        if (arguments.Length != 4)
+        {
+            Console.Error.WriteLine("usage: Tests SUITE MODELS LEVELS VERSION");
+            return 2;
+        }
+        Require(Library.Version == arguments[3], "version " + Library.Version);
+        Conformance(arguments[0], arguments[1], File.ReadAllBytes(Path.Combine(arguments[2], "levels.bin")));
+        Mistakes();
+        Live();
+        return 0;
+    }
+
+    private static void Require(bool holds, string what)
+    {
+        if (!holds) throw new Exception("not so: " + what);
+    }
+
+    private static IDictionary<string, object> Object(object json) => (IDictionary<string, object>)json;
+    private static int Int(object json) => Convert.ToInt32(json);
+
+    private static void Conformance(string suite, string models, byte[] expected)
+    {
+        var json = new JavaScriptSerializer { MaxJsonLength = int.MaxValue };
+        var all = Object(json.DeserializeObject(File.ReadAllText(Path.Combine(suite, "cases.json"))));
+        var memory = File.ReadAllBytes(Path.Combine(suite, "frames.bin"));
+        var got = new List<byte>();
+        var cases = (IEnumerable)all["cases"];
+        var ran = 0;
+        foreach (var one in cases)
+        {
+            Run(Object(one), suite, models, memory, got);
+            Require(got.SequenceEqual(expected.Take(got.Count)), Object(one)["name"] + ": the bits that Rust has");
+            ran++;
+        }
+        Require(ran > 0 && got.Count == expected.Length, "all levels of the suite");
+        Console.WriteLine("{0} cases, {1} levels: the bits that Rust has", ran, got.Count);
+    }
+
+    private static Plane PlaneOf(object json, byte[] memory)
+    {
+        var plane = Object(json);
+        var bytes = new byte[Int(plane["length"])];
+        Array.Copy(memory, Int(plane["offset"]), bytes, 0, bytes.Length);
+        return new Plane(bytes, Int(plane["row_stride"]), Int(plane["pixel_stride"]));
+    }
+
+    private static Frame FrameOf(object json, byte[] memory)
+    {
+        var frame = Object(json);
+        var colour = Object(frame["colour"]);
+        var depth = Object(frame["depth"]);
+        return new Frame
+        {
+            TimestampNs = Convert.ToUInt64(frame["timestamp_ns"]),
+            Colour = new Colour
+            {
+                Format = (ColourFormat)Array.IndexOf(Colours, colour["format"]),
+                Width = Int(colour["width"]),
+                Height = Int(colour["height"]),
+                Matrix = (YuvMatrix)Array.IndexOf(Matrices, colour["matrix"]),
+                VideoRange = (bool)colour["video_range"],
+                Planes = ((IEnumerable)colour["planes"]).Cast<object>().Select(plane => PlaneOf(plane, memory)).ToArray(),
+            },
+            Depth = new Depth
+            {
+                Format = (DepthFormat)Array.IndexOf(Depths, depth["format"]),
+                Width = Int(depth["width"]),
+                Height = Int(depth["height"]),
+                Plane = PlaneOf(depth["plane"], memory),
+            },
+            Confidence = frame["confidence"] == null ? (Confidence?)null : ConfidenceOf(frame["confidence"], memory),
+            Rotation = (Rotation)(Int(frame["rotation"]) / 90),
+            Mirrored = (bool)frame["mirrored"],
+        };
+    }
+
+    private static Confidence ConfidenceOf(object json, byte[] memory)
+    {
+        var map = Object(json);
+        return new Confidence
+        {
+            Format = (ConfidenceFormat)Array.IndexOf(Confidences, map["format"]),
+            Width = Int(map["width"]),
+            Height = Int(map["height"]),
+            Plane = PlaneOf(map["plane"], memory),
+        };
+    }
+
+    private static Target TargetOf(IDictionary<string, object> one, string suite)
+    {
+        if (one["calibration"] != null)
+            return Target.FromBytes(File.ReadAllBytes(Path.Combine(suite, (string)one["calibration"])));
+        if (one["lut"] == null) return Target.FromToml((string)one["display"]);
+        var levels = ((IEnumerable)one["lut"]).Cast<object>().Select(level => (byte)Int(level)).ToArray();
+        return Target.WithLookUpTable((string)one["display"], levels);
+    }
+
+    private static Network Model(string models, string file) => Network.FromBytes(File.ReadAllBytes(Path.Combine(models, file)));
+
+    private static SessionOptions OptionsOf(IDictionary<string, object> one, Target target, string models)
+    {
+        var name = (string)one["method"];
+        var method = name == "sweep" ? Method.Sweep : name == "by-sharpness" ? Method.BySharpness : Method.Trained;
+        var builtIn = name == "network" || name == "by-sharpness";
+        using (var network = method == Method.Sweep ? null : builtIn ? Network.BuiltIn() : Model(models, name))
+        {
+            var options = SessionOptions.For(target, method, network);
+            switch ((string)one["encoding"])
+            {
+                case "double-phase":
+                    options.DoublePhase();
+                    break;
+                case "anti-alias":
+                    options.AntiAlias();
+                    break;
+                case "band-limit":
+                    options.BandLimit();
+                    break;
+                default:
+                    using (var prefilter = Model(models, (string)one["encoding"])) options.Deep(prefilter);
+                    break;
+            }
+            if (one["brightness"] != null) options.FixedBrightness(Convert.ToSingle(one["brightness"]));
+            if (one["range"] != null)
+            {
+                var range = ((IEnumerable)one["range"]).Cast<object>().Select(Convert.ToSingle).ToArray();
+                options.DepthRange(range[0], range[1]);
+            }
+            return options;
+        }
+    }
+
+    private static void Run(IDictionary<string, object> one, string suite, string models, byte[] memory, List<byte> got)
+    {
+        using (var target = TargetOf(one, suite))
+        using (var options = OptionsOf(one, target, models))
+        using (var session = Session.Open(options, (RunningMode)Array.IndexOf(Modes, one["mode"])))
+        {
+            foreach (var frame in (IEnumerable)one["frames"])
+                using (var hologram = session.Process(FrameOf(frame, memory)))
+                    for (var colour = 0; colour < 3; colour++) got.AddRange(hologram.Levels(colour));
+        }
+    }
+
+    private static void Refused(Status status, string word, Action call)
+    {
+        try
+        {
+            call();
+        }
+        catch (PhasefrontException error)
+        {
+            Require(error.Status == status && error.Message.Contains(word), error.Status + ": " + error.Message);
+            return;
+        }
+        throw new Exception("nothing was refused that is about " + word);
+    }
+
+    private static Frame Sample(ulong timestampNs) => new Frame
+    {
+        TimestampNs = timestampNs,
+        Colour = new Colour
+        {
+            Format = ColourFormat.Rgb,
+            Width = 48,
+            Height = 36,
+            Planes = new[] { new Plane(Enumerable.Range(0, 48 * 36 * 3).Select(i => (byte)i).ToArray(), 48 * 3, 3) },
+        },
+        Depth = new Depth
+        {
+            Format = DepthFormat.NormalizedU8,
+            Width = 48,
+            Height = 36,
+            Plane = new Plane(Enumerable.Range(0, 48 * 36).Select(i => (byte)(i % 251)).ToArray(), 48, 1),
+        },
+    };
+
+    private static void Mistakes()
+    {
+        Refused(Status.Display, "width", () => Target.FromToml("width = 0"));
+        Refused(Status.Network, "rgbd-9", () => Network.BuiltIn("rgbd-9"));
+        using (var target = Target.FromToml("width = 48\nheight = 36"))
+        using (var options = SessionOptions.For(target, Method.Sweep))
+        {
+            Require(target.Size.Equals((48, 36)), "the display's size");
+            Refused(Status.Session, "listener", () => Session.Open(options, RunningMode.LiveStream));
+            using (var session = Session.Open(options, RunningMode.Video))
+            {
+                var frame = Sample(2);
+                using (var hologram = session.Process(frame))
+                {
+                    Require(hologram.Info.Width == 48 && float.IsNaN(hologram.Info.NearM), "what is known");
+                    var image = hologram.Output(Layout.Rgba);
+                    Require(image.Bytes.Length == 48 * 36 * 4 && image.Bytes[0] == hologram.Levels(0)[0], "its image");
+                    Require(hologram.Preview(hologram.ZAt(0.5, 0.5), 24, 18).Width == 24, "its preview");
+                }
+                Refused(Status.Timestamp, "2", () => session.Process(frame));
+                frame.TimestampNs = 3;
+                frame.Depth.Width = 480;
+                Refused(Status.Frame, "depth", () => session.Process(frame));
+                session.Dispose();
+                try
+                {
+                    session.WarmUp();
+                    throw new Exception("a session that has ended went on");
+                }
+                catch (ObjectDisposedException) { }
+            }
+        }
+    }
+
+    private sealed class Heard : IListener
+    {
+        public int Holograms, Dropped;
+
+        public void OnHologram(Hologram hologram)
+        {
+            using (hologram) Interlocked.Increment(ref Holograms);
+            throw new Exception("a listener may throw");
+        }
+
+        public void OnDropped(ulong timestampNs, DropReason reason) => Interlocked.Increment(ref Dropped);
+
+        public void OnFailed(ulong timestampNs, string message) => Console.Error.WriteLine(message);
+
+        public void OnQualityChanged(ulong timestampNs, QualityChange change) { }
+    }
+
+    private static void Live()
+    {
+        var heard = new Heard();
+        using (var target = Target.FromToml("width = 48\nheight = 36"))
+        using (var options = SessionOptions.For(target))
+        {
+            options.TargetRateHz = 1000;
+            options.ClearLadder();
+            options.PushRung(Method.Sweep, null, 48, 36);
+            options.PushRung(Method.Sweep, null, 24, 18, localSteps: 0);
+            var session = Session.Open(options, RunningMode.LiveStream, heard);
+            session.WarmUp();
+            for (var i = 1ul; i <= 20; i++) session.Submit(Sample(i * 1000000));
+            while (session.Statistics.Pending > 0) Thread.Sleep(1);
+            var statistics = session.Statistics;
+            Require(statistics.Submitted == 20 && statistics.Processed + statistics.Dropped == 20, "statistics");
+            session.Dispose();
+            Require(heard.Holograms > 0 && heard.Holograms + heard.Dropped == 20, "each frame is told of once");
+            Require(session.ListenerFailures == heard.Holograms, "what a listener throws is counted");
+        }
+        Console.WriteLine("mistakes are told, a live stream ends");
+    }
+}
