@@ -6,6 +6,7 @@ mod calibrate;
 mod compare;
 mod dataset;
 mod devices;
+mod doctor;
 mod evaluate;
 mod flags;
 mod frame;
@@ -62,6 +63,7 @@ enum Command {
     Video(video::Video),
     Multiplex(multiplex::MultiplexCommand),
     Devices(devices::Devices),
+    Doctor(doctor::Doctor),
     Pack(pack::Pack),
     Unpack(pack::Unpack),
     Show(show::Show),
@@ -102,6 +104,7 @@ impl Phasefront {
             }
             Command::Multiplex(command) => command.run(json),
             Command::Devices(command) => command.run(json),
+            Command::Doctor(command) => command.run(json),
             Command::Pack(command) => command.run(json),
             Command::Unpack(command) => command.run(json),
             Command::Show(command) => command.run(json),

@@ -7,6 +7,7 @@ pub mod corrected;
 pub mod dataset;
 pub mod depth_network;
 pub mod depth_study;
+pub mod doctor;
 pub mod error;
 pub mod evaluate;
 pub mod files;
