@@ -1,4 +1,6 @@
-"""What is generated, with its documents. `_ffi.pyi` has its types."""
+"""What is generated, with its documents, and its fields where it is shown. `_ffi.pyi` has its types."""
+
+import dataclasses as _dataclasses
 
 from ._documents import DOCUMENTS as _DOCUMENTS
 from .ffi import phasefront_ffi as _generated
@@ -9,3 +11,6 @@ for _name, _document in _DOCUMENTS.items():
     for _part in _name.split("."):
         _described = getattr(_described, _part)
     getattr(_described, "__func__", _described).__doc__ = _document
+    if _dataclasses.is_dataclass(_described):
+        # That of a dataclass knows no fields here, for what is generated declares none.
+        _described.__repr__ = _described.__str__

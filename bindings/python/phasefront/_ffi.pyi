@@ -78,8 +78,7 @@ class DepthFormat(enum.Enum):
         DISPARITY_F32: Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
         DISPARITY_F16: Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
         MILLIMETRES_U16: Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
-        ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3. Not the same as millimetres
-    in all 16.
+        ANDROID_DEPTH16: Android's DEPTH16: millimetres in the lower 13 bits, a confidence in the upper 3. Not the same as millimetres in all 16.
         NORMALIZED_U8: 0 nearest to 255 farthest; every pixel is a reading.
         NORMALIZED_U16: 0 nearest to 65535 farthest; every pixel is a reading.
     """
@@ -304,8 +303,7 @@ class Backend(enum.Enum):
 
     Values:
         CPU: On the CPU.
-        GPU: On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU.
-    The statistics' `backend` and `backend_why` say which it is, and why.
+        GPU: On the GPU, where this library was built for it, there is one and it answers as the CPU does; else on the CPU. The statistics' `backend` and `backend_why` say which it is, and why.
     """
     CPU = 0
     GPU = 1
@@ -319,8 +317,7 @@ class DropReason(enum.Enum):
         PAUSED: The session was paused.
         RESET: The session was reset before it was done.
         CLOSED: The session was closed before it was done.
-        UNREAD: It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages'
-    streams say so.
+        UNREAD: It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages' streams say so.
         OTHER: For a reason that this version of the bindings does not know.
     """
     SUPERSEDED = 0

@@ -47,3 +47,9 @@ def test_options_can_all_be_changed():
 def test_types_and_version_come_along():
     assert importlib.resources.files(phasefront).joinpath("py.typed").is_file()
     assert phasefront.__version__ == phasefront.version()
+
+
+def test_what_is_shown_has_its_fields():
+    assert repr(phasefront.Display(width=64)).startswith("Display(width=64, height=1080, ")
+    assert repr([phasefront.Method.SWEEP()]) == "[Method.SWEEP()]"
+    assert repr(phasefront.Quality.FIXED(rung=1)) == "Quality.FIXED(rung=1)"
