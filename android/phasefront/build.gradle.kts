@@ -9,8 +9,9 @@ plugins {
 }
 
 val workspace: File = rootDir.parentFile
-val phasefrontVersion: String = Regex("""(?m)^version = "(.+)"$""")
+fun ofCargo(key: String): String = Regex("""(?m)^$key = "(.+)"$""")
     .find(workspace.resolve("Cargo.toml").readText())!!.groupValues[1]
+val phasefrontVersion = ofCargo("version")
 
 group = "org.phasefront"
 version = phasefrontVersion
@@ -89,10 +90,21 @@ mavenPublishing {
     pom {
         name.set("Phasefront")
         description.set("RGB-D frames to phase-only 3D holograms, on the device")
+        url.set(ofCargo("homepage"))
         licenses {
             license {
                 name.set("MIT OR Apache-2.0")
             }
+        }
+        developers {
+            developer {
+                name.set("The Phasefront developers")
+                url.set(ofCargo("homepage"))
+            }
+        }
+        scm {
+            url.set(ofCargo("repository"))
+            connection.set("scm:git:${ofCargo("repository")}.git")
         }
     }
 }

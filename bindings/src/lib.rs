@@ -1,4 +1,5 @@
-//! Phasefront for Swift, Kotlin and Python, and under `bindings/c` for C. This crate only translates: what a call does, is the core's.
+//! Phasefront for Swift, Kotlin and Python, and under `bindings/c` for C. This crate only translates: what a call does,
+//! is the core's.
 //!
 //! The packages in `ios/`, `android/` and `bindings/python/` put a layer by hand over what is generated from here, so
 //! that it feels native there; the objects named `Raw…` are for them alone. Rules of this border:

@@ -312,9 +312,9 @@ typedef struct PfQualityChange {
   enum PfQualityReason reason;
 } PfQualityChange;
 
-// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the order
-// in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No exception may
-// leave a call.
+// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
+// order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
+// exception may leave a call.
 typedef struct PfListener {
   // Given to each call.
   void *context;
@@ -546,8 +546,8 @@ enum PfStatus pf_options_set_brightness_fixed(struct PfOptions *options, float s
 // Full light stands for the frame's largest amplitude.
 enum PfStatus pf_options_set_brightness_frame_max(struct PfOptions *options);
 
-// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the
-// dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
+// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
+// the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
 enum PfStatus pf_options_set_dark(struct PfOptions *options, float dark);
 
 // Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted. Not set, they suit
@@ -631,8 +631,8 @@ const char *pf_version(void);
 // default value, so "" is the default display.
 enum PfStatus pf_target_from_toml(const char *toml, struct PfTarget **target);
 
-// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows the
-// phase 2*pi*i/256.
+// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows
+// the phase 2*pi*i/256.
 enum PfStatus pf_target_with_look_up_table(const char *toml,
                                            const uint8_t *levels,
                                            size_t count,

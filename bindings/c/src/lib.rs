@@ -1,6 +1,6 @@
-//! Phasefront for C, and for what speaks C: C++, C#, Unity, Unreal, Flutter, Qt. It only translates to `phasefront-ffi`,
-//! which serves the other languages. `include/phasefront.h` is made from here by cbindgen, and says the rules of this
-//! border. What is a number in C is checked before it is an enum here.
+//! Phasefront for C, and for what speaks C: C++, C#, Unity, Unreal, Flutter, Qt. It only translates to
+//! `phasefront-ffi`, which serves the other languages. `include/phasefront.h` is made from here by cbindgen, and says
+//! the rules of this border. What is a number in C is checked before it is an enum here.
 //!
 //! # Safety
 //! Of every call: pointers are NULL, which is refused, or point to what their type says, as many of it as the length

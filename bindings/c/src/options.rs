@@ -222,8 +222,8 @@ pub unsafe extern "C" fn pf_options_set_brightness_frame_max(options: *mut PfOpt
     unsafe { brighten(options, Brightness::FrameMax) }
 }
 
-/// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the
-/// dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
+/// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
+/// the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_dark(options: *mut PfOptions, dark: f32) -> PfStatus {
     // SAFETY: the rules of this border.

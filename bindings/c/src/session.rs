@@ -122,9 +122,9 @@ impl From<QualityChange> for PfQualityChange {
     }
 }
 
-/// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the order
-/// in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No exception may
-/// leave a call.
+/// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
+/// order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
+/// exception may leave a call.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PfListener {

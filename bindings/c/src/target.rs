@@ -29,8 +29,8 @@ pub unsafe extern "C" fn pf_target_from_toml(toml: *const c_char, target: *mut *
     call(|| unsafe { give(target, "target", || Ok(given(Target::of_display(display(toml)?)?))) })
 }
 
-/// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows the
-/// phase 2*pi*i/256.
+/// A display, as in pf_target_from_toml, whose modulator was calibrated as a whole: of 256 levels the one at i shows
+/// the phase 2*pi*i/256.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_target_with_look_up_table(
     toml: *const c_char,
