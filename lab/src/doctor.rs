@@ -214,7 +214,10 @@ fn int8() -> Result<Check> {
         differ.extend((!same).then_some(isa.name()));
     }
     let says = match differ.is_empty() {
-        true => "all kernels give the bits of the portable one".into(),
+        true => {
+            let names: Vec<_> = Isa::int8().into_iter().map(Isa::name).collect();
+            format!("{}: one and the same bits", names.join(", "))
+        }
         false => format!("{} give other bits than the portable kernel", differ.join(", ")),
     };
     Ok(Check::new("int8 network", differ.is_empty(), says))

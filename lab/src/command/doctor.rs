@@ -85,8 +85,11 @@ impl Chosen {
             ),
             method,
             kernels,
-            encoder: EncoderFlags::default().read()?.describe(),
-            backend: "cpu; --backend gpu asks for a GPU",
+            encoder: format!(
+                "{}: the default, for any display and offset",
+                EncoderFlags::default().read()?.describe()
+            ),
+            backend: "cpu: the default; --backend gpu asks for a GPU",
         })
     }
 }
