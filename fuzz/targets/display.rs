@@ -13,8 +13,8 @@ fuzz_target!(|text: &str| {
         }
         Ok(display) => {
             let Ok(display) = display.with_size(6, 8) else { return };
-            // Wide volumes take seconds to plan, and are refused beyond what takes many.
-            if display.volume_depth_m() / display.pitch_m() > 2000.0 {
+            // Wide volumes take long to plan, and nothing else than narrow ones.
+            if display.volume_depth_m() / display.pitch_m() > 300.0 {
                 return;
             }
             let method = Method::Sweep(Sweep::for_display(&display));

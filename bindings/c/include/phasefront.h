@@ -1,10 +1,9 @@
-// Phasefront: RGB-D frames to phase-only holograms. Made by cbindgen from bindings/c/src; `PHASEFRONT_BLESS=1 cargo test
-// --release --workspace --test header` writes it anew.
+// Phasefront: RGB-D frames to phase-only holograms. Made by cbindgen: bindings/c/header writes it anew.
 //
-// Every call gives a PfStatus; where it is not PF_STATUS_OK, pf_last_error has one line that says what is wrong and what would
-// be right, and nothing was written to what the call gives. Objects are opaque: what a call gives is yours until its free
-// function, which takes NULL too. Text is UTF-8. Any call may come from any thread; one PfOptions is for one thread at a time.
-// No panic leaves a call.
+// Every call gives a PfStatus; where it is not PF_STATUS_OK, pf_last_error has one line that says what is wrong and what
+// would be right, and nothing was written to what the call gives. Objects are opaque: what a call gives is yours until
+// its free function, which takes NULL too. Text is UTF-8. Any call may come from any thread; one PfOptions is for one
+// thread at a time. No panic leaves a call.
 
 #ifndef PHASEFRONT_H
 #define PHASEFRONT_H
