@@ -251,8 +251,8 @@ class Hologram:
 
     @property
     def levels(self) -> numpy.ndarray:
-        """The modulator levels in place, uint8, (3, H, W): red, green, blue."""
-        return _array(self._raw, self._raw.plane_address(0), (3, self.info.height, self.info.width))
+        """The modulator levels in place, uint8, (3, H, W): red, green, blue; or (1, H, W) for a display of one laser."""
+        return _array(self._raw, self._raw.plane_address(0), (self.info.colours, self.info.height, self.info.width))
 
     def z_at(self, x: float, y: float) -> float:
         """z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm."""
