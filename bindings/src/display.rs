@@ -23,6 +23,9 @@ pub struct Display {
     /// Wavelength of the blue laser, nm.
     #[uniffi(default = 450.0)]
     pub blue_nm: f64,
+    /// Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+    #[uniffi(default = None)]
+    pub laser_nm: Option<f64>,
     /// Depth of the volume, mm.
     #[uniffi(default = 6.0)]
     pub volume_depth_mm: f64,
@@ -50,7 +53,12 @@ impl From<phasefront::Display> for Display {
     fn from(display: phasefront::Display) -> Self {
         // Metres times 1e9 leave the last digit off (637.9999…).
         let round = |value: f64| (value * 1e6).round() / 1e6;
-        let [red_nm, green_nm, blue_nm] = display.wavelengths_m().map(|l| round(l * 1e9));
+        let nm: Vec<f64> = display.wavelengths_m().iter().map(|l| round(l * 1e9)).collect();
+        let ([red_nm, green_nm, blue_nm], laser_nm) = match nm[..] {
+            [red, green, blue] => ([red, green, blue], None),
+            // What the three are where nothing is said of them.
+            _ => ([638.0, 520.0, 450.0], nm.first().copied()),
+        };
         Display {
             width: display.width() as u32,
             height: display.height() as u32,
@@ -58,6 +66,7 @@ impl From<phasefront::Display> for Display {
             red_nm,
             green_nm,
             blue_nm,
+            laser_nm,
             volume_depth_mm: round(display.volume_depth_m() * 1e3),
             offset_mm: round(display.offset_m() * 1e3),
             bits: display.bits(),
@@ -77,6 +86,7 @@ impl TryFrom<&Display> for phasefront::Display {
             red_nm,
             green_nm,
             blue_nm,
+            laser_nm,
             volume_depth_mm,
             offset_mm,
             bits,
@@ -84,8 +94,12 @@ impl TryFrom<&Display> for phasefront::Display {
         } = display;
         // The TOML form is the core's own way in; `{:?}` writes floats so that they are read back the same, all but the
         // case of NaN.
+        let wavelengths_nm = match laser_nm {
+            Some(laser_nm) => vec![laser_nm],
+            None => vec![red_nm, green_nm, blue_nm],
+        };
         let toml = format!(
-            "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = [{red_nm:?}, {green_nm:?}, {blue_nm:?}]\n\
+            "width = {width}\nheight = {height}\npitch_um = {pitch_um:?}\nwavelengths_nm = {wavelengths_nm:?}\n\
              volume_depth_mm = {volume_depth_mm:?}\noffset_mm = {offset_mm:?}\nbits = {bits}\n\
              aperture_radius = {aperture_radius:?}"
         );
@@ -105,6 +119,11 @@ mod tests {
         assert_eq!((display.width, display.green_nm), (640, 521.5));
         let core = phasefront::Display::try_from(&display).unwrap();
         assert_eq!(core, phasefront::Display::from_toml(text).unwrap());
+        let usual = display_from_toml(String::new()).unwrap();
+        let one = display_from_toml("wavelengths_nm = [532]".into()).unwrap();
+        let laser_nm = Some(532.0);
+        assert_eq!(one, Display { laser_nm, ..usual });
+        assert_eq!(phasefront::Display::try_from(&one).unwrap().colours(), 1);
     }
 
     #[test]

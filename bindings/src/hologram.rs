@@ -23,6 +23,8 @@ pub struct HologramInfo {
     pub width: u32,
     /// Pixels along y.
     pub height: u32,
+    /// How many colours its levels have: 3, or 1 for a display of one laser.
+    pub colours: u32,
     /// The amplitude that full light stands for.
     pub scale: f32,
     /// Metres at the near end of the volume; none for normalized depth.
@@ -54,6 +56,7 @@ impl RawHologram {
                 timestamp_ns: self.core.timestamp_ns(),
                 width: width as u32,
                 height: height as u32,
+                colours: self.core.colours() as u32,
                 scale: self.core.scale(),
                 near_m,
                 far_m,
@@ -69,8 +72,8 @@ impl RawHologram {
         Ok(self)
     }
 
-    /// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours
-    /// follow one another without gaps, too. Valid as long as this object.
+    /// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
+    /// laser. The colours follow one another without gaps, too. Valid as long as this object.
     ///
     /// # Errors
     /// Another colour.

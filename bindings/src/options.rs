@@ -192,7 +192,7 @@ pub enum Layout {
     Rgba,
     /// One image, bytes blue, green, red, alpha 255.
     Bgra,
-    /// Three images, one after another: red, green, blue; a byte a pixel.
+    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
     Grey,
 }
 

@@ -21,7 +21,7 @@ fn folder() -> PathBuf {
 /// The levels that `hologram` holds, read as the other languages read them.
 fn levels(hologram: &RawHologram) -> Vec<u8> {
     let len = hologram.plane_len().unwrap() as usize;
-    (0..3)
+    (0..hologram.info().unwrap().colours)
         .flat_map(|colour| {
             let address = hologram.plane_address(colour).unwrap() as usize;
             // SAFETY: the hologram is alive, and its plane of `len` bytes lies there.
@@ -575,6 +575,10 @@ mod write {
                 frame
             })
             .collect();
+        cases.push(one);
+
+        let mut one = case("a display of one laser", vec![cases[0]["frames"][0].clone()]);
+        one["display"] = json!(format!("{display}wavelengths_nm = [532]\n"));
         cases.push(one);
 
         let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0)).collect();

@@ -197,10 +197,11 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
         .map(|_| Modulator::new((height, width), target, &options))
         .transpose()?;
     let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
-    let frame = test_frame(height, width)?;
+    let frame = test_frame(height, width)?.for_display(&target.display);
     let mut scratch = pipeline.scratch();
-    let mut field = vec![Complex32::ZERO; 3 * height * width];
-    let mut levels = vec![0; 3 * height * width];
+    let values = pipeline.colours() * height * width;
+    let mut field = vec![Complex32::ZERO; values];
+    let mut levels = vec![0; values];
     let mut times = Times::default();
     pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
     let start = Instant::now();

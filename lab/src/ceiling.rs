@@ -27,7 +27,7 @@ pub struct Ceiling {
     size: usize,
     aperture_radius: f64,
     /// z, the way there from the modulator and the way back: the midpoint's first.
-    planes: Vec<(f64, [Propagator; 3], [Propagator; 3])>,
+    planes: Vec<(f64, Vec<Propagator>, Vec<Propagator>)>,
 }
 
 impl Ceiling {
@@ -58,7 +58,7 @@ impl Ceiling {
         self.planes.iter().map(|(z_m, ..)| *z_m).collect()
     }
 
-    /// Takes `phases`, (3, H, W), toward the amplitudes `wanted`, (3, H, W) at each of [`Self::z_m`], over the
+    /// Takes `phases`, (C, H, W), toward the amplitudes `wanted`, (C, H, W) at each of [`Self::z_m`], over the
     /// amplitude that full light stands for.
     pub fn optimise(&self, phases: &mut [f32], wanted: &[Vec<f32>], steps: usize) {
         let plane = self.size * self.size;

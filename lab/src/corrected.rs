@@ -39,13 +39,13 @@ pub const BLEND: f64 = 0.28;
 /// ends the last one holds.
 pub struct Correction {
     z_m: Vec<f64>,
-    /// For each distance (3, W', H'): transposed, as spectra are kept.
+    /// For each distance (C, W', H'): transposed, as spectra are kept.
     kernels: Vec<Array3<Complex32>>,
 }
 
 impl Correction {
     /// Takes, for each of `z_m` (ascending, metres against z = 0, positive toward the viewer), the kernels of the
-    /// three colours, (3, H', W'): a factor for each frequency of the padded plane in the order of the
+    /// colours, (C, H', W'): a factor for each frequency of the padded plane in the order of the
     /// discrete Fourier transform, zero first; 1 leaves it as it is.
     ///
     /// The padded plane of a scene must be at least [`padded_shape`]; a kernel that moves light by more pixels
@@ -68,9 +68,9 @@ impl Correction {
         }
         let shape = kernels[0].dim();
         for (kernel, z) in kernels.iter().zip(&z_m) {
-            if kernel.dim() != shape || shape.0 != 3 || kernel.is_empty() {
+            if kernel.dim() != shape || kernel.is_empty() {
                 return refuse(format!(
-                    "the kernel of z = {z} m has shape {:?}; all must have one shape (3, H, W)",
+                    "the kernel of z = {z} m has shape {:?}; all must have one shape (C, H, W)",
                     kernel.dim()
                 ));
             }
@@ -105,7 +105,7 @@ impl Correction {
         };
         let kernels = (z_m.iter())
             .map(|&z| {
-                Array3::from_shape_fn((3, shape.0, shape.1), |(c, ky, kx)| {
+                Array3::from_shape_fn((display.colours(), shape.0, shape.1), |(c, ky, kx)| {
                     let lambda = display.wavelengths_m()[c];
                     let v = kernel(z, lambda, frequency(kx, shape.1), frequency(ky, shape.0));
                     Complex32::new(v.re as f32, v.im as f32)
@@ -160,7 +160,7 @@ impl Correction {
         let kernels = (z_m.iter())
             .map(|z| {
                 let aberration = aberrations.at(*z);
-                Array3::from_shape_fn((3, shape.0, shape.1), |(c, ky, kx)| {
+                Array3::from_shape_fn((display.colours(), shape.0, shape.1), |(c, ky, kx)| {
                     let (mu, nu) = (frequency(kx, shape.1), frequency(ky, shape.0));
                     let phase = aberration.phase(c, mu, nu, pitch_m);
                     Complex32::new(phase.cos() as f32, phase.sin() as f32)
@@ -200,19 +200,18 @@ pub fn padded_shape(height: usize, width: usize, display: &Display) -> Result<(u
 
 /// [`padded_shape`] with room for light that a correction moves by up to `reach_m`.
 fn padded_shape_with(height: usize, width: usize, display: &Display, reach_m: f64) -> Result<(usize, usize)> {
-    let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
     let more = (reach_m / display.pitch_m()).ceil() as usize;
     Ok(asm::padded_shape(
         height.saturating_add(more),
         width.saturating_add(more),
         display.pitch_m(),
-        longest,
+        display.longest_wavelength_m(),
         display.volume_depth_m(),
         Padding::Reach,
     )?)
 }
 
-/// The corrected complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
+/// The corrected complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` hears of
 /// the propagations done, of all.
 ///
 /// Memory: five buffers of (H', W') complex numbers beside the kernels, and 20 bytes a point.
@@ -233,16 +232,24 @@ pub fn hologram(
     }
     let (height, width) = ldi.shape();
     let shape @ (padded_height, padded_width) = correction.shape();
+    let of = correction.kernels[0].dim().0;
+    if of != display.colours() {
+        return Err(Error::Input(format!(
+            "correction: kernels of {of} colours for a display of {}; both must have as many",
+            display.colours()
+        )));
+    }
     let (least_height, least_width) = padded_shape(height, width, display)?;
     if padded_height < least_height || padded_width < least_width {
         return Err(Error::Input(format!(
             "correction: kernels of {padded_width}×{padded_height}; a scene of {width}×{height} needs at least {least_width}×{least_height}"
         )));
     }
-    let scene = Planes::of(ldi, planes);
+    let colours = display.colours();
+    let scene = Planes::of(&ldi.for_display(display), planes);
     let z = |k: usize| plane_z_m(k, planes, display);
     let Some(front) = scene.occupied.last().map(|(k, _)| *k) else {
-        return Ok(Array3::zeros((3, height, width)));
+        return Ok(Array3::zeros((colours, height, width)));
     };
     // For each distance with content: its kernel, and the planes from its first content to the front.
     let sweeps: Vec<_> = (0..correction.z_m.len())
@@ -263,7 +270,7 @@ pub fn hologram(
     let mut scratch = fft.scratch();
     let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
     let mut sum = vec![Complex32::ZERO; padded_height * padded_width];
-    let mut hologram = Array3::zeros((3, height, width));
+    let mut hologram = Array3::zeros((colours, height, width));
     let done = Cell::new(0);
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
         let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
@@ -277,7 +284,7 @@ pub fn hologram(
             home: transfer(-z(front)),
             done: &|| {
                 done.set(done.get() + 1);
-                progress(done.get(), 3 * propagations);
+                progress(done.get(), colours * propagations);
             },
         };
         sum.fill(Complex32::ZERO);

@@ -3,7 +3,7 @@
 //!
 //! A folder holds `manifest.json` and a `pair_000123.npz` for each scene with the arrays `rgb`, uint8
 //! (L, H, W, 4), RGBA, front first, alpha 0 where there is no hit; `depth`, uint16 (L, H, W), d·65535;
-//! and `hologram`, complex64 (3, H, W), at the midpoint, carrier left out.
+//! and `hologram`, complex64 (C, H, W), C being 1 for a display of one laser, at the midpoint, carrier left out.
 //!
 //! For a display with an aberration the holograms are those of SM-LBM's correcting variant; a network trained on them
 //! corrects by itself.
@@ -178,6 +178,11 @@ impl Manifest {
                 format!("format is {:?}; it must be {FORMAT:?}", manifest.format),
             ));
         }
+        if !manifest.aberration.is_empty() {
+            let aberration = table::aberrations(&manifest.aberration);
+            let checked = aberration.and_then(|aberration| aberration.check(&manifest.display));
+            checked.map_err(|e| Error::file(&path, e))?;
+        }
         Ok(manifest)
     }
 
@@ -305,7 +310,7 @@ fn write_pair(path: &Path, ldi: &Ldi, hologram: &Array3<Complex32>) -> Result<()
 pub struct Pair {
     /// The scene.
     pub ldi: Ldi,
-    /// Its complex midpoint hologram, (3, H, W), carrier left out.
+    /// Its complex midpoint hologram, (C, H, W), carrier left out.
     pub hologram: Array3<Complex32>,
 }
 
@@ -355,10 +360,13 @@ pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> 
     let rgb: Array4<u8> = npy::read(&rgb).map_err(|e| damaged(&e))?;
     let depth = bytes("depth", 2 * manifest.ldi_layers * pixels)?;
     let depth: Array3<u16> = npy::read(&depth).map_err(|e| damaged(&e))?;
-    let hologram = bytes("hologram", 24 * pixels)?;
+    let colours = manifest.display.colours();
+    let hologram = bytes("hologram", 8 * colours * pixels)?;
     let hologram: Array3<Complex32> = npy::read(&hologram).map_err(|e| damaged(&e))?;
     let (layers, size) = (manifest.ldi_layers, manifest.size);
-    if rgb.dim() != (layers, size, size, 4) || depth.dim() != (layers, size, size) || hologram.dim() != (3, size, size)
+    if rgb.dim() != (layers, size, size, 4)
+        || depth.dim() != (layers, size, size)
+        || hologram.dim() != (colours, size, size)
     {
         return Err(damaged(&format!(
             "shapes {:?}, {:?} and {:?} are not those of {layers} layers of {size}×{size} pixels",

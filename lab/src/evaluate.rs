@@ -60,7 +60,7 @@ pub struct Method<'a> {
 }
 
 impl<'a> Method<'a> {
-    /// Any function from a scene to its midpoint hologram, (3, H, W), carrier left out.
+    /// Any function from a scene to its midpoint hologram, (C, H, W), carrier left out.
     pub fn new(name: impl Into<String>, field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a) -> Self {
         Method {
             name: name.into(),
@@ -70,8 +70,10 @@ impl<'a> Method<'a> {
     }
 
     /// The visible image itself as the field, with phase 0: what doing nothing is worth.
-    pub fn rgb() -> Self {
-        Self::new("rgb", |ldi| Ok(visible_rgb(ldi).mapv(Complex32::from)))
+    pub fn rgb(display: &'a Display) -> Self {
+        Self::new("rgb", move |ldi| {
+            Ok(visible_frame(ldi, display)?.rgb().mapv(Complex32::from))
+        })
     }
 
     /// SM-LBM with `planes` planes on what is visible, an RGB-D image's worth.
@@ -98,7 +100,7 @@ impl<'a> Method<'a> {
     /// exact waves.
     pub fn filled(display: &'a Display, planes: usize) -> Self {
         Self::new("filled", move |ldi| {
-            let filled = filled(&visible_frame(ldi)?, display)?;
+            let filled = filled(&visible_frame(ldi, display)?, display)?;
             sm_lbm::hologram(&filled, display, planes, &|_, _| {})
         })
     }
@@ -108,21 +110,21 @@ impl<'a> Method<'a> {
     /// # Errors
     /// A sweep that cannot be planned.
     pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
-        let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
+        let (plan, display) = (SweepPlan::new(size, size, display, sweep, 0.0)?, display.clone());
         Ok(Self::new("sweep", move |ldi| {
-            let mut field = Array3::zeros((3, size, size));
+            let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?;
+            plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
             Ok(field)
         }))
     }
 
     fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
-        let plan = SeededPlan::new(size, size, network, display)?;
+        let (plan, display) = (SeededPlan::new(size, size, network, display)?, display.clone());
         Ok(Self::new(name, move |ldi| {
-            let mut field = Array3::zeros((3, size, size));
+            let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
-            plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?;
+            plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
             Ok(field)
         }))
     }
@@ -144,13 +146,13 @@ impl<'a> Method<'a> {
             ))
             .into());
         }
-        let plan = network.plan_for(size, size, display)?;
+        let (plan, display) = (network.plan_for(size, size, display)?, display.clone());
         Ok(Self::new(name, move |ldi| {
-            let mut field = Array3::zeros((3, size, size));
+            let mut field = Array3::zeros((display.colours(), size, size));
             let values = field.as_slice_mut().expect("standard layout");
             match of_layers {
-                true => plan.field(ldi, values, &mut plan.scratch())?,
-                false => plan.field(&visible_frame(ldi)?, values, &mut plan.scratch())?,
+                true => plan.field(&*ldi.for_display(&display), values, &mut plan.scratch())?,
+                false => plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?,
             }
             Ok(field)
         }))
@@ -194,13 +196,13 @@ pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
     })
 }
 
-/// The front layer as a frame: black and farthest where nothing is.
+/// The front layer as a frame for `display`: black and farthest where nothing is.
 ///
 /// # Errors
 /// Numbers that are no frame's.
-pub fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
+pub fn visible_frame(ldi: &Ldi, display: &Display) -> Result<RgbdFrame> {
     let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
-    Ok(RgbdFrame::new(visible_rgb(ldi), depth)?)
+    Ok(RgbdFrame::new(visible_rgb(ldi), depth)?.for_display(display))
 }
 
 /// `frame` with its hidden surfaces, as the sweep finds them.
@@ -210,10 +212,10 @@ pub fn visible_frame(ldi: &Ldi) -> Result<RgbdFrame> {
 pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
     let (height, width) = frame.shape();
     let size = height * width;
-    let depth = frame.depth().to_owned();
+    let front = LdiLayer::from(frame);
     let hidden = Hidden::new(height, width, hidden_reach(display));
     let mut sources = vec![0; 2 * size];
-    let values = depth.as_slice().expect("standard layout");
+    let values = front.depth.as_slice().expect("standard layout");
     hidden.find(values, &mut sources, &mut hidden.scratch());
     let behind = sources.chunks_exact(size).map(|sources| {
         let of = |y: usize, x: usize| match sources[y * width + x] {
@@ -222,15 +224,14 @@ pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
         };
         LdiLayer {
             rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-                of(y, x).map_or(0.0, |(y, x)| frame.rgb()[(c, y, x)])
+                of(y, x).map_or(0.0, |(y, x)| front.rgb[(c, y, x)])
             }),
-            depth: Array2::from_shape_fn((height, width), |(y, x)| of(y, x).map_or(f32::NAN, |at| depth[at])),
+            depth: Array2::from_shape_fn((height, width), |(y, x)| {
+                of(y, x).map_or(f32::NAN, |at| front.depth[at])
+            }),
         }
     });
-    let front = LdiLayer {
-        rgb: frame.rgb().to_owned(),
-        depth: depth.clone(),
-    };
+    let behind: Vec<_> = behind.collect();
     Ldi::new(std::iter::once(front).chain(behind).collect())
 }
 
@@ -360,7 +361,7 @@ impl Viewer {
         })
     }
 
-    /// The amplitudes of the midpoint hologram `field`, (3, H, W), at each of `z_m`, metres, where it is shown by
+    /// The amplitudes of the midpoint hologram `field`, (C, H, W), at each of `z_m`, metres, where it is shown by
     /// `shown`.
     ///
     /// # Errors
@@ -376,7 +377,7 @@ impl Viewer {
                 let modulator = Modulator::new((size, size), target, options)?;
                 let mut scratch = modulator.scratch();
                 if !modulator.keeps_phase() {
-                    remove_mean_phase(&mut values);
+                    remove_mean_phase(&mut values, field.dim().0);
                 }
                 modulator.propagate(&mut values, &mut scratch);
                 let mut levels = vec![0; values.len()];
@@ -395,7 +396,7 @@ impl Viewer {
             optics.pass(&mut values);
         }
         let views = refocus.focal_stack(&values, z_m)?.into_iter();
-        let view = |view| Array3::from_shape_vec((3, size, size), view).expect("the field's shape");
+        let view = |view| Array3::from_shape_vec(field.dim(), view).expect("the field's shape");
         Ok(Seen {
             views: views.map(view).collect(),
             light,
@@ -423,7 +424,7 @@ impl Viewer {
         Ok(())
     }
 
-    /// The share of the light of `shown`, (3, H, W) at the modulator, that passes `opening`.
+    /// The share of the light of `shown`, (C, H, W) at the modulator, that passes `opening`.
     fn light(&self, shown: &[Complex32], opening: Opening) -> Result<f64> {
         let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
         let aperture = Aperture::new(self.size, self.size, opening)?;
@@ -438,7 +439,7 @@ impl Viewer {
 
 /// What is seen of a hologram.
 pub struct Seen {
-    /// Amplitudes, (3, H, W), one for each z.
+    /// Amplitudes, (C, H, W), one for each z.
     pub views: Vec<Array3<f32>>,
     /// The share of the modulator's light that passes the aperture; 1 for a complex field.
     pub light: f64,
@@ -580,7 +581,7 @@ pub fn judged_z_m(display: &Display) -> Vec<f64> {
         .collect()
 }
 
-/// How close `views` come to `truth`, all light counted as shown: (3, H, W) each, the midpoint first, the focal stack
+/// How close `views` come to `truth`, all light counted as shown: (C, H, W) each, the midpoint first, the focal stack
 /// after it, `margin` pixels at the border left out.
 ///
 /// # Errors
@@ -624,8 +625,8 @@ pub fn write_picture(
         .remove(0);
     let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.views.remove(0);
     let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
-    let gap = Array3::from_elem((3, manifest.size, 4), 1.0);
-    let input = visible_rgb(&pair.ldi);
+    let gap = Array3::from_elem((ours.dim().0, manifest.size, 4), 1.0);
+    let input = visible_frame(&pair.ldi, &manifest.display)?.rgb().to_owned();
     let panels = [&input, &gap, &ours, &gap, &truth, &gap, &difference].map(|panel| panel.view());
     let strip = concatenate(Axis(2), &panels).expect("panels of one height");
     files::write_amplitude(path, strip.view())

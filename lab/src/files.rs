@@ -86,7 +86,7 @@ fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
     })
 }
 
-/// Levels of a modulator, (3, H, W).
+/// Levels of a modulator, (C, H, W).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Levels {
     /// Of up to 8 bits.
@@ -96,7 +96,7 @@ pub enum Levels {
 }
 
 impl Levels {
-    /// (3, H, W).
+    /// (C, H, W).
     pub fn dim(&self) -> (usize, usize, usize) {
         match self {
             Levels::Bytes(levels) => levels.dim(),
@@ -116,11 +116,11 @@ impl Levels {
 /// A hologram as a file holds it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Hologram {
-    /// Modulator levels, (3, H, W).
+    /// Modulator levels, (C, H, W).
     PhaseOnly(Array3<u8>, HologramInfo),
-    /// Modulator levels of over 8 bits, (3, H, W).
+    /// Modulator levels of over 8 bits, (C, H, W).
     Words(Array3<u16>, HologramInfo),
-    /// A complex field, (3, H, W).
+    /// A complex field, (C, H, W).
     Complex(Array3<Complex32>, HologramInfo),
 }
 
@@ -337,19 +337,25 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).map_err(refuse)
 }
 
-/// Writes amplitudes, (3, H, W), as an 8-bit RGB PNG; what is over 1 is white.
+/// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG; what is over 1 is white, and one laser's are grey.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     let bytes = amplitude_bytes(amplitude);
     let (_, height, width) = amplitude.dim();
-    write_png(path, width, height, &bytes, None)
+    write_png_of(path, PngShape::of_levels(3, height, width), &bytes, None)
 }
 
-/// Amplitudes, (3, H, W), as rows of RGB bytes.
+/// Amplitudes, (C, H, W), as rows of RGB bytes; one laser's are grey.
 pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
-    interleaved(amplitude, |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+    interleaved(as_rgb(&amplitude), |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+/// A stack of (C, H, W) as one of (3, H, W): one laser's plane is all three.
+pub(crate) fn as_rgb<'a, T>(stack: &'a ArrayView3<'_, T>) -> ArrayView3<'a, T> {
+    let (_, height, width) = stack.dim();
+    stack.broadcast((3, height, width)).expect("three colours or one")
 }
 
 fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
@@ -363,7 +369,8 @@ fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec
 /// A file that cannot be written.
 pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
     let (width, height) = picture.dimensions();
-    write_png(path, width as usize, height as usize, picture.as_raw(), None)
+    let shape = PngShape::of_levels(3, height as usize, width as usize);
+    write_png_of(path, shape, picture.as_raw(), None)
 }
 
 /// Writes an 8-bit RGBA PNG of rows of `rgba`.
@@ -389,14 +396,24 @@ pub(crate) struct PngShape {
     pub(crate) depth: png::BitDepth,
 }
 
-fn write_png(path: &Path, width: usize, height: usize, rgb: &[u8], info: Option<&HologramInfo>) -> Result<()> {
-    let shape = PngShape {
-        width,
-        height,
-        color: png::ColorType::Rgb,
-        depth: png::BitDepth::Eight,
-    };
-    write_png_of(path, shape, rgb, info)
+impl PngShape {
+    /// Of (`colours`, `height`, `width`) bytes.
+    fn of_levels(colours: usize, height: usize, width: usize) -> Self {
+        PngShape {
+            width,
+            height,
+            color: png_color(colours),
+            depth: png::BitDepth::Eight,
+        }
+    }
+}
+
+/// What a PNG of so many colours is: RGB, or grey for one laser.
+pub(crate) fn png_color(colours: usize) -> png::ColorType {
+    match colours {
+        1 => png::ColorType::Grayscale,
+        _ => png::ColorType::Rgb,
+    }
 }
 
 /// Writes a PNG of rows of `pixels`, words big-endian, that carries `info`.
@@ -419,28 +436,28 @@ pub(crate) fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], info: Op
     })
 }
 
-/// Writes a phase-only hologram, (3, H, W), as an 8-bit RGB PNG of levels that carries `info`.
+/// Writes a phase-only hologram, (C, H, W), as an 8-bit PNG of levels that carries `info`: RGB, or grey for one laser.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
-    let (_, height, width) = levels.dim();
-    write_png(path, width, height, &interleaved(levels, |v| v), Some(info))
+    let (colours, height, width) = levels.dim();
+    let shape = PngShape::of_levels(colours, height, width);
+    write_png_of(path, shape, &interleaved(levels, |v| v), Some(info))
 }
 
-/// Writes a phase-only hologram of over 8 bits, (3, H, W), as a 16-bit RGB PNG of levels that carries `info`.
+/// Writes a phase-only hologram of over 8 bits, (C, H, W), as a 16-bit PNG of levels that carries `info`: RGB, or grey
+/// for one laser.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo) -> Result<()> {
-    let (_, height, width) = levels.dim();
+    let (colours, height, width) = levels.dim();
     let words = levels.permuted_axes([1, 2, 0]);
     let bytes: Vec<u8> = words.iter().flat_map(|level| level.to_be_bytes()).collect();
     let shape = PngShape {
-        width,
-        height,
-        color: png::ColorType::Rgb,
         depth: png::BitDepth::Sixteen,
+        ..PngShape::of_levels(colours, height, width)
     };
     write_png_of(path, shape, &bytes, Some(info))
 }
@@ -457,7 +474,7 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
     }
 }
 
-/// Writes a complex hologram, (3, H, W), as a `.npy` of complex64 with `info` in `NAME.json` beside it.
+/// Writes a complex hologram, (C, H, W), as a `.npy` of complex64 with `info` in `NAME.json` beside it.
 ///
 /// # Errors
 /// A file that cannot be written.
@@ -475,17 +492,18 @@ pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &Holog
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
         let field = npy::read::<Complex32, Ix3>(&read_file(path)?)
-            .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (3, H, W): {e}")))?;
-        if field.dim().0 != 3 || field.is_empty() {
-            return Err(Error::file(
-                path,
-                format!("has shape {:?}; it must be (3, H, W)", field.dim()),
-            ));
-        }
+            .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (C, H, W): {e}")))?;
         let beside = path.with_extension("json");
         let text = std::fs::read_to_string(&beside)
             .map_err(|e| Error::file(&beside, format!("is needed beside {}: {e}", path.display())))?;
-        let info = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
+        let info: HologramInfo = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
+        let colours = info.display.colours();
+        if field.dim().0 != colours || field.is_empty() {
+            return Err(Error::file(
+                path,
+                format!("has shape {:?}; it must be ({colours}, H, W)", field.dim()),
+            ));
+        }
         return Ok(Hologram::Complex(field.as_standard_layout().into_owned(), info));
     }
     let info = read_info(path)?.ok_or_else(|| {
@@ -496,30 +514,29 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
     })?;
     let image = open_image(path)?;
     let (width, height) = (image.width() as usize, image.height() as usize);
-    let at = |(c, y, x): (usize, usize, usize)| 3 * (y * width + x) + c;
-    match image {
-        DynamicImage::ImageRgb8(image) => {
-            let bytes = image.into_raw();
-            let levels = Array3::from_shape_fn((3, height, width), |place| bytes[at(place)]);
-            Ok(Hologram::PhaseOnly(levels, info))
-        }
-        DynamicImage::ImageRgb16(image) => {
-            let words = image.into_raw();
-            let most = words.iter().copied().max().unwrap_or_default();
-            if u32::from(most) >> info.display.bits() != 0 {
-                return Err(Error::file(
-                    path,
-                    format!(
-                        "holds a level of {most}, over the {} bits that it says",
-                        info.display.bits()
-                    ),
-                ));
-            }
-            let levels = Array3::from_shape_fn((3, height, width), |place| words[at(place)]);
-            Ok(Hologram::Words(levels, info))
-        }
-        _ => Err(Error::file(path, "is not an RGB image of levels")),
+    let shape @ (colours, ..) = (info.display.colours(), height, width);
+    let at = |(c, y, x): (usize, usize, usize)| colours * (y * width + x) + c;
+    let bytes = |bytes: Vec<u8>| Array3::from_shape_fn(shape, |place| bytes[at(place)]);
+    let words = match (image, colours) {
+        (DynamicImage::ImageRgb8(image), 3) => return Ok(Hologram::PhaseOnly(bytes(image.into_raw()), info)),
+        (DynamicImage::ImageLuma8(image), 1) => return Ok(Hologram::PhaseOnly(bytes(image.into_raw()), info)),
+        (DynamicImage::ImageRgb16(image), 3) => image.into_raw(),
+        (DynamicImage::ImageLuma16(image), 1) => image.into_raw(),
+        (_, 1) => return Err(Error::file(path, "is not a grey image of levels, as one laser has")),
+        _ => return Err(Error::file(path, "is not an RGB image of levels")),
+    };
+    let most = words.iter().copied().max().unwrap_or_default();
+    if u32::from(most) >> info.display.bits() != 0 {
+        return Err(Error::file(
+            path,
+            format!(
+                "holds a level of {most}, over the {} bits that it says",
+                info.display.bits()
+            ),
+        ));
     }
+    let levels = Array3::from_shape_fn(shape, |place| words[at(place)]);
+    Ok(Hologram::Words(levels, info))
 }
 
 /// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
@@ -711,11 +728,19 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     }
     target.illumination = laser_path.map(|p| table::read_laser(&p)).transpose()?;
     panel.onto(path, &mut target)?;
+    let aberration = match aberration_path {
+        None => None,
+        Some(path) => {
+            let aberration = table::read_aberrations(&path)?;
+            aberration.check(&target.display).map_err(|e| Error::file(path, e))?;
+            Some(aberration)
+        }
+    };
     Ok(DisplayFile {
         target,
         device,
         lut,
-        aberration: aberration_path.map(|p| table::read_aberrations(&p)).transpose()?,
+        aberration,
     })
 }
 

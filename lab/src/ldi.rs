@@ -9,7 +9,10 @@ use std::path::Path;
 use image::codecs::png::PngEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use ndarray::{Array2, Array3};
+use phasefront::unstable::frame::luminance;
 use phasefront::unstable::network::Source;
+use phasefront::{Display, RgbdFrame};
+use std::borrow::Cow;
 
 use crate::error::{Error, Result};
 use crate::files::{TEMPORARY, open_image, remove_left_over};
@@ -28,6 +31,19 @@ pub struct LdiLayer {
     pub rgb: Array3<f32>,
     /// Normalized depth, (H, W): 0 nearest, 1 farthest, NaN where there is no hit.
     pub depth: Array2<f32>,
+}
+
+impl From<&RgbdFrame> for LdiLayer {
+    /// What a frame shows; the amplitude of one laser is that of all three colours.
+    fn from(frame: &RgbdFrame) -> Self {
+        let (height, width) = frame.shape();
+        let rgb = frame.rgb();
+        let rgb = rgb.broadcast((3, height, width)).expect("three colours or one");
+        LdiLayer {
+            rgb: rgb.to_owned(),
+            depth: frame.depth().to_owned(),
+        }
+    }
 }
 
 impl PartialEq for LdiLayer {
@@ -67,6 +83,29 @@ impl Ldi {
     pub fn new(layers: Vec<LdiLayer>) -> Result<Self> {
         check_layers(&layers).map_err(|(_, reason)| Error::Input(reason))?;
         Ok(Self { layers })
+    }
+
+    /// What the lasers of `display` show of it: of one laser all three colours are the luminance
+    /// ([`RgbdFrame::for_display`]).
+    pub fn for_display(&self, display: &Display) -> Cow<'_, Self> {
+        if display.colours() == 3 {
+            return Cow::Borrowed(self);
+        }
+        let grey = |layer: &LdiLayer| {
+            let (_, height, width) = layer.rgb.dim();
+            let rgb = layer.rgb.as_standard_layout();
+            let mut amplitude = Array2::zeros((height, width));
+            let values = rgb.as_slice().zip(amplitude.as_slice_mut());
+            let (rgb, values) = values.expect("both are in standard layout");
+            luminance(rgb, values);
+            LdiLayer {
+                rgb: amplitude.broadcast((3, height, width)).expect("one plane").to_owned(),
+                depth: layer.depth.clone(),
+            }
+        };
+        Cow::Owned(Ldi {
+            layers: self.layers.iter().map(grey).collect(),
+        })
     }
 
     /// Height and width in pixels.

@@ -10,43 +10,43 @@ const SSIM_SIGMA: f64 = 1.5;
 const SSIM_HALF: usize = 5;
 
 /// How alike two stacks of amplitudes are.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Red, green, blue, dB.
-    pub psnr: [f64; 3],
+    /// Of each colour, dB.
+    pub psnr: Vec<f64>,
     /// Over all values of all colours, dB.
     pub psnr_overall: f64,
-    /// Red, green, blue.
-    pub ssim: [f64; 3],
+    /// Of each colour.
+    pub ssim: Vec<f64>,
     /// The mean of the colours.
     pub ssim_overall: f64,
 }
 
-/// Compares `a` with `b`, both (3, H, W).
+/// Compares `a` with `b`, both (C, H, W).
 ///
 /// # Errors
-/// Shapes that differ, or that are not three planes.
+/// Shapes that differ.
 pub fn compare(a: ArrayView3<'_, f32>, b: ArrayView3<'_, f32>) -> Result<Comparison> {
-    if a.dim() != b.dim() || a.dim().0 != 3 {
-        let (_, ha, wa) = a.dim();
-        let (_, hb, wb) = b.dim();
+    let ((ca, ha, wa), (cb, hb, wb)) = (a.dim(), b.dim());
+    if (ha, wa) != (hb, wb) {
         return Err(Error::Input(format!(
             "one is {wa}×{ha}, the other {wb}×{hb}; only images of one size can be compared"
         )));
     }
-    let mut squares = [0.0; 3];
-    let mut ssims = [0.0; 3];
-    for c in 0..3 {
-        let (a, b) = (a.index_axis(Axis(0), c), b.index_axis(Axis(0), c));
-        squares[c] = mean_square(a, b);
-        ssims[c] = ssim(a, b);
+    if ca != cb {
+        return Err(Error::Input(format!(
+            "one has {ca} colours, the other {cb}; only images of the same colours can be compared"
+        )));
     }
-    let mean = |values: [f64; 3]| values.iter().sum::<f64>() / 3.0;
+    let colours = || a.axis_iter(Axis(0)).zip(b.axis_iter(Axis(0)));
+    let squares: Vec<f64> = colours().map(|(a, b)| mean_square(a, b)).collect();
+    let ssims: Vec<f64> = colours().map(|(a, b)| ssim(a, b)).collect();
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     Ok(Comparison {
-        psnr: squares.map(decibels),
-        psnr_overall: decibels(mean(squares)),
+        psnr: squares.iter().copied().map(decibels).collect(),
+        psnr_overall: decibels(mean(&squares)),
+        ssim_overall: mean(&ssims),
         ssim: ssims,
-        ssim_overall: mean(ssims),
     })
 }
 

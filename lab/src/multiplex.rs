@@ -32,13 +32,13 @@ pub struct Multiplex<'a> {
     target: &'a Target,
     encoder: Encoder,
     /// From the modulator to the midpoint through the aperture, and back.
-    ways: [[Propagator; 3]; 2],
+    ways: [Vec<Propagator>; 2],
 }
 
 /// One phase map.
 #[derive(Debug, Clone)]
 pub struct Map {
-    /// Levels, (3, H, W).
+    /// Levels, (C, H, W).
     pub levels: Array3<u8>,
     /// The amplitude that full light stands for.
     pub scale: f32,
@@ -48,7 +48,7 @@ pub struct Map {
 const MOST: f32 = 4.0;
 
 impl<'a> Multiplex<'a> {
-    /// Plans maps of (3, H, W) = `shape` waves for `target`.
+    /// Plans maps of (C, H, W) = `shape` waves for `target`.
     ///
     /// # Errors
     /// What the encoder refuses; an offset too far away.
@@ -66,7 +66,7 @@ impl<'a> Multiplex<'a> {
         })
     }
 
-    /// `count` maps of `wave`, (3, H, W), at the modulator.
+    /// `count` maps of `wave`, (C, H, W), at the modulator.
     pub fn maps(&self, wave: &Array3<Complex32>, count: usize, differ: Differ) -> Vec<Map> {
         let wave = wave.as_slice().expect("standard layout");
         let [there, back] = &self.ways;
@@ -103,7 +103,7 @@ impl<'a> Multiplex<'a> {
             let used = self.encoder.encode(&mut field, scale, &mut phases, &mut scratch);
             scale = Some(used);
             let response = &self.target.response;
-            let mut levels = Array3::zeros((3, self.shape.0, self.shape.1));
+            let mut levels = Array3::zeros((there.len(), self.shape.0, self.shape.1));
             for (at, (level, phase)) in levels.iter_mut().zip(&phases).enumerate() {
                 let phase = if odd { -phase } else { *phase };
                 *level = response.level((phase + turn).rem_euclid(TAU).min(TAU.next_down()), at);
@@ -129,7 +129,7 @@ impl<'a> Multiplex<'a> {
         field
     }
 
-    fn pass(&self, way: &[Propagator; 3], field: &mut [Complex32]) {
+    fn pass(&self, way: &[Propagator], field: &mut [Complex32]) {
         let (mut scratch, radius) = (way[0].scratch(), self.target.display.aperture_radius());
         for (way, plane) in way.iter().zip(field.chunks_exact_mut(self.shape.0 * self.shape.1)) {
             way.propagate_through(plane, radius, &mut scratch);
@@ -150,12 +150,15 @@ impl<'a> Multiplex<'a> {
         let stack = |plan: &Refocus, field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
             let views = plan.focal_stack(field, &z_m)?.into_iter();
             Ok(views
-                .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the wave's shape"))
+                .map(|view| {
+                    Array3::from_shape_vec((display.colours(), height, width), view)
+                        .expect("a view of the wave's shape")
+                })
                 .collect())
         };
         let free = Refocus::new(height, width, display, &z_m, None)?;
         let truth = stack(&free, wave.as_slice().expect("standard layout"))?;
-        let mut sums = vec![Array3::<f32>::zeros((3, height, width)); z_m.len()];
+        let mut sums = vec![Array3::<f32>::zeros(wave.dim()); z_m.len()];
         let mut figures = Vec::new();
         for (n, map) in maps.iter().enumerate() {
             let views = stack(&plan, &self.shown(map))?;

@@ -244,7 +244,7 @@ impl Regions {
                 .and(&layer.depth)
                 .for_each(|hidden, d| *hidden |= !d.is_nan() && !nearer(*d));
         }
-        let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
+        let longest = display.longest_wavelength_m();
         let reach_m = asm::reach_m(front_z_m - rear_z_m, longest, display.pitch_m());
         let reach = (reach_m / display.pitch_m()).ceil() as usize;
         let (near_visible, near_hidden) = (widened(&visible, reach), widened(&hidden, reach));

@@ -1,7 +1,7 @@
 //! Holograms as the image files that a modulator's input takes, and back.
 //!
-//! A packing of all colours in one image is one PNG. One of a colour after the other is three, `NAME-red.png`,
-//! `NAME-green.png` and `NAME-blue.png`.
+//! A packing of all colours in one image is one PNG, and so is one laser's. One of a colour after the other is three,
+//! `NAME-red.png`, `NAME-green.png` and `NAME-blue.png`.
 
 use crate::error::{Error, Result};
 use crate::files::{DisplayFile, Hologram, PngShape, open_image, write_png_of};
@@ -13,6 +13,19 @@ use std::path::{Path, PathBuf};
 
 /// The names of the colours, in their order.
 pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
+
+/// Which of `colours` is called `name`.
+///
+/// # Errors
+/// Those of a display of one laser, which has no red, green and blue.
+pub fn colour(name: &str, colours: usize) -> Result<usize> {
+    let known = COLOURS.iter().take(colours).position(|known| *known == name);
+    known.filter(|_| colours == COLOURS.len()).ok_or_else(|| {
+        Error::Input(format!(
+            "--colour {name}: the display has one laser, whose maps have no other colour; leave it out"
+        ))
+    })
+}
 
 /// The pixels of one image file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -131,7 +144,7 @@ pub fn bit_planes(
 /// The images of a phase-only hologram: one, or one for each colour.
 ///
 /// # Errors
-/// A complex hologram; one that is larger than the modulator or has other bits.
+/// A complex hologram; one that is larger than the modulator or has other bits or colours.
 pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     let shape = hologram.shape();
     let bits = hologram.info().display.bits();
@@ -139,6 +152,12 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
         return Err(Error::Input(format!(
             "the hologram has levels of {bits} bits, the modulator {}; make it with this --display",
             display.device.display.bits()
+        )));
+    }
+    let (colours, right) = (hologram.info().display.colours(), display.device.display.colours());
+    if colours != right {
+        return Err(Error::Input(format!(
+            "the hologram is of {colours} colours, the display has {right}; make it with this --display"
         )));
     }
     let levels = match hologram {
@@ -153,7 +172,7 @@ pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
     match (&display.device.packing, levels) {
         (Packing::Images(layout), levels) => {
             let output = output(display, shape, *layout)?;
-            (0..layout.images())
+            (0..layout.images(colours))
                 .map(|image| {
                     let mut bytes = vec![0; output.image_bytes()];
                     output.write(levels, image, &mut bytes)?;
@@ -189,12 +208,13 @@ pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
     })
 }
 
-/// The levels, (3, H, W) = (3, `shape`), that `images` show in the middle of the modulator.
+/// The levels, (C, H, W) = (C, `shape`), that `images` show in the middle of the modulator.
 ///
 /// # Errors
 /// Images of another number, size or kind.
 pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) -> Result<Array3<u16>> {
-    let mut levels = Array3::zeros((3, shape.0, shape.1));
+    let colours = display.device.display.colours();
+    let mut levels = Array3::zeros((colours, shape.0, shape.1));
     let values = levels.as_slice_mut().expect("standard layout");
     let fits = |count: usize, shape: (usize, usize), kind: Kind| match images {
         all if all.len() != count => Err(Error::Input(format!(
@@ -226,7 +246,7 @@ pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) ->
         }
         Packing::Images(layout) => {
             let output = output(display, shape, *layout)?;
-            fits(layout.images(), output.shape(), kind(*layout))?;
+            fits(layout.images(colours), output.shape(), kind(*layout))?;
             for (n, image) in images.iter().enumerate() {
                 let mut bytes = image.bytes.clone();
                 swap(image.kind, &mut bytes);

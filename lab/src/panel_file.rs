@@ -4,7 +4,7 @@
 //! carrier_mrad = [4.0, 0.0]              # right and down, the same for all colours
 //! lens_mm = 300.0                        # positive draws light together toward the viewer
 //! flatness = "CAL_LSH0802200_520nm.bmp"  # or one file for each colour
-//! shift_px = [[0.5, 0.0], [0.0, 0.0], [-0.25, 1.0]]   # red, green, blue: right and down
+//! shift_px = [[0.5, 0.0], [0.0, 0.0], [-0.25, 1.0]]   # red, green, blue, or the one laser: right and down
 //! scale = [1.001, 1.0, 0.998]
 //! ```
 //!
@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::files::{has_extension, open_image};
 use image::DynamicImage;
 use phasefront::Target;
-use phasefront::target::Flatness;
+use phasefront::target::{Flatness, Registration};
 use serde::Deserialize;
 use std::path::Path;
 
@@ -27,8 +27,10 @@ pub(crate) struct PanelToml {
     carrier_mrad: Option<[f64; 2]>,
     lens_mm: Option<f64>,
     flatness: Option<FlatnessToml>,
-    shift_px: Option<[[f64; 2]; 3]>,
-    scale: Option<[f64; 3]>,
+    #[serde(default)]
+    shift_px: Vec<[f64; 2]>,
+    #[serde(default)]
+    scale: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -73,12 +75,10 @@ impl PanelToml {
             let maps = maps.collect::<Result<Vec<_>>>()?.concat();
             panel.flatness = Some(Flatness::new(modulator, maps)?);
         }
-        if let Some(shift_px) = self.shift_px {
-            target.registration.shift_px = shift_px;
-        }
-        if let Some(scale) = self.scale {
-            target.registration.scale = scale;
-        }
+        target.registration = Registration {
+            shift_px: self.shift_px,
+            scale: self.scale,
+        };
         Ok(())
     }
 }

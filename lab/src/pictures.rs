@@ -17,7 +17,7 @@ const FRAME_MS: u32 = 100;
 /// The longest side of a WebP, pixels.
 const WEBP_SIDE: u32 = 16383;
 
-/// Amplitudes, (3, H, W), as a picture; what is over 1 is white.
+/// Amplitudes, (C, H, W), as a picture; what is over 1 is white, and one laser's is grey.
 pub fn of_amplitude(amplitude: ArrayView3<'_, f32>) -> RgbImage {
     let (_, height, width) = amplitude.dim();
     RgbImage::from_raw(width as u32, height as u32, files::amplitude_bytes(amplitude)).expect("three bytes a pixel")

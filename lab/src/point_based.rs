@@ -314,7 +314,7 @@ fn ceil_div(a: i64, b: i64) -> i64 {
     -(-a).div_euclid(b)
 }
 
-/// The complex midpoint hologram of `ldi`, (3, H, W), at z = 0, its depths on `planes` planes. `progress` hears of
+/// The complex midpoint hologram of `ldi`, (C, H, W), at z = 0, its depths on `planes` planes. `progress` hears of
 /// the rows of points done, of all.
 ///
 /// Memory: some 100 bytes a pixel, and the tables.
@@ -329,11 +329,12 @@ pub fn hologram(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
     check_planes(planes)?;
-    let points = Points::of(ldi, planes, occlusion);
+    let points = Points::of(&ldi.for_display(display), planes, occlusion);
     let (height, width) = (points.height, points.width);
     let tables = tables(&points, display)?;
-    let widest = |tables: &[Table; 3]| tables.iter().map(|t| t.radius).max().unwrap_or(0);
-    let halo = tables.iter().flatten().map(widest).max().unwrap_or(0);
+    let colours = display.colours();
+    let widest = |tables: &[Table]| tables.iter().map(|t| t.radius).max().unwrap_or(0);
+    let halo = tables.iter().flatten().map(|tables| widest(tables)).max().unwrap_or(0);
     let bands: Vec<_> = (0..height).step_by(BAND_ROWS).collect();
     let done = AtomicUsize::new(0);
     let parts: Vec<(Range<usize>, Vec<Complex32>)> = (bands.par_iter())
@@ -341,7 +342,7 @@ pub fn hologram(
             let last = height.min(first + BAND_ROWS);
             let rows = first.saturating_sub(halo)..height.min(last + halo);
             let size = rows.len() * width;
-            let mut part = vec![Complex32::ZERO; 3 * size];
+            let mut part = vec![Complex32::ZERO; colours * size];
             let mut mask = Mask::new();
             for y in first..last {
                 for x in 0..width {
@@ -364,7 +365,7 @@ pub fn hologram(
             (rows, part)
         })
         .collect();
-    let mut hologram = Array3::from_elem((3, height, width), Complex32::ZERO);
+    let mut hologram = Array3::from_elem((colours, height, width), Complex32::ZERO);
     let values = hologram.as_slice_mut().expect("standard layout");
     values
         .par_chunks_exact_mut(height * width)
@@ -389,7 +390,7 @@ fn check_planes(planes: usize) -> Result<()> {
 }
 
 /// For each plane that holds points, the table of each colour.
-fn tables(points: &Points, display: &Display) -> Result<Vec<Option<[Table; 3]>>> {
+fn tables(points: &Points, display: &Display) -> Result<Vec<Option<Vec<Table>>>> {
     let mut occupied = vec![false; points.planes];
     for hit in &points.hits {
         occupied[hit.plane as usize] = true;
@@ -399,15 +400,15 @@ fn tables(points: &Points, display: &Display) -> Result<Vec<Option<[Table; 3]>>>
     // Half of a square for each colour.
     let values: f64 = (occupied.iter().enumerate())
         .filter(|(_, occupied)| **occupied)
-        .flat_map(|(plane, _)| display.wavelengths_m().map(|lambda| (plane, lambda)))
-        .map(|(plane, lambda)| 2.0 * (radius_px(z(plane), lambda, pitch_m) as f64 + 1.0).powi(2))
+        .flat_map(|(plane, _)| display.wavelengths_m().iter().map(move |lambda| (plane, lambda)))
+        .map(|(plane, lambda)| 2.0 * (radius_px(z(plane), *lambda, pitch_m) as f64 + 1.0).powi(2))
         .sum();
     if values > MAX_TABLE_VALUES as f64 {
         return Err(Error::Input(format!(
             "the sub-holograms of {} planes reach {} pixels far and do not fit in memory; \
              fewer planes, a shallower volume or a larger pitch is needed",
             occupied.iter().filter(|occupied| **occupied).count(),
-            radius_px(z(0), display.wavelengths_m()[0], pitch_m),
+            radius_px(z(0), display.longest_wavelength_m(), pitch_m),
         )));
     }
     Ok(occupied
@@ -415,9 +416,8 @@ fn tables(points: &Points, display: &Display) -> Result<Vec<Option<[Table; 3]>>>
         .enumerate()
         .map(|(plane, occupied)| {
             occupied.then(|| {
-                display
-                    .wavelengths_m()
-                    .map(|lambda| Table::new(z(plane), lambda, pitch_m))
+                let lasers = display.wavelengths_m().iter();
+                lasers.map(|lambda| Table::new(z(plane), *lambda, pitch_m)).collect()
             })
         })
         .collect())

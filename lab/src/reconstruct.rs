@@ -14,13 +14,13 @@ use phasefront::unstable::wave::asm::Propagator;
 use std::f32::consts::TAU;
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
-pub struct AberratedOptics([Propagator; 3]);
+pub struct AberratedOptics(Vec<Propagator>);
 
 impl AberratedOptics {
     /// Those that `correction` corrects.
     ///
     /// # Errors
-    /// An empty shape.
+    /// An empty shape; a correction of other colours.
     pub fn new((height, width): (usize, usize), display: &Display, correction: &Aberration) -> Result<Self> {
         let pitch_m = display.pitch_m();
         let plans = Propagator::for_colours_corrected(
@@ -35,10 +35,10 @@ impl AberratedOptics {
         Ok(AberratedOptics(plans))
     }
 
-    /// What becomes of `field`, (3, H, W), on its way through.
+    /// What becomes of `field`, (C, H, W), on its way through.
     pub fn pass(&self, field: &mut [Complex32]) {
         let mut scratch = self.0[0].scratch();
-        let area = field.len() / 3;
+        let area = field.len() / self.0.len();
         for (plan, plane) in self.0.iter().zip(field.chunks_exact_mut(area)) {
             plan.propagate(plane, &mut scratch);
         }
@@ -63,7 +63,7 @@ impl Hologram {
         }
     }
 
-    /// The amplitudes at each of `z_m`, (3, H, W), against the middle of the volume, metres.
+    /// The amplitudes at each of `z_m`, (C, H, W), against the middle of the volume, metres.
     ///
     /// # Errors
     /// A z too far to be propagated to, a look-up table that is none, or a hologram for a calibrated display.
@@ -80,6 +80,12 @@ impl Hologram {
         let shape = self.shape();
         let (height, width) = shape;
         let info = self.info();
+        let (ours, theirs) = (info.display.colours(), file.target.display.colours());
+        if ours != theirs {
+            return Err(Error::Input(format!(
+                "a hologram of {ours} colours on a display of {theirs}; both must have as many"
+            )));
+        }
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             _ => {
@@ -101,7 +107,10 @@ impl Hologram {
         let views = plan.focal_stack(field.as_slice().expect("standard layout"), z_m)?;
         Ok(views
             .into_iter()
-            .map(|view| Array3::from_shape_vec((3, height, width), view).expect("a view of the hologram's shape"))
+            .map(|view| {
+                Array3::from_shape_vec((info.display.colours(), height, width), view)
+                    .expect("a view of the hologram's shape")
+            })
             .collect())
     }
 
@@ -112,7 +121,7 @@ impl Hologram {
         let (height, width) = shape;
         let scale = self.info().scale.unwrap_or(1.0);
         let display = &file.target.display;
-        let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
+        let mut field = Array3::from_elem((self.info().display.colours(), height, width), Complex32::ZERO);
         let values = field.as_slice_mut().expect("standard layout");
         match self {
             Hologram::PhaseOnly(levels, _) => {

@@ -127,7 +127,7 @@ impl SimulatedDisplay {
             },
             waves,
             beam,
-            aberration: Aberration::NONE,
+            aberration: Aberration::none(display.colours()),
             camera,
         })
     }

@@ -148,8 +148,8 @@ pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_
     }
 }
 
-/// The complex midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes. `progress` hears of
-/// the planes done, of all those that hold points in three colours.
+/// The complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` hears of
+/// the planes done, of all those that hold points in all colours.
 ///
 /// Memory: two buffers of (H', W') complex numbers, 20 bytes a point, 8 bytes a plane, and the
 /// transfer functions, a quarter of a buffer each: one for neighbours, one for a wider gap.
@@ -166,8 +166,8 @@ pub fn hologram(
         return Err(phasefront::Error::Plan("no planes to cut the scene into; at least 1 is needed".into()).into());
     }
     let (height, width) = ldi.shape();
-    let scene = Planes::of(ldi, planes);
-    let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
+    let scene = Planes::of(&ldi.for_display(display), planes);
+    let longest = display.longest_wavelength_m();
     let shape = asm::padded_shape(
         height,
         width,
@@ -179,8 +179,8 @@ pub fn hologram(
     let (padded_height, padded_width) = shape;
     let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
     let mut scratch = fft.scratch();
-    let mut hologram = Array3::zeros((3, height, width));
-    let total = 3 * scene.occupied.len();
+    let mut hologram = Array3::zeros((display.colours(), height, width));
+    let total = display.colours() * scene.occupied.len();
     let step_m = display.volume_depth_m() / planes as f64;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
         let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);

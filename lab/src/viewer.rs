@@ -149,12 +149,13 @@ fn sharpness(view: &RgbImage) -> Array2<f32> {
 }
 
 impl Phase {
-    /// Of levels, (3, H, W).
+    /// Of levels, (C, H, W).
     ///
     /// # Errors
     /// A modulator too large for a picture.
     pub fn new(levels: ArrayView3<'_, u8>) -> Result<Self> {
         let (_, height, width) = levels.dim();
+        let levels = files::as_rgb(&levels);
         let all = RgbImage::from_fn(width as u32, height as u32, |x, y| {
             image::Rgb([0, 1, 2].map(|c| levels[(c, y as usize, x as usize)]))
         });
@@ -173,7 +174,7 @@ fn url(kind: &str, bytes: &[u8]) -> String {
     format!("data:image/{kind};base64,{}", STANDARD.encode(bytes))
 }
 
-/// The picture of a view's amplitudes, (3, H, W), no wider than pages show them.
+/// The picture of a view's amplitudes, (C, H, W), no wider than pages show them.
 pub fn picture(view: ArrayView3<'_, f32>) -> RgbImage {
     pictures::at_width(pictures::of_amplitude(view), WIDEST)
 }

@@ -229,12 +229,12 @@ fn a_dead_pixel_is_told_and_its_neighbours_stand_in() {
 fn cylinder() -> Aberration {
     let display = Display::default();
     let shift_m = 21e-3 * 21e-3 / 200e-3;
-    let coefficients = display.wavelengths_m().map(|lambda| {
+    let coefficients = display.wavelengths_m().iter().map(|lambda| {
         // πλ·shift·µ² = K·x², and x² = (2ρ² − 1)/4 + ρ²·cos 2θ/2 + 1/4.
         let k = std::f64::consts::PI * lambda * shift_m / (4.0 * display.pitch_m().powi(2));
         [k / 4.0, k / 2.0, 0.0, 0.0, 0.0]
     });
-    Aberration::new(coefficients).unwrap()
+    Aberration::new(coefficients.collect::<Vec<_>>()).unwrap()
 }
 
 /// Three boards behind one another, each with soft bars of its own, upright ones, lying ones and slanted ones, six to

@@ -73,7 +73,7 @@ fn agrees_with_equation_5_plane_by_plane() {
             let t = (z - z_m[next - 1]) / (z_m[next] - z_m[next - 1]);
             kernel(z_m[next - 1], lambda, mu, nu) * (1.0 - t) + kernel(z_m[next], lambda, mu, nu) * t
         };
-        for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
+        for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
             let content = |k: usize| {
                 let mut plane: Array2<Option<f64>> = Array2::from_elem(shape, None);
                 for layer in ldi.layers.iter().rev() {

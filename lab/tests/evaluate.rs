@@ -116,7 +116,7 @@ fn a_pair_is_read_as_it_was_made() {
 #[test]
 fn the_figures_are_those_of_the_definition() {
     let data = Data::new();
-    let rows = data.evaluate(&[Method::rgb()], &[Shown::complex()]);
+    let rows = data.evaluate(&[Method::rgb(&data.manifest.display)], &[Shown::complex()]);
     assert_eq!((rows.len(), rows[0].scenes.len()), (1, 2));
     let display = Display::default();
     for (index, figures) in &rows[0].scenes {
@@ -140,7 +140,7 @@ fn the_figures_are_those_of_the_definition() {
         for d in &depths {
             let view = |field: &Array3<Complex32>| {
                 let mut out = field.clone();
-                for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
+                for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
                     let z = display.z_of_depth(*d);
                     let plan = Propagator::new(SIZE, SIZE, display.pitch_m(), lambda, z, Padding::Double).unwrap();
                     let mut plane = out.index_axis_mut(Axis(0), colour);
@@ -170,7 +170,7 @@ fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
     let methods = [
         Method::layers(display, PLANES),
         Method::visible(display, PLANES),
-        Method::rgb(),
+        Method::rgb(display),
     ];
     let rows = data.evaluate(&methods, &[Shown::complex()]);
     let [layers, visible, rgb] = [0, 1, 2].map(|i| &rows[i].mean);
@@ -374,7 +374,10 @@ fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let judged = [("8", &network), ("layers", &layers)]
         .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());
     let [flat, layers] = judged;
-    let rows = data.evaluate(&[flat, layers, Method::rgb()], &[Shown::complex()]);
+    let rows = data.evaluate(
+        &[flat, layers, Method::rgb(&data.manifest.display)],
+        &[Shown::complex()],
+    );
     let psnr: Vec<f64> = rows.iter().map(|row| row.mean.amplitude_psnr).collect();
     assert!(psnr[0] > psnr[2] && psnr[1] > psnr[2] + 3.0, "{psnr:?}");
     let deep = Display::from_toml("volume_depth_mm = 12").unwrap();

@@ -133,7 +133,7 @@ fn a_plane_of_constant_depth_gives_back_its_amplitude() {
         let ldi = flat(shape, depth);
         let ours = hologram(&ldi, 100, Occlusion::Geometric);
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
-        for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
+        for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
             let plan = Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
             let mut plane = ours.index_axis(Axis(0), colour).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());

@@ -85,7 +85,7 @@ fn two_planes_equal_the_closed_computation() {
     assert!((z(0) - 1.5e-3).abs() < 1e-12 && (z(1) + 1.5e-3).abs() < 1e-12);
     let red = display.wavelengths_m()[0];
     let padded = asm::padded_shape(48, 56, 8e-6, red, 6e-3, Padding::Reach).unwrap();
-    for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
+    for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
         let image = |l: &LdiLayer| l.rgb.index_axis(Axis(0), colour).mapv(f64::from);
         let start = |z: f64| Complex64::from_polar(1.0, 2.0 * std::f64::consts::PI * z / lambda);
         let mut field = Array2::zeros(padded);
@@ -111,7 +111,7 @@ fn a_plane_of_constant_depth_refocuses_to_its_amplitude() {
         let display = Display::default();
         let z = sm_lbm::plane_z_m(sm_lbm::plane_of_depth(depth, 100), 100, &display);
         let inner = s![32..88, 32..128];
-        for (colour, lambda) in display.wavelengths_m().into_iter().enumerate() {
+        for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
             let plan = Propagator::new(120, 160, display.pitch_m(), lambda, z, Padding::Reach).unwrap();
             let mut plane = ours.index_axis(Axis(0), colour).to_owned();
             plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());

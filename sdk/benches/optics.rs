@@ -49,7 +49,7 @@ fn aperture(bencher: Bencher<'_, '_>) {
 #[divan::bench]
 fn remove_mean_phase(bencher: Bencher<'_, '_>) {
     let mut field = field(3);
-    let run = || phasefront::unstable::modulator::remove_mean_phase(&mut field);
+    let run = || phasefront::unstable::modulator::remove_mean_phase(&mut field, 3);
     bencher.counter(pixels(3)).bench_local(run);
 }
 

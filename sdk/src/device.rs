@@ -259,7 +259,7 @@ impl PackingToml {
 }
 
 impl From<Display> for Device {
-    /// One whose input takes all colours in one image.
+    /// One whose input takes all colours in one image, or one grey image of one laser's levels.
     fn from(display: Display) -> Self {
         Device {
             name: String::new(),
@@ -278,8 +278,9 @@ impl From<Display> for Device {
 impl Packing {
     /// Where a file says nothing of it.
     fn usual(display: &Display) -> Self {
-        Packing::Images(match display.bits() {
-            0..=8 => Layout::Rgb,
+        Packing::Images(match (display.bits(), display.colours()) {
+            (0..=8, 1) => Layout::Grey,
+            (0..=8, _) => Layout::Rgb,
             _ => Layout::Grey16,
         })
     }

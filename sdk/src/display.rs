@@ -15,7 +15,7 @@ pub struct Display {
     width: usize,
     height: usize,
     pitch_m: f64,
-    wavelengths_m: [f64; 3],
+    wavelengths_m: Vec<f64>,
     volume_depth_m: f64,
     offset_m: f64,
     bits: u32,
@@ -29,7 +29,7 @@ struct DisplayToml {
     width: usize,
     height: usize,
     pitch_um: f64,
-    wavelengths_nm: [f64; 3],
+    wavelengths_nm: Vec<f64>,
     volume_depth_mm: f64,
     offset_mm: f64,
     bits: u32,
@@ -44,7 +44,7 @@ impl Default for Display {
             width: 1920,
             height: 1080,
             pitch_m: 8e-6,
-            wavelengths_m: [638e-9, 520e-9, 450e-9],
+            wavelengths_m: vec![638e-9, 520e-9, 450e-9],
             volume_depth_m: 6e-3,
             offset_m: 0.0,
             bits: 8,
@@ -67,7 +67,7 @@ impl From<Display> for DisplayToml {
             width: d.width,
             height: d.height,
             pitch_um: round(d.pitch_m * 1e6),
-            wavelengths_nm: d.wavelengths_m.map(|l| round(l * 1e9)),
+            wavelengths_nm: d.wavelengths_m.iter().map(|l| round(l * 1e9)).collect(),
             volume_depth_mm: round(d.volume_depth_m * 1e3),
             offset_mm: round(d.offset_m * 1e3),
             bits: d.bits,
@@ -85,7 +85,7 @@ impl TryFrom<DisplayToml> for Display {
             width: t.width,
             height: t.height,
             pitch_m: t.pitch_um / 1e6,
-            wavelengths_m: t.wavelengths_nm.map(|l| l / 1e9),
+            wavelengths_m: t.wavelengths_nm.iter().map(|l| l / 1e9).collect(),
             volume_depth_m: t.volume_depth_mm / 1e3,
             offset_m: t.offset_mm / 1e3,
             bits: t.bits,
@@ -131,11 +131,17 @@ impl Display {
         if !(0.1e-6..=1e-3).contains(&self.pitch_m) {
             return refuse(format!("pitch_um is {}; it must lie in 0.1..=1000", self.pitch_m * 1e6));
         }
-        for l in self.wavelengths_m {
-            if !(100e-9..=20e-6).contains(&l) {
+        if ![1, 3].contains(&self.wavelengths_m.len()) {
+            return refuse(format!(
+                "wavelengths_nm has {} lasers; three are right, for red, green and blue, or one",
+                self.wavelengths_m.len()
+            ));
+        }
+        for l in &self.wavelengths_m {
+            if !(100e-9..=20e-6).contains(l) {
                 return refuse(format!("a wavelength is {} nm; each must lie in 100..=20000", l * 1e9));
             }
-            if l > 2.0 * self.pitch_m {
+            if *l > 2.0 * self.pitch_m {
                 return refuse(format!(
                     "a wavelength of {} nm needs a pitch of at least half of it; pitch_um is {}",
                     l * 1e9,
@@ -182,9 +188,19 @@ impl Display {
         self.pitch_m
     }
 
-    /// Wavelengths in the order red, green, blue, metres.
-    pub fn wavelengths_m(&self) -> [f64; 3] {
-        self.wavelengths_m
+    /// Wavelengths in the order red, green, blue, or that of the one laser, metres.
+    pub fn wavelengths_m(&self) -> &[f64] {
+        &self.wavelengths_m
+    }
+
+    /// The longest of them, whose light spreads farthest, metres.
+    pub fn longest_wavelength_m(&self) -> f64 {
+        self.wavelengths_m.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// How many lasers it has, C: 3 or 1. Frames, fields, levels and views have as many planes.
+    pub fn colours(&self) -> usize {
+        self.wavelengths_m.len()
     }
 
     /// Depth V of the volume, metres.
@@ -234,6 +250,20 @@ impl Display {
     }
 }
 
+/// Checks that `what`, which is of `colours` colours, is for a display of `right` lasers.
+///
+/// # Errors
+/// Another number.
+pub(crate) fn check_colours(what: &str, colours: usize, right: usize) -> Result<()> {
+    match colours == right {
+        true => Ok(()),
+        false => Err(Error::Plan(format!(
+            "{what} has {colours} {}, the display {right}; both must have as many",
+            if colours == 1 { "colour" } else { "colours" }
+        ))),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -257,6 +287,8 @@ mod tests {
             ("pitch_um = 0.2", "wavelength"),
             ("wavelengths_nm = [638, 520, -450]", "wavelength"),
             ("volume_depth_mm = 0", "volume_depth_mm"),
+            ("wavelengths_nm = [638, 520]", "2 lasers"),
+            ("wavelengths_nm = []", "0 lasers"),
             ("offset_mm = inf", "offset_mm"),
             ("bits = 11", "bits"),
             ("aperture_radius = 0", "aperture_radius"),
@@ -268,6 +300,15 @@ mod tests {
             assert!(message.contains(word), "{text}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
+    }
+
+    #[test]
+    fn one_laser_is_a_display() {
+        let d = Display::from_toml("wavelengths_nm = [532]").unwrap();
+        assert_eq!((d.colours(), d.wavelengths_m()), (1, &[532e-9][..]));
+        let text = toml::to_string(&d).unwrap();
+        assert_eq!(Display::from_toml(&text).unwrap(), d);
+        assert_eq!(Display::default().colours(), 3);
     }
 
     #[test]

@@ -13,15 +13,17 @@ pub(crate) use colour::check_size;
 pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix};
 #[cfg(feature = "gpu")]
 pub(crate) use convert::yuv_constants;
-pub use convert::{ColourPlan, ColourScratch};
+pub use convert::{ColourPlan, ColourScratch, luminance};
 pub use plane::{Orientation, Plane, Rotation};
 pub(crate) use resample::Axis;
 pub use resample::Crop;
 
+use crate::display::Display;
 use crate::error::{Error, Result};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 
-/// Colour as amplitude in \[0, 1], (3, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest.
+/// Colour as amplitude in \[0, 1], (C, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest. C is 3, red, green
+/// and blue, or 1 for a display of one laser.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RgbdFrame {
     rgb: Array3<f32>,
@@ -29,15 +31,15 @@ pub struct RgbdFrame {
 }
 
 impl RgbdFrame {
-    /// Joins `rgb`, (3, H, W), and `depth`, (H, W).
+    /// Joins `rgb`, (C, H, W), and `depth`, (H, W).
     ///
     /// # Errors
     /// Shapes that do not fit, an empty frame, or a value that is not finite or outside \[0, 1].
     pub fn new(rgb: Array3<f32>, depth: Array2<f32>) -> Result<Self> {
         let (channels, height, width) = rgb.dim();
-        if channels != 3 {
+        if ![1, 3].contains(&channels) {
             return Err(Error::Frame(format!(
-                "colour has {channels} planes; it must have 3: red, green, blue"
+                "colour has {channels} planes; it must have 3, for red, green and blue, or 1"
             )));
         }
         if height == 0 || width == 0 {
@@ -75,10 +77,29 @@ impl RgbdFrame {
         })
     }
 
-    /// A black frame at the far end of the volume.
-    pub(crate) fn black((height, width): (usize, usize)) -> Self {
+    /// The frame as the lasers of `display` show it. One laser shows the luminance Y of the picture, at amplitude √Y;
+    /// light is the square of amplitude, and Y = 0.2126·R + 0.7152·G + 0.0722·B (Rec. 709). Three lasers show a frame
+    /// of one colour as grey.
+    pub fn for_display(self, display: &Display) -> Self {
+        let (height, width) = self.shape();
+        let rgb = match (self.colours(), display.colours()) {
+            (3, 1) => {
+                let mut amplitude = Array3::zeros((1, height, width));
+                let planes = amplitude.as_slice_mut().zip(self.rgb.as_slice());
+                let (amplitude_values, rgb) = planes.expect("both are made in standard layout");
+                luminance(rgb, amplitude_values);
+                amplitude
+            }
+            (1, 3) => Array3::from_shape_fn((3, height, width), |(_, y, x)| self.rgb[(0, y, x)]),
+            _ => self.rgb,
+        };
+        RgbdFrame { rgb, depth: self.depth }
+    }
+
+    /// A black frame of `colours` at the far end of the volume.
+    pub(crate) fn black(colours: usize, (height, width): (usize, usize)) -> Self {
         RgbdFrame {
-            rgb: Array3::zeros((3, height, width)),
+            rgb: Array3::zeros((colours, height, width)),
             depth: Array2::ones((height, width)),
         }
     }
@@ -94,7 +115,12 @@ impl RgbdFrame {
         self.depth.dim()
     }
 
-    /// The amplitudes, (3, H, W), contiguous.
+    /// How many colours it has, C: 3 or 1.
+    pub fn colours(&self) -> usize {
+        self.rgb.dim().0
+    }
+
+    /// The amplitudes, (C, H, W), contiguous.
     pub fn rgb(&self) -> ArrayView3<'_, f32> {
         self.rgb.view()
     }
@@ -114,13 +140,19 @@ impl RgbdFrame {
     }
 
     /// # Errors
-    /// Another shape than a plan's.
-    pub(crate) fn check_shape(&self, plan: (usize, usize)) -> Result<()> {
+    /// Another shape than a plan's, or other colours.
+    pub(crate) fn check(&self, plan: (usize, usize), colours: usize) -> Result<()> {
         let (height, width) = self.shape();
         if (height, width) != plan {
             return Err(Error::Frame(format!(
                 "the frame is {width}×{height}; this plan takes {}×{}",
                 plan.1, plan.0
+            )));
+        }
+        if self.colours() != colours {
+            return Err(Error::Frame(format!(
+                "the frame's colours are {}; this plan takes {colours}, as RgbdFrame::for_display gives them",
+                self.colours()
             )));
         }
         Ok(())
@@ -134,6 +166,30 @@ mod tests {
 
     fn message(rgb: Array3<f32>, depth: Array2<f32>) -> String {
         RgbdFrame::new(rgb, depth).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn one_laser_shows_the_luminance() {
+        let one = Display::from_toml("wavelengths_nm = [532]").unwrap();
+        let rgb = Array3::from_shape_fn((3, 2, 4), |(c, y, x)| (c * 8 + y * 4 + x) as f32 / 24.0);
+        let depth = Array2::from_shape_fn((2, 4), |(y, x)| (y * 4 + x) as f32 / 8.0);
+        let frame = RgbdFrame::new(rgb.clone(), depth).unwrap();
+        let shown = frame.clone().for_display(&one);
+        assert_eq!((shown.colours(), shown.depth()), (1, frame.depth()));
+        for ((_, y, x), amplitude) in shown.rgb().indexed_iter() {
+            let light = |c| f64::from(rgb[(c, y, x)]).powi(2);
+            let luminance = 0.2126 * light(0) + 0.7152 * light(1) + 0.0722 * light(2);
+            assert!((f64::from(*amplitude) - luminance.sqrt()).abs() < 1e-6);
+        }
+        assert_eq!(shown.clone().for_display(&one), shown);
+        assert_eq!(frame.clone().for_display(&Display::default()), frame);
+        let grey = shown.clone().for_display(&Display::default());
+        assert!(
+            grey.rgb()
+                .outer_iter()
+                .all(|plane| plane == shown.rgb().index_axis(ndarray::Axis(0), 0))
+        );
+        assert!(frame.check((2, 4), 1).unwrap_err().to_string().contains("for_display"));
     }
 
     #[test]

@@ -18,22 +18,22 @@ pub const MAX_GAIN: f32 = 10.0;
 pub struct Illumination {
     /// (Gh, Gw).
     nodes: (usize, usize),
-    /// (3, Gh, Gw).
+    /// (C, Gh, Gw).
     gain: Vec<f32>,
 }
 
 impl Illumination {
-    /// From the laser's amplitude, (3, Gh, Gw), of any scale: each colour is divided by its largest value.
+    /// From the lasers' amplitudes, (C, Gh, Gw), of any scale: each colour is divided by its largest value.
     ///
     /// # Errors
-    /// Not three colours, fewer than 2 nodes along an axis, or a value that is not finite or negative, or a colour
-    /// without light.
+    /// Neither three colours nor one, fewer than 2 nodes along an axis, or a value that is not finite or negative, or a
+    /// colour without light.
     pub fn new(amplitude: ArrayView3<'_, f32>) -> Result<Self> {
         let refuse = |what: String| Err(Error::Plan(format!("laser map: {what}")));
         let (colours, rows, columns) = amplitude.dim();
-        if colours != 3 || rows < 2 || columns < 2 {
+        if ![1, 3].contains(&colours) || rows < 2 || columns < 2 {
             return refuse(format!(
-                "{colours} colours of {columns}×{rows}; there must be 3 of at least 2×2"
+                "{colours} colours of {columns}×{rows}; there must be 3 or 1 of at least 2×2"
             ));
         }
         let mut gain = Vec::with_capacity(amplitude.len());
@@ -53,12 +53,17 @@ impl Illumination {
         })
     }
 
+    /// How many colours it is of.
+    pub fn colours(&self) -> usize {
+        self.gain.len() / (self.nodes.0 * self.nodes.1)
+    }
+
     /// (Gh, Gw).
     pub fn nodes(&self) -> (usize, usize) {
         self.nodes
     }
 
-    /// One over the amplitude of each node, (3, Gh, Gw), at least 1, at most [`MAX_GAIN`].
+    /// One over the amplitude of each node, (C, Gh, Gw), at least 1, at most [`MAX_GAIN`].
     pub fn gains(&self) -> &[f32] {
         &self.gain
     }
@@ -67,7 +72,7 @@ impl Illumination {
     /// of [`Self::divide`].
     ///
     /// # Panics
-    /// If `colour` is over 2 or the pixel outside.
+    /// If it has no such colour or the pixel is outside.
     pub fn gain(&self, colour: usize, y: usize, x: usize, (height, width): (usize, usize)) -> f32 {
         assert!(y < height && x < width);
         let (i, fy) = split(y, height, self.nodes.0);
@@ -84,11 +89,11 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field`, (3, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's
+    /// Divides `field`, (C, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's
     /// amplitude. An axis of the modulator shorter than the field's counts as that. Allocates nothing.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `field` has not C·H·W values.
     pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value *= gain);
     }
@@ -97,7 +102,7 @@ impl Illumination {
     /// modulator.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `field` has not C·H·W values.
     pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value /= gain);
     }
@@ -119,7 +124,7 @@ impl Illumination {
         modulator: (usize, usize),
         change: impl Fn(&mut Complex32, f32) + Sync,
     ) {
-        assert_eq!(field.len(), 3 * height * width);
+        assert_eq!(field.len(), self.colours() * height * width);
         let lines = field.par_chunks_exact_mut(width).enumerate();
         lines.for_each(|(row, values)| {
             wide!(self.change_row(values, row, height, modulator, &change));
@@ -220,7 +225,7 @@ mod tests {
     #[test]
     fn unusable_maps_are_named() {
         let message = |a: Array3<f32>| Illumination::new(a.view()).unwrap_err().to_string();
-        assert!(message(Array3::ones((1, 4, 4))).contains("3 of"));
+        assert!(message(Array3::ones((2, 4, 4))).contains("3 or 1 of"));
         assert!(message(Array3::ones((3, 1, 4))).contains("2×2"));
         assert!(message(Array3::zeros((3, 4, 4))).contains("without light"));
         assert!(message(Array3::from_elem((3, 4, 4), f32::NAN)).contains("not finite"));

@@ -64,8 +64,9 @@
 //!
 //! # Conventions
 //!
-//! Colours in the order red, green, blue; lengths in metres (`_m`); planes row-major (H, W), stacks (3, H, W); x right,
-//! y down, z toward the viewer; the midpoint hologram at z = 0. An image's value is the amplitude.
+//! Colours in the order red, green, blue; lengths in metres (`_m`); planes row-major (H, W), stacks (C, H, W); x right,
+//! y down, z toward the viewer; the midpoint hologram at z = 0. An image's value is the amplitude. C is 3, or 1 where
+//! the display has one laser, which shows a picture's luminance ([`RgbdFrame::for_display`]).
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
 

@@ -63,6 +63,7 @@ pub(crate) fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Di
 /// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
 pub struct MethodPlan {
     shape: (usize, usize),
+    colours: usize,
     way: Way,
 }
 
@@ -111,6 +112,7 @@ impl MethodPlan {
         };
         Ok(MethodPlan {
             shape: (height, width),
+            colours: display.colours(),
             way,
         })
     }
@@ -153,10 +155,10 @@ impl MethodPlan {
         })
     }
 
-    /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (3, H, W).
+    /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (C, H, W).
     ///
     /// # Errors
-    /// A frame of another shape, or a `field` that has not 3·H·W values.
+    /// A frame of another shape or of other colours, or a `field` that has not C·H·W values.
     ///
     /// # Panics
     /// If `scratch` is another plan's.
@@ -173,7 +175,7 @@ impl MethodPlan {
         field: &mut [Complex32],
         scratch: &mut MethodScratch,
     ) -> Result<()> {
-        frame.check_shape(self.shape)?;
+        frame.check(self.shape, self.colours)?;
         match (&self.way, &mut scratch.0) {
             (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),

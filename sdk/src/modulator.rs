@@ -20,10 +20,11 @@ use std::time::{Duration, Instant};
 
 /// A plan for one shape, target and encoding. Immutable; shared between threads.
 pub struct Modulator {
+    colours: usize,
     height: usize,
     width: usize,
     /// None where the field stands at the modulator and there is nothing to correct.
-    offset: Option<[Propagator; 3]>,
+    offset: Option<Vec<Propagator>>,
     registration: Option<RegistrationPlan>,
     encoder: Encoder,
     midpoint: Option<MidpointSteps>,
@@ -55,7 +56,7 @@ pub struct Modulation {
 }
 
 impl Modulator {
-    /// Plans the way of (3, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
+    /// Plans the way of (C, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
     /// the offset's transfer function, so that it costs nothing beside it.
     ///
     /// # Errors
@@ -74,11 +75,13 @@ impl Modulator {
             network.check_prefilter(&target.display)?;
         }
         let distance_m = target.display.offset_m() - z_m;
+        let colours = target.display.colours();
         Ok(Modulator {
+            colours,
             height: shape.0,
             width: shape.1,
             offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
-            registration: RegistrationPlan::new(shape, &target.registration)?,
+            registration: RegistrationPlan::new(shape, colours, &target.registration)?,
             encoder: Encoder::new(shape, target, options)?,
             midpoint: match options.midpoint_steps {
                 0 => None,
@@ -97,6 +100,11 @@ impl Modulator {
         self.keeps_phase
     }
 
+    /// How many colours it is for.
+    pub(crate) fn colours(&self) -> usize {
+        self.colours
+    }
+
     /// (H, W).
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
@@ -113,17 +121,17 @@ impl Modulator {
             },
             midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
             phases: match self.midpoint.is_some() || self.panel.is_some() {
-                true => vec![0.0; 3 * self.height * self.width],
+                true => vec![0.0; self.colours * self.height * self.width],
                 false => Vec::new(),
             },
             percentile: Percentile::new(),
         }
     }
 
-    /// Takes `field`, (3, H, W), to the modulator, in place. Allocates nothing.
+    /// Takes `field`, (C, H, W), to the modulator, in place. Allocates nothing.
     ///
     /// # Panics
-    /// If `scratch` is another plan's, or `field` has not 3·H·W values.
+    /// If `scratch` is another plan's, or `field` has not C·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
         if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
@@ -138,11 +146,11 @@ impl Modulator {
         }
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`. `field` is worked on: what it holds afterwards means
+    /// Encodes a field at the modulator, (C, H, W), into `levels`. `field` is worked on: what it holds afterwards means
     /// nothing. Allocates nothing.
     ///
     /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
+    /// If `field` or `levels` has not C·H·W values.
     pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut ModulatorScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
@@ -181,7 +189,7 @@ impl Modulator {
     /// phases in the end.
     ///
     /// # Panics
-    /// If `field`, `phases` or `words` has not 3·H·W values.
+    /// If `field`, `phases` or `words` has not C·H·W values.
     pub fn modulate_words(
         &self,
         field: &mut [Complex32],
@@ -222,10 +230,10 @@ impl Modulator {
     }
 }
 
-/// Turns each colour of `field`, (3, H, W), by its mean phase arg Σu, so that its phase is centred on 0:
-/// a network's constant phase is arbitrary, and double phase wraps least around 0.
-pub fn remove_mean_phase(field: &mut [Complex32]) {
-    let size = field.len() / 3;
+/// Turns each of the `colours` planes of `field`, (C, H, W), by its mean phase arg Σu, so that its phase is centred on
+/// 0: a network's constant phase is arbitrary, and double phase wraps least around 0.
+pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
+    let size = field.len() / colours;
     if size == 0 {
         return;
     }
@@ -275,7 +283,7 @@ mod tests {
         let mut field: Vec<_> = (0..3 * 20_000)
             .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i / 20_000) as f32 + 0.1 * (i % 3) as f32))
             .collect();
-        remove_mean_phase(&mut field);
+        remove_mean_phase(&mut field, 3);
         for plane in field.chunks_exact(20_000) {
             let sum: Complex32 = plane.iter().sum();
             assert!(sum.arg().abs() < 1e-4);

@@ -25,7 +25,7 @@ mod tensor;
 pub use chain::Precision;
 pub use filter::{FilterPlan, FilterScratch};
 pub use head::Head;
-use metadata::Description;
+use metadata::{Description, Served};
 pub use metadata::{InputKind, TrainedDisplay};
 
 use crate::display::Display;
@@ -33,7 +33,7 @@ use crate::{Error, Result};
 use chain::Chain;
 #[cfg(feature = "gpu")]
 pub(crate) use fused::int8_layers;
-use fused::{FusedChain, FusedScratch};
+use fused::{FieldOf, FusedChain, FusedScratch};
 use num_complex::Complex32;
 pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
 use prost::Message;
@@ -190,7 +190,16 @@ impl Network {
     /// # Errors
     /// [`Error::Network`] for a display of a larger λ·V/p², or one whose lasers differ by over 5 % from one stretch.
     pub fn depth_scale(&self, display: &Display) -> Result<f32> {
-        Ok(self.display.depth_scale(display)?.min(1.0) as f32)
+        Ok(depth_scale(self.display.serve(display)?))
+    }
+
+    /// The colour whose output is the field of a `display` of one laser, 0 red, 1 green, 2 blue: the nearest of those
+    /// whose depths were trained as far as the display's reach. None for a display of three.
+    ///
+    /// # Errors
+    /// As [`Self::depth_scale`].
+    pub fn colour(&self, display: &Display) -> Result<Option<usize>> {
+        Ok(self.display.serve(display)?.colour)
     }
 
     /// Checks that it serves `display`.
@@ -214,13 +223,16 @@ impl Network {
         self.seed_planes
     }
 
-    /// [`Self::plan`] for frames whose depth is for `display`.
+    /// [`Self::plan`] for frames whose depth is for `display`, and for its colours: for one laser the network reads its
+    /// amplitude as red, green and blue, and [`Self::colour`] is kept of what it gives.
     ///
     /// # Errors
     /// As [`Self::plan`] and [`Self::depth_scale`].
     pub fn plan_for(&self, height: usize, width: usize, display: &Display) -> Result<NetworkPlan> {
+        let served = self.display.serve(display)?;
         Ok(NetworkPlan {
-            depth_scale: self.depth_scale(display)?,
+            depth_scale: depth_scale(served),
+            colour: served.colour,
             ..self.plan(height, width)?
         })
     }
@@ -266,6 +278,7 @@ impl Network {
             input: self.input,
             head: self.head,
             depth_scale: 1.0,
+            colour: None,
             height,
             width,
             path: Path::Fused(chain),
@@ -294,7 +307,20 @@ impl Network {
             chain,
             input: self.input,
             head: self.head,
+            colour: None,
             size: (height, width),
+        })
+    }
+
+    /// [`Self::filter_plan`] for the colours of `display`: for one laser in place on a (1, `height`, `width`) field, as
+    /// [`Self::plan_for`].
+    ///
+    /// # Errors
+    /// As [`Self::filter_plan`] and [`Self::depth_scale`].
+    pub fn filter_plan_for(&self, height: usize, width: usize, display: &Display) -> Result<FilterPlan> {
+        Ok(FilterPlan {
+            colour: self.colour(display)?,
+            ..self.filter_plan(height, width)?
         })
     }
 
@@ -335,6 +361,7 @@ impl Network {
             input: self.input,
             head: self.head,
             depth_scale: 1.0,
+            colour: None,
             height,
             width,
             path: Path::Stock(plan),
@@ -345,6 +372,11 @@ impl Network {
             },
         })
     }
+}
+
+/// What depths are stretched by: a little over the trained range is taken as that.
+fn depth_scale(served: Served) -> f32 {
+    served.scale.min(1.0) as f32
 }
 
 pub(crate) fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
@@ -382,6 +414,8 @@ pub struct NetworkPlan {
     head: Head,
     /// What depths are stretched by about the middle.
     depth_scale: f32,
+    /// Of a display of one laser, the output that is its field.
+    colour: Option<usize>,
     height: usize,
     width: usize,
     path: Path,
@@ -452,19 +486,33 @@ impl NetworkPlan {
         }
     }
 
-    /// Runs the network on the rows of `source` and writes the complex field that its head makes of them, (3, H, W), on
+    /// Runs the network on the rows of `source` and writes the complex field that its head makes of them, (C, H, W), on
     /// the current rayon pool. On the fused path neither input nor output lies in memory as planes, and after the first
     /// frame nothing is allocated.
     ///
     /// # Errors
-    /// [`Error::Frame`] when `field` has not 3·H·W values.
+    /// [`Error::Frame`] when `field` has not C·H·W values.
     pub fn field<S: Source + ?Sized>(
         &self,
         source: &S,
         field: &mut [Complex32],
         scratch: &mut NetworkScratch,
     ) -> Result<()> {
-        self.check("field", field.len(), 3)?;
+        match self.colour {
+            None => self.field_of([0, 1, 2], source, field, scratch),
+            Some(colour) => self.field_of([colour], source, field, scratch),
+        }
+    }
+
+    /// The field of some colours of the output.
+    fn field_of<S: Source + ?Sized, const C: usize>(
+        &self,
+        colours: [usize; C],
+        source: &S,
+        field: &mut [Complex32],
+        scratch: &mut NetworkScratch,
+    ) -> Result<()> {
+        self.check("field", field.len(), C)?;
         let size = self.size();
         let source = &Stretched {
             source,
@@ -473,7 +521,12 @@ impl NetworkPlan {
         };
         match &self.path {
             Path::Fused(chain) => {
-                chain.field(source, (self.input, self.head), field, size, &scratch.fused);
+                let into = FieldOf {
+                    kind: self.input,
+                    head: self.head,
+                    colours,
+                };
+                chain.field(source, into, field, size, &scratch.fused);
                 Ok(())
             }
             #[cfg(feature = "tract")]
@@ -487,7 +540,7 @@ impl NetworkPlan {
                     source.read(row / size.0, row % size.0, 0, into);
                 }
                 plan.run(input, output)?;
-                self.head.field(self.input, output, input, field)
+                self.head.field_of(self.input, &colours, output, input, field)
             }
         }
     }

@@ -20,8 +20,8 @@ use crate::target::Target;
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// How the levels of the colours lie in images. Levels of fewer bits than their place in the image stand in its upper
-/// bits.
+/// How the levels of the colours lie in images. Where all colours are in one, those of one laser stand at each. Levels
+/// of fewer bits than their place in the image stand in its upper bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Layout {
@@ -34,15 +34,15 @@ pub enum Layout {
     /// One image, 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
     /// RGBA_1010102, Metal's rgb10a2.
     Rgb10,
-    /// Three images, one after another: red, green, blue; a byte a pixel.
+    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
     Grey,
-    /// Three images, one after another: red, green, blue; a 16-bit little-endian word a pixel.
+    /// An image for each colour, one after another: red, green, blue; a 16-bit little-endian word a pixel.
     Grey16,
-    /// Three images, one after another; bytes red, green, blue, over which a level's bits are spread.
+    /// An image for each colour, one after another; bytes red, green, blue, over which a level's bits are spread.
     Split(Split),
 }
 
-/// A hologram's levels, (3, H, W).
+/// A hologram's levels, (C, H, W).
 #[derive(Debug, Clone, Copy)]
 pub enum Levels<'a> {
     /// As the planned response makes them, up to 8 bits.
@@ -52,10 +52,10 @@ pub enum Levels<'a> {
 }
 
 impl Layout {
-    /// How many images a hologram becomes.
-    pub fn images(self) -> usize {
+    /// How many images a hologram of `colours` becomes.
+    pub fn images(self, colours: usize) -> usize {
         match self {
-            Layout::Grey | Layout::Grey16 | Layout::Split(_) => 3,
+            Layout::Grey | Layout::Grey16 | Layout::Split(_) => colours,
             _ => 1,
         }
     }
@@ -146,6 +146,7 @@ impl Placement {
 /// A plan for one modulator, hologram shape and placement. Immutable; shared between threads.
 #[derive(Debug, Clone)]
 pub struct Output {
+    colours: usize,
     modulator: (usize, usize),
     hologram: (usize, usize),
     placement: Placement,
@@ -185,6 +186,7 @@ impl Output {
         let from =
             |modulator: usize, hologram: usize, shift: i32| -(((modulator - hologram) / 2) as i64 + i64::from(shift));
         Ok(Output {
+            colours: target.display.colours(),
             modulator,
             hologram: (height, width),
             placement,
@@ -214,7 +216,7 @@ impl Output {
         self.modulator
     }
 
-    /// Image `image` of a hologram of `levels`, (3, H, W), into `bytes`, rows without gaps. Allocates nothing.
+    /// Image `image` of a hologram of `levels`, (C, H, W), into `bytes`, rows without gaps. Allocates nothing.
     ///
     /// # Errors
     /// An image that the layout has not.
@@ -222,7 +224,7 @@ impl Output {
     /// # Panics
     /// If `levels` or `bytes` has another length than planned.
     pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
-        let size = 3 * self.hologram.0 * self.hologram.1;
+        let size = self.colours * self.hologram.0 * self.hologram.1;
         let (byte_bits, word_bits) = self.bits;
         match levels {
             Levels::Bytes(levels) => {
@@ -249,7 +251,7 @@ impl Output {
     }
 
     /// The inverse of [`Self::write`]: the levels that image `image` shows, of the display's bits, into their places of
-    /// (3, H, W). What other images hold is left as it is, and so are pixels that were shifted off the modulator.
+    /// (C, H, W). What other images hold is left as it is, and so are pixels that were shifted off the modulator.
     ///
     /// # Errors
     /// An image that the layout has not, or whose pixels have fewer bits than the display.
@@ -261,7 +263,7 @@ impl Output {
         let (height, width) = self.hologram;
         let (out_height, out_width) = self.modulator;
         assert_eq!(bytes.len(), self.image_bytes());
-        assert_eq!(levels.len(), 3 * height * width);
+        assert_eq!(levels.len(), self.colours * height * width);
         self.check_image(image)?;
         let (place, bits) = (layout.place_bits(), self.bits.1);
         if place < bits {
@@ -278,7 +280,7 @@ impl Output {
                 let row = flip(row as usize, out_height, self.placement.flip_y);
                 let column = flip(column as usize, out_width, self.placement.flip_x);
                 let pixel = &bytes[(row * out_width + column) * layout.pixel_bytes()..][..layout.pixel_bytes()];
-                for colour in 0..3 {
+                for colour in 0..self.colours {
                     if let Some(level) = layout.read_pixel(image, colour, pixel) {
                         levels[(colour * height + y) * width + x] = level >> (place - bits);
                     }
@@ -290,10 +292,10 @@ impl Output {
 
     fn check_image(&self, image: usize) -> Result<()> {
         let layout = self.placement.layout;
-        if image >= layout.images() {
+        if image >= layout.images(self.colours) {
             return Err(Error::Plan(format!(
                 "there is no image {image}; {layout:?} has {}",
-                layout.images()
+                layout.images(self.colours)
             )));
         }
         Ok(())
@@ -325,12 +327,12 @@ impl Output {
                 let modulator_x = flip(x, out_width, self.placement.flip_x);
                 let x = self.from.1 + modulator_x as i64;
                 let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
-                let level = |colour: usize| match inside {
-                    true => placed(level((colour * height + y as usize) * width + x as usize)),
-                    false => {
-                        let odd = (x + y).rem_euclid(2) as usize;
-                        placed(dark(odd, colour, (modulator_y, modulator_x)))
-                    }
+                let level = |place: usize| {
+                    let colour = place % self.colours;
+                    placed(match inside {
+                        true => level((colour * height + y as usize) * width + x as usize),
+                        false => dark((x + y).rem_euclid(2) as usize, colour, (modulator_y, modulator_x)),
+                    })
                 };
                 layout.write_pixel(image, level, pixel);
             }
@@ -388,7 +390,7 @@ mod tests {
                 output
                     .write(
                         Levels::Bytes(&levels),
-                        layout.images(),
+                        layout.images(3),
                         &mut vec![0; output.image_bytes()]
                     )
                     .is_err()
@@ -466,7 +468,7 @@ mod tests {
             let words: Vec<u16> = (0..45).map(|i| (i * 37 + 5) % (1 << bits)).collect();
             let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
             let mut read = vec![0; words.len()];
-            for image in 0..layout.images() {
+            for image in 0..layout.images(3) {
                 let mut pixels = vec![0; output.image_bytes()];
                 let levels = if bits > 8 {
                     Levels::Words(&words)

@@ -3,7 +3,7 @@
 //!
 //! It stands between the encoder and the response, on phases that lie in memory. The encoder's sweep does not know it.
 
-use crate::display::Display;
+use crate::display::{Display, check_colours};
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
@@ -102,7 +102,8 @@ impl Panel {
     }
 
     /// # Errors
-    /// A map for another modulator; a carrier and a lens that turn the phase by over half a turn from pixel to pixel.
+    /// A map for another modulator or other colours; a carrier and a lens that turn the phase by over half a turn from
+    /// pixel to pixel.
     pub(crate) fn check(&self, display: &Display) -> Result<()> {
         let (height, width) = (display.height(), display.width());
         if let Some(flatness) = &self.flatness
@@ -113,13 +114,18 @@ impl Panel {
                 flatness.shape.1, flatness.shape.0
             )));
         }
+        if let Some(flatness) = &self.flatness
+            && flatness.maps.len() > height * width
+        {
+            check_colours("the flatness map", 3, display.colours())?;
+        }
         if self.lens_m == Some(0.0) || self.lens_m.is_some_and(|f| !f.is_finite()) {
             return Err(Error::Plan("a lens of no focal length; it must not be 0".into()));
         }
         for (angle, pixels) in self.carrier_rad.into_iter().zip([width, height]) {
             let reach_m = pixels as f64 / 2.0 * display.pitch_m();
             let slope = angle.sin().abs() + self.lens_m.map_or(0.0, |f| reach_m / f.abs());
-            let shortest_m = display.wavelengths_m().into_iter().fold(f64::INFINITY, f64::min);
+            let shortest_m = display.wavelengths_m().iter().copied().fold(f64::INFINITY, f64::min);
             let turns = slope * display.pitch_m() / shortest_m;
             if turns.is_nan() || turns > 0.5 {
                 return Err(Error::Plan(format!(
@@ -134,14 +140,14 @@ impl Panel {
 /// A plan for holograms of one shape in the middle of a display. Immutable; shared between threads.
 #[derive(Debug, Clone)]
 pub struct PanelPlan {
-    /// (3, H, W), in turns of 2π/65536; empty where nothing is added.
+    /// (C, H, W), in turns of 2π/65536; empty where nothing is added.
     added: Arc<[u16]>,
     width: usize,
     nearest: Option<Nearest>,
 }
 
 impl PanelPlan {
-    /// Plans (3, H, W) = `shape` phases for `display`; None where `panel` adds nothing.
+    /// Plans (C, H, W) = `shape` phases for `display`; None where `panel` adds nothing.
     ///
     /// # Errors
     /// A map for another modulator; a carrier and a lens that turn the phase by over half a turn from pixel to pixel.
@@ -164,7 +170,7 @@ impl PanelPlan {
         }))
     }
 
-    /// Adds its phases to `phases`, (3, H, W) in \[0, 2π), where they stay. Allocates nothing.
+    /// Adds its phases to `phases`, (C, H, W) in \[0, 2π), where they stay. Allocates nothing.
     ///
     /// # Panics
     /// If `phases` has another length than planned.
@@ -183,12 +189,12 @@ impl PanelPlan {
             });
     }
 
-    /// The phase that is added at value `at` of a stack (3, H, W).
+    /// The phase that is added at value `at` of a stack (C, H, W).
     pub fn added(&self, at: usize) -> f32 {
         self.added.get(at).copied().map_or(0.0, radians)
     }
 
-    /// The inverse of [`Self::add`] on a field, (3, H, W), whose phases are those of levels.
+    /// The inverse of [`Self::add`] on a field, (C, H, W), whose phases are those of levels.
     ///
     /// # Panics
     /// If `field` has another length than planned.
@@ -201,7 +207,7 @@ impl PanelPlan {
         pairs.for_each(|(value, added)| *value *= Complex32::from_polar(1.0, -radians(*added)));
     }
 
-    /// The levels of `phases`, (3, H, W) in \[0, 2π), where they go on over one turn: of the levels that show a phase,
+    /// The levels of `phases`, (C, H, W) in \[0, 2π), where they go on over one turn: of the levels that show a phase,
     /// the one whose own phase is nearest to its left neighbour's, the first pixel's nearest to the middle of the
     /// range. False, and nothing done, where they do not. Allocates nothing.
     ///
@@ -223,7 +229,7 @@ fn radians(turns: u16) -> f32 {
     f32::from(turns) * (TAU / 65536.0)
 }
 
-/// The phases that `panel` adds, (3, H, W), in turns of 2π/65536. Light is exp(+i2πz/λ), so a wave that goes right by
+/// The phases that `panel` adds, (C, H, W), in turns of 2π/65536. Light is exp(+i2πz/λ), so a wave that goes right by
 /// the angle θ is exp(i2πx·sin θ/λ), and one that comes together f behind the panel exp(−iπ(x² + y²)/(λf)).
 fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> Vec<u16> {
     let modulator = (display.height(), display.width());
@@ -234,8 +240,8 @@ fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> V
     let pitch_m = display.pitch_m();
     let place = |at: usize, pixels: usize| (at as f64 - (pixels as f64 - 1.0) / 2.0) * pitch_m;
     let sines = panel.carrier_rad.map(f64::sin);
-    let mut all = Vec::with_capacity(3 * height * width);
-    for (colour, wavelength_m) in display.wavelengths_m().into_iter().enumerate() {
+    let mut all = Vec::with_capacity(display.colours() * height * width);
+    for (colour, wavelength_m) in display.wavelengths_m().iter().enumerate() {
         for y in 0..height {
             let y_m = place(y, height);
             for x in 0..width {
@@ -332,7 +338,7 @@ mod tests {
         let phases: Vec<f32> = (0..3 * 160).map(|i| (i % 63) as f32 * 0.1).collect();
         let mut shown = phases.clone();
         plan.add(&mut shown);
-        for (colour, wavelength_m) in display.wavelengths_m().into_iter().enumerate() {
+        for (colour, wavelength_m) in display.wavelengths_m().iter().enumerate() {
             for (y, x) in [(0, 0), (3, 15), (9, 7)] {
                 let (y_m, x_m) = ((y as f64 - 4.5) * 8e-6, (x as f64 - 7.5) * 8e-6);
                 let wave = 2.0 * PI * (x_m * 0.01f64.sin() + y_m * (-0.004f64).sin()) / wavelength_m;
@@ -368,7 +374,7 @@ mod tests {
         };
         let plan = PanelPlan::new(&panel, &display, (64, 128)).unwrap().unwrap();
         let distance_m = 20e-3;
-        for (colour, wavelength_m) in display.wavelengths_m().into_iter().enumerate() {
+        for (colour, wavelength_m) in display.wavelengths_m().iter().copied().enumerate() {
             // A beam of 20 pixels that goes straight without the carrier.
             let beam = |y: usize, x: usize| {
                 let (y, x) = (y as f32 - 31.5, x as f32 - 63.5);

@@ -65,6 +65,11 @@ impl Pipeline {
         Ok(Pipeline { method, modulator })
     }
 
+    /// How many colours its frames, fields and levels have, C: as many as the display has lasers.
+    pub fn colours(&self) -> usize {
+        self.modulator.colours()
+    }
+
     /// (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.method.shape()
@@ -83,7 +88,7 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (3, H, W): the method's hologram, mean phase taken out (but for an
+    /// The field at the modulator, into `field`, (C, H, W): the method's hologram, mean phase taken out (but for an
     /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
     ///
     /// # Errors
@@ -109,17 +114,17 @@ impl Pipeline {
         let of_method = &mut scratch.method;
         self.method.field_after(follows, frame, field, of_method)?;
         if !self.modulator.keeps_phase() {
-            remove_mean_phase(field);
+            remove_mean_phase(field, self.modulator.colours());
         }
         let predicted = Instant::now();
         self.modulator.propagate(field, &mut scratch.modulator);
         Ok((predicted - start, predicted.elapsed()))
     }
 
-    /// Encodes a field at the modulator, (3, H, W), into `levels`, as [`Modulator::modulate`].
+    /// Encodes a field at the modulator, (C, H, W), into `levels`, as [`Modulator::modulate`].
     ///
     /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
+    /// If `field` or `levels` has not C·H·W values.
     pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut PipelineScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
@@ -150,7 +155,7 @@ impl Pipeline {
     /// [`Modulator::modulate_words`].
     ///
     /// # Panics
-    /// If `field`, `phases` or `words` has not 3·H·W values.
+    /// If `field`, `phases` or `words` has not C·H·W values.
     pub fn modulate_words(
         &self,
         field: &mut [Complex32],
@@ -161,14 +166,14 @@ impl Pipeline {
         (self.modulator).modulate_words(field, phases, words, &mut scratch.modulator)
     }
 
-    /// One frame: its field into `field` and its levels into `levels`, both (3, H, W). `field` is worked
+    /// One frame: its field into `field` and its levels into `levels`, both (C, H, W). `field` is worked
     /// on: what it holds afterwards means nothing.
     ///
     /// # Errors
     /// A frame of another shape.
     ///
     /// # Panics
-    /// If `levels` has not 3·H·W values.
+    /// If `levels` has not C·H·W values.
     pub fn process(
         &self,
         frame: &RgbdFrame,

@@ -25,11 +25,12 @@ const MOST_SIDE: usize = 1 << 14;
 
 /// A plan for one hologram shape, z and screen size. Immutable; shared between threads.
 pub struct Preview {
+    colours: usize,
     hologram: (usize, usize),
     small: (usize, usize),
     factor: usize,
     /// None where the hologram stands at z.
-    propagators: Option<[Propagator; 3]>,
+    propagators: Option<Vec<Propagator>>,
     /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
     response: Response,
@@ -83,6 +84,7 @@ impl Preview {
         let aberration = target.correction.as_ref().map(Aberration::reversed);
         let illumination = target.illumination.clone();
         Ok(Preview {
+            colours: target.display.colours(),
             hologram: (height, width),
             small,
             factor,
@@ -111,13 +113,13 @@ impl Preview {
         let size = self.small.0 * self.small.1;
         PreviewScratch {
             field: vec![Complex32::ZERO; size],
-            amplitude: vec![0.0; 3 * size],
+            amplitude: vec![0.0; self.colours * size],
             propagation: self.propagators.as_ref().map(|p| p[0].scratch()),
         }
     }
 
-    /// The view of `levels`, (3, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red,
-    /// green, blue, alpha 255; amplitude 1 is 255. Allocates nothing.
+    /// The view of `levels`, (C, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red,
+    /// green, blue, alpha 255; amplitude 1 is 255, and one laser's view is grey. Allocates nothing.
     ///
     /// # Panics
     /// If `levels` or `rgba` has another length than planned.
@@ -125,7 +127,7 @@ impl Preview {
         let (height, width) = self.hologram;
         let (small_height, small_width) = self.small;
         let (screen_height, screen_width) = self.screen;
-        assert_eq!(levels.len(), 3 * height * width);
+        assert_eq!(levels.len(), self.colours * height * width);
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
         let light = scale / (self.factor * self.factor) as f32;
         // Where all pixels answer alike each level is one phase.
@@ -206,7 +208,11 @@ impl Preview {
                     (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
                 };
                 for (x, pixel) in pixels.as_chunks_mut::<4>().0.iter_mut().enumerate() {
-                    *pixel = [byte(0, x), byte(1, x), byte(2, x), 255];
+                    let [red, green, blue] = match self.colours {
+                        1 => [byte(0, x); 3],
+                        _ => [0, 1, 2].map(|colour| byte(colour, x)),
+                    };
+                    *pixel = [red, green, blue, 255];
                 }
             });
     }

@@ -45,8 +45,8 @@ impl Refocus {
             Aperture::new(1, 1, opening)?;
         }
         let reach_m = z_m.iter().map(|z| (z - display.offset_m()).abs()).fold(0.0, f64::max);
-        let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
-        let padded = asm::padded_shape(height, width, display.pitch_m(), longest, reach_m, Padding::Reach)?;
+        let (pitch_m, longest_m) = (display.pitch_m(), display.longest_wavelength_m());
+        let padded = asm::padded_shape(height, width, pitch_m, longest_m, reach_m, Padding::Reach)?;
         Ok(Refocus {
             display: display.clone(),
             fft: Fft2::new(height, width, padded.0, padded.1),
@@ -60,10 +60,10 @@ impl Refocus {
         self.fft.scratch()
     }
 
-    /// The spectrum of `plane`, (H, W), one colour (0 red, 1 green, 2 blue) of a hologram.
+    /// The spectrum of `plane`, (H, W), one colour (0 red, 1 green, 2 blue, or 0 of one laser) of a hologram.
     ///
     /// # Panics
-    /// If `plane` has not H·W values or `colour` is over 2.
+    /// If `plane` has not H·W values or the display has no such colour.
     pub fn spectrum(&self, plane: &[Complex32], colour: usize, scratch: &mut Scratch) -> Spectrum {
         let shape = self.fft.padded_shape();
         let mut columns = vec![Complex32::ZERO; shape.0 * shape.1];
@@ -125,16 +125,17 @@ impl Refocus {
         Ok(())
     }
 
-    /// The amplitudes |ASM(H, z − offset)| of a whole `hologram`, (3, H, W), for each z: stacks of
-    /// (3, H, W), in the order of `z_m`.
+    /// The amplitudes |ASM(H, z − offset)| of a whole `hologram`, (C, H, W), for each z: stacks of
+    /// (C, H, W), in the order of `z_m`.
     ///
     /// # Errors
     /// As [`Self::field`].
     pub fn focal_stack(&self, hologram: &[Complex32], z_m: &[f64]) -> Result<Vec<Vec<f32>>> {
-        let size = hologram.len() / 3;
+        let colours = self.display.colours();
+        let size = hologram.len() / colours;
         let mut scratch = self.scratch();
         let mut plane = vec![Complex32::ZERO; size];
-        let mut stack = vec![vec![0.0; 3 * size]; z_m.len()];
+        let mut stack = vec![vec![0.0; colours * size]; z_m.len()];
         for (colour, source) in hologram.chunks_exact(size).enumerate() {
             let spectrum = self.spectrum(source, colour, &mut scratch);
             for (view, &z) in stack.iter_mut().zip(z_m) {
@@ -148,7 +149,7 @@ impl Refocus {
     }
 }
 
-/// The field right behind a modulator that shows `levels`, (3, H, W): `scale`·exp(iφ) for each. Through the
+/// The field right behind a modulator that shows `levels`, (C, H, W): `scale`·exp(iφ) for each. Through the
 /// Fourier aperture it becomes the field that was encoded at that scale.
 ///
 /// # Panics

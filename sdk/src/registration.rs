@@ -4,36 +4,37 @@
 //! A field is band-limited to the aperture, so its values between pixels are those of a windowed sinc (Lanczos, four
 //! lobes): first along rows, then along columns.
 
+use crate::display::check_colours;
 use crate::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-/// How each colour is moved, in the order red, green, blue.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How each colour is moved, in the order red, green, blue. The default moves none.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Registration {
-    /// How far right and down, pixels of the modulator.
-    pub shift_px: [[f64; 2]; 3],
-    /// How much larger, about the middle of the hologram.
-    pub scale: [f64; 3],
-}
-
-impl Default for Registration {
-    /// Every colour where it is.
-    fn default() -> Self {
-        Registration {
-            shift_px: [[0.0; 2]; 3],
-            scale: [1.0; 3],
-        }
-    }
+    /// How far right and down, pixels of the modulator: one for each colour, or none where none is shifted.
+    pub shift_px: Vec<[f64; 2]>,
+    /// How much larger, about the middle of the hologram: one for each colour, or none where all keep their size.
+    pub scale: Vec<f64>,
 }
 
 /// Values on each side of a place that it is made of.
 const REACH: usize = 4;
 
 impl Registration {
+    /// Whether any colour is moved.
+    pub fn moves(&self) -> bool {
+        self.shift_px.iter().any(|shift| *shift != [0.0; 2]) || self.scale.iter().any(|scale| *scale != 1.0)
+    }
+
     /// # Errors
-    /// A shift of over 1000 pixels, or a scale outside 0.8 to 1.25.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// Another number of colours, a shift of over 1000 pixels, or a scale outside 0.8 to 1.25.
+    pub(crate) fn check(&self, colours: usize) -> Result<()> {
+        for (what, count) in [("shift_px", self.shift_px.len()), ("scale", self.scale.len())] {
+            if count > 0 {
+                check_colours(what, count, colours)?;
+            }
+        }
         for shift in self.shift_px.as_flattened() {
             if !(-1000.0..=1000.0).contains(shift) {
                 return Err(Error::Plan(format!(
@@ -41,8 +42,8 @@ impl Registration {
                 )));
             }
         }
-        for scale in self.scale {
-            if !(0.8..=1.25).contains(&scale) {
+        for scale in &self.scale {
+            if !(0.8..=1.25).contains(scale) {
                 return Err(Error::Plan(format!(
                     "a colour's scale is {scale}; it must lie in 0.8..=1.25"
                 )));
@@ -58,7 +59,7 @@ pub(crate) struct RegistrationPlan {
     height: usize,
     width: usize,
     /// Of each colour, for x and for y; None where it stays.
-    axes: [Option<[Axis; 2]>; 3],
+    axes: Vec<Option<[Axis; 2]>>,
 }
 
 /// Where each value of an axis comes from.
@@ -73,21 +74,26 @@ struct Taps {
 }
 
 impl RegistrationPlan {
-    /// Plans the move of (3, H, W) = `shape` fields; None where every colour stays.
+    /// Plans the move of fields of `colours` planes of (H, W) = `shape`; None where every colour stays.
     ///
     /// # Errors
     /// As [`Registration::check`].
-    pub(crate) fn new((height, width): (usize, usize), of: &Registration) -> Result<Option<Self>> {
-        of.check()?;
-        if *of == Registration::default() {
+    pub(crate) fn new((height, width): (usize, usize), colours: usize, of: &Registration) -> Result<Option<Self>> {
+        of.check(colours)?;
+        if !of.moves() {
             return Ok(None);
         }
-        let axes = std::array::from_fn(|colour| {
-            let ([right, down], scale) = (of.shift_px[colour], of.scale[colour]);
+        let axes = |colour: usize| {
+            let [right, down] = of.shift_px.get(colour).copied().unwrap_or_default();
+            let scale = of.scale.get(colour).copied().unwrap_or(1.0);
             let moves = (right, down, scale) != (0.0, 0.0, 1.0);
             moves.then(|| [Axis::new(width, right, scale), Axis::new(height, down, scale)])
-        });
-        Ok(Some(RegistrationPlan { height, width, axes }))
+        };
+        Ok(Some(RegistrationPlan {
+            height,
+            width,
+            axes: (0..colours).map(axes).collect(),
+        }))
     }
 
     /// Moves `plane`, (H, W), of `colour`, in place; what comes from outside is 0. `scratch` has as many values.
@@ -174,17 +180,27 @@ mod tests {
     fn colours_go_where_they_are_told() {
         let (height, width) = (61, 80);
         let of = Registration {
-            shift_px: [[0.0; 2], [3.25, -1.5], [-2.0, 4.0]],
-            scale: [1.0, 1.02, 1.0],
+            shift_px: vec![[0.0; 2], [3.25, -1.5], [-2.0, 4.0]],
+            scale: vec![1.0, 1.02, 1.0],
         };
-        let plan = RegistrationPlan::new((height, width), &of).unwrap().unwrap();
+        let plan = RegistrationPlan::new((height, width), 3, &of).unwrap().unwrap();
         let plane: Vec<Complex32> = (0..height * width)
             .map(|at| field((at % width) as f64 - 39.5, (at / width) as f64 - 30.0))
             .collect();
         let mut scratch = vec![Complex32::ZERO; plane.len()];
+        let alone = Registration {
+            shift_px: vec![of.shift_px[1]],
+            scale: vec![of.scale[1]],
+        };
+        let alone = RegistrationPlan::new((height, width), 1, &alone).unwrap().unwrap();
         for colour in 0..3 {
             let mut moved = plane.clone();
             plan.apply(colour, &mut moved, &mut scratch);
+            if colour == 1 {
+                let mut other = plane.clone();
+                alone.apply(0, &mut other, &mut scratch);
+                assert_eq!(other, moved);
+            }
             let ([right, down], scale) = (of.shift_px[colour], of.scale[colour]);
             let worst = (0..height * width)
                 .filter(|at| (8..height - 8).contains(&(at / width)) && (8..width - 8).contains(&(at % width)))
@@ -202,19 +218,19 @@ mod tests {
 
     #[test]
     fn what_cannot_be_is_refused() {
-        let good = Registration::default();
-        assert!(RegistrationPlan::new((4, 4), &good).unwrap().is_none());
+        let of = |shift_px: &[[f64; 2]], scale: &[f64]| {
+            let (shift_px, scale) = (shift_px.into(), scale.into());
+            RegistrationPlan::new((4, 4), 3, &Registration { shift_px, scale })
+        };
+        for good in [of(&[], &[]), of(&[[0.0; 2]; 3], &[1.0; 3])] {
+            assert!(good.unwrap().is_none());
+        }
         for bad in [
-            Registration {
-                scale: [1.0, 2.0, 1.0],
-                ..good
-            },
-            Registration {
-                shift_px: [[f64::NAN, 0.0]; 3],
-                ..good
-            },
+            of(&[], &[1.0, 2.0, 1.0]),
+            of(&[[f64::NAN, 0.0]; 3], &[]),
+            of(&[[1.0, 0.0]], &[]),
         ] {
-            assert!(RegistrationPlan::new((4, 4), &bad).is_err());
+            assert!(bad.is_err());
         }
     }
 }

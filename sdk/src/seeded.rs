@@ -22,13 +22,14 @@ pub fn seed(network: &Network, display: &Display) -> Sweep {
 
 /// A plan of a seeded network for one frame shape and display. Immutable; shared between threads.
 pub struct SeededPlan {
+    colours: usize,
     sweep: SweepPlan,
     network: NetworkPlan,
 }
 
 /// Working memory of a [`SeededPlan`] for one frame at a time.
 pub struct SeededScratch {
-    /// (3, H, W).
+    /// (C, H, W).
     seed: Vec<Complex32>,
     sweep: SweepScratch,
     network: NetworkScratch,
@@ -43,6 +44,7 @@ impl SeededPlan {
     pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
         let sweep = seed(network, display);
         Ok(SeededPlan {
+            colours: display.colours(),
             sweep: SweepPlan::new(height, width, display, sweep, 0.0)?,
             network: network.plan_for(height, width, display)?,
         })
@@ -57,17 +59,17 @@ impl SeededPlan {
     pub fn scratch(&self) -> SeededScratch {
         let (height, width) = self.sweep.shape();
         SeededScratch {
-            seed: vec![Complex32::ZERO; 3 * height * width],
+            seed: vec![Complex32::ZERO; self.colours * height * width],
             sweep: self.sweep.scratch(),
             network: self.network.scratch(),
         }
     }
 
-    /// The midpoint hologram of `frame`, carrier-free, into `field`, (3, H, W). After the first frame nothing is
+    /// The midpoint hologram of `frame`, carrier-free, into `field`, (C, H, W). After the first frame nothing is
     /// allocated.
     ///
     /// # Errors
-    /// A frame of another shape, or a `field` that has not 3·H·W values.
+    /// A frame of another shape or of other colours, or a `field` that has not C·H·W values.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SeededScratch) -> Result<()> {
         self.sweep.field(frame, &mut scratch.seed, &mut scratch.sweep)?;
         let seeded = SeededFrame {
@@ -78,7 +80,7 @@ impl SeededPlan {
     }
 }
 
-/// A frame and its seed, (3, H, W), as a seeded network reads them.
+/// A frame and its seed, (C, H, W), as a seeded network reads them.
 pub struct SeededFrame<'a> {
     /// The frame.
     pub frame: &'a RgbdFrame,
@@ -95,7 +97,7 @@ impl Source for SeededFrame<'_> {
             return self.frame.read(plane, row, from, into);
         };
         let (height, width) = self.frame.shape();
-        let at = ((part % 3) * height + row) * width + from;
+        let at = ((part % 3 % self.frame.colours()) * height + row) * width + from;
         let values = into.iter_mut().zip(&self.seed[at..]);
         match part / 3 {
             0 => values.for_each(|(to, u)| *to = 0.5 * (u.re - 0.5)),

@@ -124,7 +124,7 @@ impl Response {
         }
     }
 
-    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (3, H, W).
+    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (C, H, W).
     ///
     /// # Panics
     /// If `at` is outside the shape that the response is made for.
@@ -136,7 +136,7 @@ impl Response {
         }
     }
 
-    /// The phase that `level` shows, in \[0, 2π), at value `at` of a stack (3, H, W).
+    /// The phase that `level` shows, in \[0, 2π), at value `at` of a stack (C, H, W).
     ///
     /// # Panics
     /// As [`Self::level`].
@@ -152,7 +152,7 @@ impl Response {
     }
 
     /// [`Self::level`] of each phase of a row or part of one, which begins at value `first` of a stack
-    /// (3, H, W). Allocates nothing.
+    /// (C, H, W). Allocates nothing.
     ///
     /// # Panics
     /// If the lengths differ, or the response is made for a shape whose row ends before.

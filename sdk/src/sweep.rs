@@ -148,8 +148,7 @@ impl Sweep {
 
 /// How far light of the longest wavelength spreads over `distance_m`, pixels.
 fn reach_px(display: &Display, distance_m: f64) -> f64 {
-    let longest = display.wavelengths_m().into_iter().fold(0.0, f64::max);
-    crate::wave::asm::reach_m(distance_m, longest, display.pitch_m()) / display.pitch_m()
+    crate::wave::asm::reach_m(distance_m, display.longest_wavelength_m(), display.pitch_m()) / display.pitch_m()
 }
 
 /// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall
@@ -169,7 +168,7 @@ pub struct SweepPlan {
     sweep: Sweep,
     z_m: f64,
     fir: Fir,
-    filters: [Filters; 3],
+    filters: Vec<Filters>,
     hidden: Hidden,
     layout: Layout,
 }
@@ -198,14 +197,8 @@ impl SweepPlan {
         }
         let optics = optics(display, &sweep, z_m)?;
         // Fitting is the plan's only slow part, and colours do not depend on each other.
-        let mut filters = optics.map(|_| None);
-        (filters.par_iter_mut().zip(&optics)).for_each(|(filters, optics)| {
-            *filters = Some(Filters::new(optics, sweep.taps / 2));
-        });
-        let [Some(red), Some(green), Some(blue)] = filters else {
-            unreachable!("all three were made");
-        };
-        let filters = [red, green, blue];
+        let filters = optics.par_iter().map(|optics| Filters::new(optics, sweep.taps / 2));
+        let filters: Vec<Filters> = filters.collect();
         let way_m = |k: usize| optics[0].home_m.abs() + k as f64 * optics[0].step_m;
         let layout = Layout::new(
             sweep.tile,
@@ -257,18 +250,19 @@ impl SweepPlan {
         self.z_m
     }
 
-    /// The filters of red, green and blue.
+    /// The filters of each colour.
     #[cfg(feature = "gpu")]
-    pub(crate) fn filters(&self) -> &[Filters; 3] {
+    pub(crate) fn filters(&self) -> &[Filters] {
         &self.filters
     }
 
-    /// How well the filters of red, green and blue fit.
-    pub fn fit_errors(&self) -> [FitError; 3] {
-        self.filters.each_ref().map(|filters| FitError {
+    /// How well the filters of each colour fit.
+    pub fn fit_errors(&self) -> Vec<FitError> {
+        let of = |filters: &Filters| FitError {
             step: filters.errors[0],
             volume: filters.errors[1],
-        })
+        };
+        self.filters.iter().map(of).collect()
     }
 
     /// Working memory for one frame at a time, for the current thread pool.
@@ -288,17 +282,17 @@ impl SweepPlan {
         }
     }
 
-    /// The hologram of `frame`, carrier-free, at [`SweepPlan::z_m`], into `field`, (3, H, W). Allocates nothing.
+    /// The hologram of `frame`, carrier-free, at [`SweepPlan::z_m`], into `field`, (C, H, W). Allocates nothing.
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// A frame of another shape or of other colours.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values or `scratch` is another plan's.
+    /// If `field` has not C·H·W values or `scratch` is another plan's.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
-        frame.check_shape(self.shape())?;
+        frame.check(self.shape(), self.filters.len())?;
         let size = self.height * self.width;
-        assert_eq!(field.len(), 3 * size);
+        assert_eq!(field.len(), self.filters.len() * size);
         let (rgb, depth) = frame.values();
         const PART: usize = 1 << 14;
         (scratch.planes.par_chunks_mut(PART))
@@ -321,6 +315,7 @@ impl SweepPlan {
             width: self.width,
         };
         let mut planes = field.chunks_exact_mut(size);
+        // As many as there may be, for nothing is allocated here.
         let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
         let (down, across) = self.layout.count(self.height, self.width);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
@@ -353,8 +348,8 @@ pub fn reaches(display: &Display, z_m: f64) -> bool {
     reach_px(display, z_m.abs() + display.volume_depth_m() / 2.0) <= MAX_HOME_REACH as f64
 }
 
-/// The optics of red, green and blue between the planes of `sweep` and to `z_m`.
-pub(crate) fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Optics; 3]> {
+/// The optics of each colour between the planes of `sweep` and to `z_m`.
+pub(crate) fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>> {
     if !z_m.is_finite() {
         return Err(Error::Plan(format!(
             "sweep: the hologram cannot stand at z = {z_m} m; it must be finite"
@@ -370,12 +365,13 @@ pub(crate) fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<[Opti
             z_m * 1e3
         )));
     }
-    Ok(display.wavelengths_m().map(|wavelength_m| Optics {
+    let of = |&wavelength_m: &f64| Optics {
         pitch_m: display.pitch_m(),
         wavelength_m,
         step_m,
         planes: sweep.planes,
         home_m,
         between_planes: sweep.between_planes,
-    }))
+    };
+    Ok(display.wavelengths_m().iter().map(of).collect())
 }

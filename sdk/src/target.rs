@@ -11,7 +11,7 @@
 
 mod file;
 
-use crate::display::Display;
+use crate::display::{Display, check_colours};
 use crate::error::{Error, Result};
 pub use crate::illumination::Illumination;
 pub use crate::panel::{Flatness, Panel};
@@ -69,8 +69,18 @@ impl Default for Target {
 
 impl Target {
     /// # Errors
-    /// A table or a map for another modulator, or a table for a display of over 8 bits.
+    /// A table or a map for another modulator or another number of lasers, or a table for a display of over 8 bits.
     pub(crate) fn check(&self) -> Result<()> {
+        let colours = self.display.colours();
+        if let Response::PerPixel(table) = &self.response {
+            check_colours("the per-pixel table", table.colours(), colours)?;
+        }
+        if let Some(light) = &self.illumination {
+            check_colours("the laser's map", light.colours(), colours)?;
+        }
+        if let Some(correction) = &self.correction {
+            check_colours("the correction", correction.coefficients().len(), colours)?;
+        }
         let shape = (self.display.height(), self.display.width());
         if let Some(other) = self.response.shape()
             && other != shape
@@ -87,7 +97,7 @@ impl Target {
             )));
         }
         self.panel.check(&self.display)?;
-        self.registration.check()
+        self.registration.check(colours)
     }
 
     /// (H, W) of the modulator.
@@ -95,7 +105,7 @@ impl Target {
         (self.display.height(), self.display.width())
     }
 
-    /// The way of each colour of (3, H, W) = `shape` fields over `distance_m`, `correction` being part of it: in pixels
+    /// The way of each colour of (C, H, W) = `shape` fields over `distance_m`, `correction` being part of it: in pixels
     /// of `binning`² of the modulator's. None where there is nothing to do.
     ///
     /// # Errors
@@ -106,7 +116,7 @@ impl Target {
         binning: usize,
         distance_m: f64,
         correction: Option<&Aberration>,
-    ) -> Result<Option<[Propagator; 3]>> {
+    ) -> Result<Option<Vec<Propagator>>> {
         let (pupil_pitch_m, colours) = (self.display.pitch_m(), self.display.wavelengths_m());
         let pitch_m = pupil_pitch_m * binning as f64;
         match (distance_m, correction) {

@@ -18,7 +18,7 @@ use phasefront::unstable::wave::{
     aperture::{Aperture, Opening},
     asm::{Padding, Propagator},
 };
-use phasefront::{Display, Encoding, Method, Network, RgbdFrame, Sweep, Target};
+use phasefront::{Display, Encoding, Method, Network, Pipeline, RgbdFrame, Sweep, Target};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -102,12 +102,28 @@ fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
             ..Panel::default()
         },
         registration: Registration {
-            scale: [1.01, 1.0, 0.99],
+            scale: vec![1.01, 1.0, 0.99],
             ..Registration::default()
         },
         response: Response::PerPixel(table.into()),
         illumination: Some(laser),
         correction: Some(correction),
+    }
+}
+
+/// Whole frames on a display of one laser, on the current thread pool.
+fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
+    let display = Display::from_toml("wavelengths_nm = [520]\noffset_mm = 6").unwrap();
+    let (h, w) = frame.shape();
+    let frame = frame.clone().for_display(&display);
+    let (mut field, mut levels) = (vec![Complex32::ZERO; h * w], vec![0; h * w]);
+    for method in [Method::Sweep(Sweep::for_display(&display)), Method::trained(seeded)] {
+        let plan = Pipeline::new((h, w), method.clone(), &(&display).into(), &Encoding::ANTI_ALIAS.into()).unwrap();
+        let mut scratch = plan.scratch();
+        let process = || {
+            plan.process(&frame, &mut field, &mut levels, &mut scratch).unwrap();
+        };
+        assert_eq!(count(process), 0, "one laser, {method:?}");
     }
 }
 
@@ -165,6 +181,7 @@ fn hot_calls_allocate_nothing() {
                 plan.modulate(&mut field, &mut levels, &mut scratch);
             };
             assert_eq!(count(frame), 0, "a calibrated display");
+            one_laser(&swept, seeded.clone());
             for method in [
                 Method::Sweep(Sweep::for_display(&display)),
                 Method::trained(seeded.clone()),

@@ -72,6 +72,22 @@ fn every_method_gives_the_same_levels_on_any_number_of_threads() {
 }
 
 #[test]
+fn one_laser_gives_the_same_levels_on_any_number_of_threads() {
+    let display = Display::from_toml(&format!(
+        "width = {W}\nheight = {H}\noffset_mm = 2\nwavelengths_nm = [532]"
+    ))
+    .unwrap();
+    for (name, method) in [
+        ("sweep", Method::Sweep(Sweep::for_display(&display))),
+        ("int8", Method::Network(network(&Model::int8(8, 8)))),
+    ] {
+        let mut options = SessionOptions::new(display.clone(), method);
+        options.encoder.midpoint_steps = 1;
+        check(name, &options);
+    }
+}
+
+#[test]
 fn every_encoding_gives_the_same_levels_on_any_number_of_threads() {
     let method = Method::Network(network(&Model::int8(5, 8)));
     let midpoint = EncoderOptions {

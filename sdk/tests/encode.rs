@@ -17,6 +17,9 @@ use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use reference::test_plane;
 use rustfft::num_complex::{Complex32, Complex64};
 
+/// A display's first line.
+const ONE_LASER: &str = "wavelengths_nm = [532]\n";
+
 /// What double phase begins with, value by value: the field drawn to the real axis where it is dark, blurred, divided
 /// by the light, over `scale`.
 fn start(
@@ -53,18 +56,19 @@ fn start(
 }
 
 /// A case against the oracle, by phases and by levels; the same bits on any number of threads.
-fn check(shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderOptions) {
+fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderOptions) {
     const SCALE: f32 = 1.3;
     let (h, w) = shape;
     let response = Response::linear(8).unwrap();
     let radius = if laser.is_some() { 0.9 } else { 1.0 };
-    let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+    let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
+    let colours = display.colours() as u32;
     let target = Target {
         response: response.clone(),
         illumination: laser.cloned(),
         ..display.with_size(h, w).unwrap().into()
     };
-    let given: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 40 + c)).collect();
+    let given: Vec<_> = (0..colours).flat_map(|c| test_plane(shape, 40 + c)).collect();
     let mut results = [1, 3].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
@@ -76,7 +80,7 @@ fn check(shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderO
             (phases, levels)
         })
     });
-    let why = format!("{w}×{h}, light {}, {options:?}", laser.is_some());
+    let why = format!("{w}×{h}, {colours} colours, light {}, {options:?}", laser.is_some());
     assert!(results[0] == results[1], "other bits on other threads: {why}");
     let (phases, levels) = std::mem::take(&mut results[0]);
     assert!((phases.iter().zip(&levels).enumerate()).all(|(at, (p, l))| response.level(*p, at) == *l));
@@ -113,19 +117,21 @@ fn check(shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderO
 fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
     let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
     let laser = Illumination::new(beam.view()).unwrap();
+    let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
     let wide = Encoding::AntiAlias { sigma: 2.0, width: 9 };
     let encodings = [Encoding::DoublePhase, Encoding::ANTI_ALIAS, wide, Encoding::BAND_LIMIT];
     for shape in [(61, 47), (40, 150), (7, 130), (1, 1), (2, 2), (33, 1), (1, 40), (3, 5)] {
         for encoding in &encodings {
             for (dark, local_steps) in [(0.4, 0), (0.0, 1), (0.4, 1), (0.4, 2), (1.0, 3)] {
+                let options = EncoderOptions {
+                    dark,
+                    local_steps,
+                    ..encoding.clone().into()
+                };
                 for light in [None, Some(&laser)] {
-                    let options = EncoderOptions {
-                        dark,
-                        local_steps,
-                        ..encoding.clone().into()
-                    };
-                    check(shape, light, &options);
+                    check("", shape, light, &options);
                 }
+                check(ONE_LASER, shape, Some(&alone), &options);
             }
         }
     }
@@ -234,20 +240,24 @@ fn steps_at_the_midpoint_agree_with_sums_in_f64() {
     const SCALE: f32 = 1.3;
     let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
     let laser = Illumination::new(beam.view()).unwrap();
-    for (shape @ (h, w), offset_m, radius, light, steps) in [
-        ((61, 47), 0.0, 1.0, None, 1),
-        ((40, 66), 2e-3, 0.9, Some(&laser), 2),
-        ((33, 20), 1e-3, 0.3, None, 2),
-        ((1, 9), -1e-3, 1.2, None, 3),
-        ((1, 1), 0.0, 1.0, None, 1),
+    let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
+    for (display, shape @ (h, w), offset_m, radius, light, steps) in [
+        ("", (61, 47), 0.0, 1.0, None, 1),
+        ("", (40, 66), 2e-3, 0.9, Some(&laser), 2),
+        ("", (33, 20), 1e-3, 0.3, None, 2),
+        ("", (1, 9), -1e-3, 1.2, None, 3),
+        ("", (1, 1), 0.0, 1.0, None, 1),
+        (ONE_LASER, (61, 47), 0.0, 1.0, None, 1),
+        (ONE_LASER, (40, 66), 2e-3, 0.9, Some(&alone), 2),
     ] {
-        let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+        let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
         let display = display.with_offset_m(offset_m).unwrap();
         let target = Target {
             illumination: light.cloned(),
             ..display.clone().with_size(h, w).unwrap().into()
         };
-        let field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 40 + c)).collect();
+        let planes = 0..display.colours() as u32;
+        let field: Vec<_> = planes.flat_map(|c| test_plane(shape, 40 + c)).collect();
         let start: Vec<f32> = (0..field.len()).map(|i| (i * 37 % 628) as f32 / 100.0).collect();
         let mut results = [1, 3].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);

@@ -777,7 +777,7 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
     let frame = rgbd(h, w);
     for (offset_m, illumination, correction) in [
         (0.0, Some(beam.clone()), None),
-        (2e-3, Some(beam), Some(bent)),
+        (2e-3, Some(beam), Some(bent.clone())),
         (0.0, None, Some(bent)),
     ] {
         // A modulator that is wider than the frame, and lower.

@@ -301,6 +301,10 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
         (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
         cases.push((ten, "8 bits"));
+        let text = "width = 64\nheight = 48\noffset_mm = 2\nwavelengths_nm = [532]";
+        let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
+        (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
+        cases.push((one, "one laser"));
         // A line that no workgroup's memory holds.
         let mut long = gpu.clone();
         let text = "width = 9000\nheight = 4\noffset_mm = 2";

@@ -17,6 +17,10 @@ fn display() -> Display {
     Display::from_toml("volume_depth_mm = 1.5").unwrap()
 }
 
+fn one_laser() -> Display {
+    Display::from_toml("volume_depth_mm = 1.5\nwavelengths_nm = [532]").unwrap()
+}
+
 fn sweep() -> Sweep {
     Sweep {
         planes: 9,
@@ -47,7 +51,7 @@ fn frame(height: usize, width: usize) -> RgbdFrame {
 fn run(plan: &SweepPlan, frame: &RgbdFrame) -> Vec<Complex32> {
     let (height, width) = plan.shape();
     // What stood there before must not matter.
-    let mut field = vec![Complex32::new(f32::NAN, f32::NAN); 3 * height * width];
+    let mut field = vec![Complex32::new(f32::NAN, f32::NAN); frame.colours() * height * width];
     let mut scratch = plan.scratch();
     for _ in 0..2 {
         plan.field(frame, &mut field, &mut scratch).unwrap();
@@ -108,11 +112,14 @@ fn the_sweep_is_its_oracle() {
         (35, 37, sweep(), 2e-3),
         (35, 37, sweep(), -1e-3),
     ] {
-        let frame = frame(height, width);
-        let plan = SweepPlan::new(height, width, &display(), sweep, z_m).unwrap();
-        let slow = reference::field(&frame, &display(), sweep, z_m).unwrap();
-        let worst = farthest(&run(&plan, &frame), &slow);
-        assert!(worst < 1e-3, "{width}×{height} {sweep:?} {z_m}: {worst}");
+        for display in [display(), one_laser()] {
+            let frame = frame(height, width).for_display(&display);
+            let plan = SweepPlan::new(height, width, &display, sweep, z_m).unwrap();
+            let slow = reference::field(&frame, &display, sweep, z_m).unwrap();
+            let worst = farthest(&run(&plan, &frame), &slow);
+            let colours = display.colours();
+            assert!(worst < 1e-3, "{width}×{height} {sweep:?} {z_m} {colours}: {worst}");
+        }
     }
 }
 
@@ -195,13 +202,16 @@ fn what_cannot_be_swept_is_named() {
 #[test]
 fn a_seeded_network_corrects_the_sweep() {
     let (height, width) = (37, 45);
-    let display = Display::default();
-    let frame = frame(height, width);
-    for (model, tolerance, planes) in [
-        (Model::new(4, 8), 1e-5, None),
-        (Model::int8(5, 8), 0.05, None),
-        (Model::new(4, 8), 1e-5, Some(24)),
+    for (model, tolerance, planes, wavelengths_nm) in [
+        (Model::new(4, 8), 1e-5, None, "[638, 520, 450]"),
+        (Model::int8(5, 8), 0.05, None, "[638, 520, 450]"),
+        (Model::new(4, 8), 1e-5, Some(24), "[638, 520, 450]"),
+        // Colour 1, without a stretch.
+        (Model::new(4, 8), 1e-5, None, "[520]"),
+        (Model::int8(5, 8), 0.05, Some(24), "[520]"),
     ] {
+        let display = Display::from_toml(&format!("wavelengths_nm = {wavelengths_nm}")).unwrap();
+        let frame = frame(height, width).for_display(&display);
         let sweep = match planes {
             Some(planes) => Sweep::of_planes(&display, planes),
             None => Sweep::for_display(&display),
@@ -215,14 +225,17 @@ fn a_seeded_network_corrects_the_sweep() {
             ..model
         };
         let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
-        let mut input: Vec<f32> = frame.rgb().iter().chain(frame.depth()).map(|v| v - 0.5).collect();
-        input.extend(seed.iter().map(|u| 0.5 * (u.re - 0.5)));
-        input.extend(seed.iter().map(|u| 0.5 * u.im));
+        // One laser is all three colours of the input, and one of the output.
+        let (rgb, seeds) = (frame.rgb(), seed.repeat(3 / frame.colours()));
+        let rgb = rgb.broadcast((3, height, width)).unwrap();
+        let mut input: Vec<f32> = rgb.iter().chain(frame.depth()).map(|v| v - 0.5).collect();
+        input.extend(seeds.iter().map(|u| 0.5 * (u.re - 0.5)));
+        input.extend(seeds.iter().map(|u| 0.5 * u.im));
         let output = network::reference::run(network.chain(), &input, height, width);
-        let (re, im) = output.split_at(seed.len());
-        let expected: Vec<_> = (seed.iter().zip(re).zip(im))
-            .map(|((u, re), im)| u + Complex32::new(*re, *im))
-            .collect();
+        let (re, im) = output.split_at(seeds.len());
+        let expected = (seeds.iter().zip(re).zip(im)).map(|((u, re), im)| u + Complex32::new(*re, *im));
+        let first = network.colour(&display).unwrap().unwrap_or(0) * height * width;
+        let expected: Vec<_> = expected.skip(first).take(seed.len()).collect();
         let plan = MethodPlan::new(height, width, Method::trained(network), &display).unwrap();
         let mut field = vec![Complex32::ZERO; seed.len()];
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();

@@ -193,7 +193,7 @@ typedef enum PfLayout {
   PF_LAYOUT_RGBA = 1,
   // One image, bytes blue, green, red, alpha 255.
   PF_LAYOUT_BGRA = 2,
-  // An image a colour, one after another: red, green, blue; a byte a pixel.
+  // An image for each colour, one after another: red, green, blue; a byte a pixel.
   PF_LAYOUT_GREY = 3,
 } PfLayout;
 
@@ -240,6 +240,8 @@ typedef struct PfHologramInfo {
   uint32_t width;
   // Pixels along y.
   uint32_t height;
+  // How many colours its levels have: 3, or 1 for a display of one laser.
+  uint32_t colours;
   // The rung of the ladder that it was made on, 0 the best.
   uint32_t rung;
   // The amplitude that full light stands for.
@@ -456,8 +458,8 @@ extern "C" {
 // What is known of a hologram.
 enum PfStatus pf_hologram_info(const struct PfHologram *hologram, struct PfHologramInfo *info);
 
-// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours follow
-// one another without gaps, too. Valid until pf_hologram_free.
+// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.
+// The colours follow one another without gaps, too. Valid until pf_hologram_free.
 enum PfStatus pf_hologram_levels(const struct PfHologram *hologram,
                                  uint32_t colour,
                                  const uint8_t **levels,

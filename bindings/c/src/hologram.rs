@@ -49,6 +49,8 @@ pub struct PfHologramInfo {
     pub width: u32,
     /// Pixels along y.
     pub height: u32,
+    /// How many colours its levels have: 3, or 1 for a display of one laser.
+    pub colours: u32,
     /// The rung of the ladder that it was made on, 0 the best.
     pub rung: u32,
     /// The amplitude that full light stands for.
@@ -73,7 +75,7 @@ pub enum PfLayout {
     Rgba = 1,
     /// One image, bytes blue, green, red, alpha 255.
     Bgra = 2,
-    /// An image a colour, one after another: red, green, blue; a byte a pixel.
+    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
     Grey = 3,
 }
 
@@ -125,6 +127,7 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
                 timestamp_ns: known.timestamp_ns,
                 width: known.width,
                 height: known.height,
+                colours: known.colours,
                 rung: known.rung,
                 scale: known.scale,
                 near_m: known.near_m.unwrap_or(f32::NAN),
@@ -136,8 +139,8 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
     })
 }
 
-/// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours follow
-/// one another without gaps, too. Valid until pf_hologram_free.
+/// Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.
+/// The colours follow one another without gaps, too. Valid until pf_hologram_free.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_levels(
     hologram: *const PfHologram,

@@ -167,7 +167,9 @@ static size_t run(const cJSON *json, const char *suite, const char *models, cons
         PfFrame frame = frame_of(one, memory);
         PfHologram *hologram = NULL;
         ok(pf_session_process(session, &frame, &hologram), text(json, "name"));
-        for (uint32_t colour = 0; colour < 3; colour++) {
+        PfHologramInfo info;
+        ok(pf_hologram_info(hologram, &info), "info");
+        for (uint32_t colour = 0; colour < info.colours; colour++) {
             const uint8_t *levels = NULL;
             size_t length = 0;
             ok(pf_hologram_levels(hologram, colour, &levels, &length), "levels");

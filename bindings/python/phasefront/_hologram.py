@@ -38,7 +38,9 @@ class Purpose:
 def _display(display: Display) -> dict[str, object]:
     """A display as its TOML form has it."""
     fields = dict(vars(display))
-    return fields | {"wavelengths_nm": [fields.pop(f"{colour}_nm") for colour in ("red", "green", "blue")]}
+    three = [fields.pop(f"{colour}_nm") for colour in ("red", "green", "blue")]
+    laser = fields.pop("laser_nm")
+    return fields | {"wavelengths_nm": three if laser is None else [laser]}
 
 
 def _encoder(encoding: Encoding) -> str:
@@ -59,8 +61,8 @@ class Hologram:
 
     @property
     def levels(self) -> NDArray[numpy.uint8]:
-        """The modulator levels in place, uint8, (3, H, W): red, green, blue. Read only."""
-        return array_at(self._raw, self._raw.plane_address(0), (3, self.info.height, self.info.width))
+        """The modulator levels in place, uint8, (3, H, W): red, green, blue; (1, H, W) of one laser. Read only."""
+        return array_at(self._raw, self._raw.plane_address(0), (self.info.colours, self.info.height, self.info.width))
 
     def z_at(self, x: float, y: float) -> float:
         """z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm."""

@@ -32,6 +32,8 @@ namespace Phasefront
         public uint Width;
         /// <summary>Pixels along y.</summary>
         public uint Height;
+        /// <summary>How many colours its levels have: 3, or 1 for a display of one laser.</summary>
+        public uint Colours;
         /// <summary>The rung of the ladder that it was made on, 0 the best.</summary>
         public uint Rung;
         /// <summary>The amplitude that full light stands for.</summary>
@@ -55,7 +57,7 @@ namespace Phasefront
         Rgba = 1,
         /// <summary>One image, bytes blue, green, red, alpha 255.</summary>
         Bgra = 2,
-        /// <summary>An image a colour, one after another; a byte a pixel.</summary>
+        /// <summary>An image for each colour, one after another; a byte a pixel.</summary>
         Grey = 3,
     }
 
@@ -103,7 +105,7 @@ namespace Phasefront
             }
         }
 
-        /// <summary>The levels of one colour, row by row without gaps: 0 red, 1 green, 2 blue.</summary>
+        /// <summary>The levels of one colour, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one laser.</summary>
         public byte[] Levels(int colour)
         {
             Check(Native.pf_hologram_levels(this, checked((uint)colour), out var levels, out var length));

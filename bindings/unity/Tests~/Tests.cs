@@ -163,7 +163,7 @@ internal static class Tests
         {
             foreach (var frame in (IEnumerable)one["frames"])
                 using (var hologram = session.Process(FrameOf(frame, memory)))
-                    for (var colour = 0; colour < 3; colour++) got.AddRange(hologram.Levels(colour));
+                    for (var colour = 0; colour < hologram.Info.Colours; colour++) got.AddRange(hologram.Levels(colour));
         }
     }
 

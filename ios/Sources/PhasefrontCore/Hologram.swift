@@ -8,10 +8,13 @@ public enum Colour: UInt32, CaseIterable, Sendable {
     case green
     /// The blue laser's.
     case blue
+
+    /// The one of a display of one laser.
+    public static let laser = Colour.red
 }
 
-/// The hologram of one frame: modulator levels of three colours, and what is known of them. Its memory goes back to the
-/// session when the last reference to it is gone.
+/// The hologram of one frame: modulator levels of three colours, or of one laser, and what is known of them. Its memory
+/// goes back to the session when the last reference to it is gone.
 public final class Hologram: Sendable {
     /// What is known of it.
     public let info: HologramInfo

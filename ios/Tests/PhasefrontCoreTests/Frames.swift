@@ -36,9 +36,9 @@ func still(timestampNs: UInt64 = 0, colour: Data = colourBytes(), depth: Data = 
 }
 
 extension Hologram {
-    /// The levels of all three colours.
+    /// The levels of all colours.
     func levels() throws -> Data {
-        try Colour.allCases.reduce(into: Data()) { all, colour in
+        try Colour.allCases.prefix(Int(info.colours)).reduce(into: Data()) { all, colour in
             try withPlane(colour) { all.append(contentsOf: $0) }
         }
     }

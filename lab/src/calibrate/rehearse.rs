@@ -212,7 +212,7 @@ impl Stage<'_> {
         let mut dice = Dice::new(self.rehearsal.seed ^ 0xab);
         let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
         let wavelengths = display.wavelengths_m();
-        let truth = wavelengths.map(|lambda| green.map(|a| a * wavelengths[1] / lambda));
+        let truth: [Coefficients; 3] = std::array::from_fn(|c| green.map(|a| a * wavelengths[1] / wavelengths[c]));
         let aberrated = (self.simulated.clone()).with_aberration(Aberration::new(truth)?);
         let target = Target {
             response: calibrated.clone(),
@@ -283,6 +283,7 @@ impl Stage<'_> {
             red,
             green,
             blue,
+            laser: None,
         };
         table::write_aberrations(&self.folder.join("aberration.toml"), &[entry])?;
         let panel = Panel {

@@ -2,8 +2,8 @@
 //! aberrations.
 //!
 //! * The table is [`phasefront::unstable::slm::per_pixel`]'s bytes.
-//! * The laser map is an RGB PNG of 8 or 16 bits: the laser's amplitude at nodes spread evenly from the first to the
-//!   last pixel of each axis, each colour of any scale.
+//! * The laser map is a PNG of 8 or 16 bits, RGB, or grey for one laser: the lasers' amplitude at nodes spread evenly
+//!   from the first to the last pixel of each axis, each colour of any scale.
 //! * Aberrations are TOML, one `[[at]]` a calibrated distance, z ascending, with the coefficients a₃ to a₇ of the
 //!   correction in radians; `x` and `y`, from 0 to 1 over the frame, where they differ over it:
 //!
@@ -14,12 +14,15 @@
 //! green = [0.15, -1.0, 0.0, 0.06, 0.0]
 //! blue = [0.17, -1.2, 0.0, 0.07, 0.0]
 //! ```
+//!
+//! One laser has `laser = […]` in their place.
 
 use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
-use crate::files::{open_image, write_atomically};
+use crate::files::{self, open_image, write_atomically};
 use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
+use phasefront::Display;
 use phasefront::target::{Aberration, Illumination, PerPixel};
 use phasefront::unstable::wave::zernike::{Aberrations, Coefficients};
 use serde::{Deserialize, Serialize};
@@ -46,32 +49,39 @@ pub fn write_per_pixel(path: &Path, table: &PerPixel) -> Result<()> {
 /// Reads a laser map.
 ///
 /// # Errors
-/// A file that is missing, no RGB image, or a colour without light.
+/// A file that is missing, neither RGB nor grey, or a colour without light.
 pub fn read_laser(path: &Path) -> Result<Illumination> {
     let image = open_image(path)?;
-    if !matches!(image, DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgb16(_)) {
-        return Err(Error::file(
-            path,
-            format!("holds {:?} pixels; a laser map is RGB", image.color()),
-        ));
-    }
+    let colours = match image {
+        DynamicImage::ImageRgb8(_) | DynamicImage::ImageRgb16(_) => 3,
+        DynamicImage::ImageLuma8(_) | DynamicImage::ImageLuma16(_) => 1,
+        _ => {
+            return Err(Error::file(
+                path,
+                format!(
+                    "holds {:?} pixels; a laser map is RGB, or grey for one laser",
+                    image.color()
+                ),
+            ));
+        }
+    };
     let image = image.into_rgb32f();
     let (width, height) = (image.width() as usize, image.height() as usize);
     let pixels = image.into_raw();
-    let amplitude = Array3::from_shape_fn((3, height, width), |(c, y, x)| pixels[3 * (y * width + x) + c]);
+    let amplitude = Array3::from_shape_fn((colours, height, width), |(c, y, x)| pixels[3 * (y * width + x) + c]);
     Illumination::new(amplitude.view()).map_err(|e| Error::file(path, e))
 }
 
-/// Writes a laser map of amplitudes, (3, Gh, Gw), each colour to its largest value, in 16 bits.
+/// Writes a laser map of amplitudes, (C, Gh, Gw), each colour to its largest value, in 16 bits.
 ///
 /// # Errors
 /// A file that cannot be written.
 pub fn write_laser(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
-    let (_, height, width) = amplitude.dim();
+    let (colours, height, width) = amplitude.dim();
     let most: Vec<f32> = (amplitude.outer_iter())
         .map(|plane| plane.iter().copied().fold(f32::MIN_POSITIVE, f32::max))
         .collect();
-    let mut bytes = Vec::with_capacity(6 * height * width);
+    let mut bytes = Vec::with_capacity(2 * amplitude.len());
     for y in 0..height {
         for x in 0..width {
             for (c, most) in most.iter().enumerate() {
@@ -82,7 +92,7 @@ pub fn write_laser(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     }
     write_atomically(path, |file| {
         let mut encoder = png::Encoder::new(file, width as u32, height as u32);
-        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_color(files::png_color(colours));
         encoder.set_depth(png::BitDepth::Sixteen);
         let other = std::io::Error::other;
         let mut writer = encoder.write_header().map_err(other)?;
@@ -112,6 +122,9 @@ pub struct Entry {
     /// Of blue.
     #[serde(default)]
     pub blue: Coefficients,
+    /// Of the laser of a display that has one, in the place of the three.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<Coefficients>,
 }
 
 impl Entry {
@@ -125,7 +138,10 @@ impl Entry {
     }
 
     fn aberration(&self) -> phasefront::Result<Aberration> {
-        Aberration::new([self.red, self.green, self.blue])
+        match self.laser {
+            Some(laser) => Aberration::new([laser]),
+            None => Aberration::new([self.red, self.green, self.blue]),
+        }
     }
 }
 
@@ -145,11 +161,36 @@ pub enum AberrationFile {
 }
 
 impl AberrationFile {
+    /// How many colours it corrects.
+    pub fn colours(&self) -> usize {
+        let entries = self.entries();
+        let laser = entries.first().is_some_and(|entry| entry.laser.is_some());
+        if laser { 1 } else { 3 }
+    }
+
+    /// Checks that it is for the lasers of `display`.
+    ///
+    /// # Errors
+    /// Another number of colours.
+    pub fn check(&self, display: &Display) -> Result<()> {
+        let (of, right) = (self.colours(), display.colours());
+        match of == right {
+            true => Ok(()),
+            false => Err(Error::Input(format!(
+                "the aberration is of {of} colours, the display has {right}; both must have as many"
+            ))),
+        }
+    }
+
     /// What the file says, entry by entry.
     pub fn entries(&self) -> Vec<Entry> {
         let entries = |all: &Aberrations, place: Option<[f64; 2]>| -> Vec<Entry> {
             let entry = |(z_m, a): &(f64, Aberration)| {
-                let [red, green, blue] = *a.coefficients();
+                let (laser, [red, green, blue]) = match *a.coefficients() {
+                    [laser] => (Some(laser), Default::default()),
+                    [red, green, blue] => (None, [red, green, blue]),
+                    _ => unreachable!("of three colours or one"),
+                };
                 Entry {
                     z_mm: z_m * 1e3,
                     x: place.map(|p| p[0]),
@@ -157,6 +198,7 @@ impl AberrationFile {
                     red,
                     green,
                     blue,
+                    laser,
                 }
             };
             all.calibrated().iter().map(entry).collect()
@@ -232,7 +274,11 @@ pub fn write_aberrations(path: &Path, entries: &[Entry]) -> Result<()> {
                 text.push_str(&format!("{name} = {place:?}\n"));
             }
         }
-        for (name, a) in [("red", entry.red), ("green", entry.green), ("blue", entry.blue)] {
+        let colours = match entry.laser {
+            Some(laser) => vec![("laser", laser)],
+            None => vec![("red", entry.red), ("green", entry.green), ("blue", entry.blue)],
+        };
+        for (name, a) in colours {
             text.push_str(&format!("{name} = {a:?}\n"));
         }
         text.push('\n');
@@ -258,7 +304,11 @@ mod tests {
         for (a, b) in read.gains().iter().zip(direct.gains()) {
             assert!((a - b).abs() < 1e-4);
         }
-        image::GrayImage::new(4, 4).save(&path).unwrap();
+        let green = map.slice(ndarray::s![1..2, .., ..]);
+        write_laser(&path, green).unwrap();
+        let alone = read_laser(&path).unwrap();
+        assert_eq!(alone.gains(), &read.gains()[20..40]);
+        image::RgbaImage::new(4, 4).save(&path).unwrap();
         assert!(read_laser(&path).unwrap_err().to_string().contains("RGB"));
     }
 
@@ -274,6 +324,7 @@ mod tests {
             red: [0.1, -0.2, 0.3, 0.0, 1.5],
             green: [z_mm; 5],
             blue: [0.0; 5],
+            laser: None,
         };
         write_aberrations(&path, &[entry(-1.0, None), entry(2.0, None)]).unwrap();
         let AberrationFile::Uniform(read) = read_aberrations(&path).unwrap() else {
@@ -287,7 +338,19 @@ mod tests {
         };
         let places: Vec<_> = read.points().map(|(place, _)| place).collect();
         assert_eq!(places, [[0.2, 0.5], [0.8, 0.5]]);
+        let laser = |z_mm: f64| Entry {
+            laser: Some([0.5, 0.0, -1.0, 0.0, z_mm]),
+            ..entry(z_mm, None)
+        };
+        write_aberrations(&path, &[laser(0.0), laser(1.0)]).unwrap();
+        let read = read_aberrations(&path).unwrap();
+        assert_eq!(read.colours(), 1);
+        let AberrationFile::Uniform(read) = read else {
+            panic!("not uniform");
+        };
+        assert_eq!(read.at(1e-3).coefficients(), [[0.5, 0.0, -1.0, 0.0, 1.0]]);
         for (entries, word) in [
+            (vec![laser(0.0), entry(1.0, None)], "one colour and of three"),
             (vec![entry(2.0, None), entry(1.0, None)], "ascend"),
             (vec![entry(0.0, None), entry(1.0, Some(0.5))], "x and y"),
             (vec![entry(0.0, Some(1.5))], "0 to 1"),

@@ -74,7 +74,7 @@ pub(crate) struct Lut {
 
 impl Lut {
     fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?.target.display;
+        let display = self.display.read_of_three()?.target.display;
         let pattern = Pattern::new(display.height(), display.width())?;
         match (&self.patterns, &self.captures, &self.output) {
             (Some(folder), ..) => {
@@ -214,7 +214,7 @@ impl Laser {
         if !files::has_extension(&self.output, "png") {
             return Err(Error::file(&self.output, "the name must end in .png"));
         }
-        let display = self.display.read()?.target.display;
+        let display = self.display.read_of_three()?.target.display;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
         let (mut maps, mut left) = (Vec::new(), Vec::new());
@@ -337,7 +337,7 @@ struct SearchFile {
 impl Aberration {
     fn run(self, json: bool) -> Result<()> {
         let state = self.folder.join("search.json");
-        let file = self.display.read()?;
+        let file = self.display.read_of_three()?;
         let entries = match self.output.exists() {
             true => table::read_entries(&self.output)?,
             false => Vec::new(),
@@ -459,6 +459,7 @@ impl Aberration {
             red: [0.0; 5],
             green: [0.0; 5],
             blue: [0.0; 5],
+            laser: None,
         });
         entries.retain(|e| (e.z_mm, e.x, e.y) != (entry.z_mm, entry.x, entry.y));
         *entry.colour_mut(self.index()) = now.search.best;

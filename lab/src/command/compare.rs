@@ -25,8 +25,10 @@ impl Compare {
         let result = metrics::compare(a.view(), b.view()).map_err(|e| Error::file(&self.b, e))?;
         let mut text = String::from("        PSNR dB    SSIM");
         let colours = ["red", "green", "blue"];
-        for (i, colour) in colours.iter().enumerate() {
-            text += &format!("\n{colour:7} {:7.2}  {:6.4}", result.psnr[i], result.ssim[i]);
+        let each = result.psnr.iter().zip(&result.ssim);
+        // Of one laser the overall figure is its own.
+        for (colour, (psnr, ssim)) in colours.iter().zip(each).filter(|_| result.psnr.len() == colours.len()) {
+            text += &format!("\n{colour:7} {psnr:7.2}  {ssim:6.4}");
         }
         text += &format!("\noverall {:7.2}  {:6.4}", result.psnr_overall, result.ssim_overall);
         super::print(json, &json!(result), text);

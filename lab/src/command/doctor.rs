@@ -75,11 +75,14 @@ impl Chosen {
             }
             None => None,
         };
-        let [red, green, blue] = display.wavelengths_m().map(|lambda| (lambda * 1e9).round());
+        let lasers: Vec<_> = (display.wavelengths_m().iter())
+            .map(|lambda| (lambda * 1e9).round().to_string())
+            .collect();
         Ok(Chosen {
             display: format!(
-                "{width}×{height} of {} µm, {red}/{green}/{blue} nm, {} mm deep, modulator at {} mm",
+                "{width}×{height} of {} µm, {} nm, {} mm deep, modulator at {} mm",
                 display.pitch_m() * 1e6,
+                lasers.join("/"),
                 display.volume_depth_m() * 1e3,
                 display.offset_m() * 1e3
             ),

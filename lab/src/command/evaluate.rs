@@ -243,7 +243,7 @@ impl Evaluate {
         let mut methods: Vec<_> = (self.method.iter())
             .map(|name| {
                 Ok(match name {
-                    MethodName::Rgb => Method::rgb(),
+                    MethodName::Rgb => Method::rgb(display),
                     MethodName::Visible => Method::visible(display, planes),
                     MethodName::Filled => Method::filled(display, planes),
                     MethodName::Sweep => Method::sweep(manifest.size, display, self.sweep(display))?,

@@ -30,6 +30,17 @@ impl DisplayFlags {
         self.display.is_some()
     }
 
+    /// Of a command that knows red, green and blue alone.
+    pub(crate) fn read_of_three(&self) -> Result<DisplayFile> {
+        let file = self.read()?;
+        match file.target.display.colours() {
+            3 => Ok(file),
+            _ => Err(Error::Input(
+                "this command is for displays of three lasers; --display has one".into(),
+            )),
+        }
+    }
+
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => files::find_display(name)?,

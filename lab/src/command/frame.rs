@@ -112,7 +112,7 @@ impl FrameFlags {
         self.photo.as_deref().or(self.rgb.as_deref())
     }
 
-    /// The frame for `display`.
+    /// The frame for `display`, in the colours of its lasers.
     pub(crate) fn read(&self, display: &Display) -> Result<RgbdFrame> {
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
@@ -144,7 +144,7 @@ impl FrameFlags {
                 modulator.0
             );
         }
-        Ok(frame)
+        Ok(frame.for_display(display))
     }
 
     fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {

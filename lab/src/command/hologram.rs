@@ -324,7 +324,9 @@ impl Making {
             ));
         }
         match &self.ldi {
-            Some(dir) => Ok(Image::Layers(Ldi::read(dir)?)),
+            Some(dir) => Ok(Image::Layers(
+                Ldi::read(dir)?.for_display(&display.target.display).into_owned(),
+            )),
             None => Ok(Image::Rgbd(self.frame.read(&display.target.display)?)),
         }
     }
@@ -360,7 +362,8 @@ impl Making {
                 self.by_core(method.name(), core, frame, display, encoder, device.as_ref())
             }
             (method, Image::Rgbd(frame)) => {
-                self.by_layers(method, &single_layer(frame)?, display, self.encoder.read()?)
+                let ldi = Ldi::new(vec![LdiLayer::from(frame)])?;
+                self.by_layers(method, &ldi, display, self.encoder.read()?)
             }
             (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
         }
@@ -404,7 +407,8 @@ impl Making {
         let options = self.encoder_options(&encoder.options);
         let pipeline = Pipeline::new((height, width), method, &target, &options)?;
         let mut scratch = pipeline.scratch();
-        let mut field = Array3::from_elem((3, height, width), Complex32::ZERO);
+        let mut field = Array3::from_elem((pipeline.colours(), height, width), Complex32::ZERO);
+        let shape = field.dim();
         let values = field.as_slice_mut().expect("standard layout");
         let (predict, propagate) = pipeline.field(frame, values, &mut scratch)?;
         // The encoder filters the field that it is given, so a copy is kept where it is asked for.
@@ -416,7 +420,7 @@ impl Making {
         let engine = pipeline.method().engine();
         Ok(Made {
             method: stage,
-            field: kept.map(|values| stack(values, height, width)),
+            field: kept.map(|values| stack(values, shape)),
             levels,
             words,
             encoder,
@@ -496,8 +500,8 @@ impl Making {
         let mut engine = None;
         let (stage, mut field) = match method {
             Method::Core(_) => {
-                let plan = self.network_for_layers(display)?.plan(height, width)?;
-                let mut field = Array3::zeros((3, height, width));
+                let plan = self.network_for_layers(display)?.plan_for(height, width, display)?;
+                let mut field = Array3::zeros((display.colours(), height, width));
                 let values = field.as_slice_mut().expect("standard layout");
                 plan.field(ldi, values, &mut plan.scratch())?;
                 engine = Some(described(plan.engine()));
@@ -527,6 +531,7 @@ impl Making {
         };
         bar.finish_and_clear();
         let waved = Instant::now();
+        let shape = field.dim();
         let values = field.as_slice_mut().expect("standard layout");
         modulator.propagate(values, &mut scratch);
         let propagate = waved.elapsed();
@@ -537,7 +542,7 @@ impl Making {
         });
         Ok(Made {
             method: stage,
-            field: kept.map(|values| stack(values, height, width)),
+            field: kept.map(|values| stack(values, shape)),
             levels,
             words,
             encoder,
@@ -649,26 +654,19 @@ fn levels_by(
     (height, width): (usize, usize),
     modulate: impl FnOnce(Out<'_>) -> Modulation,
 ) -> (Array3<u8>, Option<Array3<u16>>, Modulation) {
-    let mut levels = Array3::zeros((3, height, width));
+    let shape = (display.colours(), height, width);
+    let mut levels = Array3::zeros(shape);
     if display.bits() <= 8 {
         let modulation = modulate(Out::Bytes(levels.as_slice_mut().expect("standard layout")));
         return (levels, None, modulation);
     }
-    let mut words = Array3::zeros((3, height, width));
+    let mut words = Array3::zeros(shape);
     let values = words.as_slice_mut().expect("standard layout");
     let modulation = modulate(Out::Words(&mut vec![0.0; values.len()], values));
     let upper = words.mapv(|word: u16| (word >> (display.bits() - 8)) as u8);
     (upper, Some(words), modulation)
 }
 
-fn stack(values: Vec<Complex32>, height: usize, width: usize) -> Array3<Complex32> {
-    Array3::from_shape_vec((3, height, width), values).expect("a stack of the frame's shape")
-}
-
-/// An RGB-D frame as a layered depth image of one layer.
-fn single_layer(frame: &RgbdFrame) -> Result<Ldi> {
-    Ldi::new(vec![LdiLayer {
-        rgb: frame.rgb().to_owned(),
-        depth: frame.depth().to_owned(),
-    }])
+fn stack(values: Vec<Complex32>, shape: (usize, usize, usize)) -> Array3<Complex32> {
+    Array3::from_shape_vec(shape, values).expect("a stack of the frame's shape")
 }

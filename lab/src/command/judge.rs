@@ -83,7 +83,7 @@ impl Judge {
         let display = &file.target.display;
         let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
         let frame = match &layers {
-            Some(ldi) => evaluate::visible_frame(ldi)?,
+            Some(ldi) => evaluate::visible_frame(ldi, display)?,
             None => self.frame.read(display)?,
         };
         let (height, width) = frame.shape();

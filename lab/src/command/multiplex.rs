@@ -77,7 +77,7 @@ impl MultiplexCommand {
         })?;
         let pipeline = Pipeline::new(frame.shape(), method, &target, &encoder.options)?;
         let (height, width) = frame.shape();
-        let mut wave = Array3::from_elem((3, height, width), Complex32::ZERO);
+        let mut wave = Array3::from_elem((pipeline.colours(), height, width), Complex32::ZERO);
         let values = wave.as_slice_mut().expect("standard layout");
         pipeline.field(&frame, values, &mut pipeline.scratch())?;
         let plan = Multiplex::new(frame.shape(), &target, &encoder.options)?;
@@ -142,15 +142,11 @@ impl MultiplexCommand {
                 "--packed is for modulators whose frames are bit planes; this one's are not, -o writes the maps".into(),
             ));
         };
+        let (count, height, width) = maps[0].levels.dim();
         let colours: Vec<usize> = match &self.colour {
-            None => vec![0, 1, 2],
-            Some(name) => packed::COLOURS
-                .iter()
-                .position(|known| known == name)
-                .into_iter()
-                .collect(),
+            None => (0..count).collect(),
+            Some(name) => vec![packed::colour(name, count)?],
         };
-        let (_, height, width) = maps[0].levels.dim();
         let plan = packed::bit_planes(display, (height, width), cells)?;
         let planes: Vec<&[u8]> = (colours.iter())
             .flat_map(|colour| {

@@ -34,7 +34,7 @@ pub(crate) struct Occlusion {
 
 impl Occlusion {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        let display = self.display.read()?.target.display;
+        let display = self.display.read_of_three()?.target.display;
         let ldi = match &self.ldi {
             Some(dir) => Ldi::read(dir)?,
             None => occlusion::two_bars(),
@@ -120,7 +120,7 @@ fn table(study: &Study) -> String {
     );
     let or_dash = |value: Option<f64>| value.map_or("–".into(), |v| format!("{v:.4}"));
     for (i, outcome) in study.outcomes.iter().enumerate() {
-        let (front, rear, found) = (outcome.front_quality, outcome.rear_quality, outcome.artefacts);
+        let (front, rear, found) = (&outcome.front_quality, &outcome.rear_quality, outcome.artefacts);
         text += &format!(
             "\n{} {:33}{:7.2} {:7.4}  {:7.2} {:7.4}  {:>8} {:>8} {:>8} {:>9}",
             i + 1,

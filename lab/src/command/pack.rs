@@ -16,7 +16,7 @@ pub(crate) struct Pack {
     holograms: Vec<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Of several holograms the colour that is shown
+    /// Of several holograms the colour that is shown; not for one laser
     #[arg(long, value_parser = packed::COLOURS)]
     colour: Option<String>,
     /// The frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
@@ -32,7 +32,11 @@ impl Pack {
         let display = self.display.read()?;
         let images = match (&self.holograms[..], &self.colour) {
             ([hologram], None) => packed::pack(&files::read_hologram(hologram)?, &display)?,
-            (_, Some(colour)) => vec![self.planes(&display, colour)?],
+            (_, Some(colour)) => {
+                let colour = packed::colour(colour, display.device.display.colours())?;
+                vec![self.planes(&display, colour)?]
+            }
+            (_, None) if display.device.display.colours() == 1 => vec![self.planes(&display, 0)?],
             (_, None) => {
                 return Err(Error::Input(
                     "several holograms in one frame need --colour, which of theirs is shown".into(),
@@ -52,18 +56,21 @@ impl Pack {
     }
 
     /// One colour of all holograms, one after another in the planes of a frame.
-    fn planes(&self, display: &DisplayFile, colour: &str) -> Result<packed::Image> {
+    fn planes(&self, display: &DisplayFile, colour: usize) -> Result<packed::Image> {
         let Packing::BitPlanes(cells) = &display.device.packing else {
             return Err(Error::Input(
-                "--colour is for modulators whose frames are bit planes; this one's are not".into(),
+                "several holograms in one frame are for modulators whose frames are bit planes; this one's are not"
+                    .into(),
             ));
         };
-        let colour = packed::COLOURS.iter().position(|name| *name == colour).unwrap_or(0);
         let mut maps = Vec::new();
         for path in &self.holograms {
             let Hologram::PhaseOnly(levels, _) = files::read_hologram(path)? else {
                 return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
             };
+            if levels.dim().0 != display.device.display.colours() {
+                return Err(Error::file(path, "is of other colours than the display"));
+            }
             maps.push(levels.index_axis(ndarray::Axis(0), colour).to_owned());
         }
         let plan = packed::bit_planes(display, maps[0].dim(), cells)?;

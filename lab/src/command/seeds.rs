@@ -4,7 +4,7 @@ use super::flags::progress_bar;
 use super::hologram::sweep_for;
 use clap::Args;
 use phasefront_lab::dataset::Manifest;
-use phasefront_lab::{Result, seeds};
+use phasefront_lab::{Error, Result, seeds};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -32,6 +32,11 @@ pub(crate) struct Seeds {
 impl Seeds {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         let manifest = Manifest::read(&self.data)?;
+        if manifest.display.colours() != 3 {
+            return Err(Error::Input(
+                "seeds are for networks of three colours; the data set's display has one laser".into(),
+            ));
+        }
         let sweep = sweep_for(&manifest.display, self.planes, self.taps);
         let bar = progress_bar(manifest.scenes as u64, "scenes");
         let made = || bar.inc(1);

@@ -82,7 +82,7 @@ impl Show {
         match packed::COLOURS.iter().position(|known| known == name) {
             Some(colour) if images.len() == packed::COLOURS.len() => Ok(vec![images.swap_remove(colour)]),
             _ => Err(Error::Input(
-                "--colour is for packings of an image a colour; this one has all in one".into(),
+                "--colour is for packings of an image a colour; this display has all in one, or one laser".into(),
             )),
         }
     }

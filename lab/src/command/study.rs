@@ -111,7 +111,7 @@ impl Study {
             scenes: self.scenes.into(),
             size: self.size.into(),
             seed: self.seed,
-            display: self.display.read()?.target.display,
+            display: self.display.read_of_three()?.target.display,
         })
     }
 
@@ -229,7 +229,7 @@ impl Study {
     }
 
     fn depth(&self, json: bool) -> Result<()> {
-        let display = self.display.read()?.target.display;
+        let display = self.display.read_of_three()?.target.display;
         let planes = self.planes.unwrap_or(256) as usize;
         let sweep = Method::Sweep(Sweep::for_display(&display));
         let mut methods = vec![("sweep".to_owned(), sweep)];
@@ -265,7 +265,7 @@ impl Study {
         /// Of each scene.
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
-        let display = self.display.read()?.target.display.with_size(height, width)?;
+        let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
         let method = Method::Network(models::network("8", Precision::Int8)?);
         let scenes = usize::from(self.scenes);
         let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");

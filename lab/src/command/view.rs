@@ -271,7 +271,8 @@ fn views(hologram: &Hologram, file: &DisplayFile, z_m: &[f64], bar: &ProgressBar
 
 fn figures(info: &HologramInfo, (height, width): (usize, usize)) -> Vec<(String, String)> {
     let display = &info.display;
-    let nm = display.wavelengths_m().map(|m| format!("{:.0}", m * 1e9)).join(", ");
+    let nm = display.wavelengths_m().iter().map(|m| format!("{:.0}", m * 1e9));
+    let nm = nm.collect::<Vec<_>>().join(", ");
     let mut rows = vec![
         (
             "Hologram",

@@ -293,7 +293,7 @@ pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2
     out.mapv(|v| Complex32::new(v.re as f32, v.im as f32))
 }
 
-/// The midpoint hologram of `ldi`, (3, H, W), at z = 0, from `planes` planes, each corrected from place to place.
+/// The midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes, each corrected from place to place.
 /// `progress` hears of the propagations done, of all.
 ///
 /// # Errors
@@ -314,10 +314,11 @@ pub fn hologram(
     let pitch_m = display.pitch_m();
     let shape = padded_shape_with(height, width, display, aberrations.reach_m(pitch_m))?;
     let (padded_height, padded_width) = shape;
-    let scene = Planes::of(ldi, planes);
+    let colours = display.colours();
+    let scene = Planes::of(&ldi.for_display(display), planes);
     let z = |k: usize| plane_z_m(k, planes, display);
     let Some(front) = scene.occupied.last().map(|(k, _)| *k) else {
-        return Ok(Array3::zeros((3, height, width)));
+        return Ok(Array3::zeros((colours, height, width)));
     };
     let count = scene.occupied.len();
     let propagations = count * (count + 3) / 2;
@@ -330,7 +331,7 @@ pub fn hologram(
     let mut scratch = fft.scratch();
     let mut plane = vec![Complex32::ZERO; padded_height * padded_width];
     let mut sum = plane.clone();
-    let mut hologram = Array3::zeros((3, height, width));
+    let mut hologram = Array3::zeros((colours, height, width));
     let step_m = display.volume_depth_m() / planes as f64;
     let mut done = 0;
     for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
@@ -348,7 +349,7 @@ pub fn hologram(
                 cross(&fft, &mut scratch, &across, points, |_| Complex32::ZERO);
                 at = *next;
                 done += 1;
-                progress(done, 3 * propagations);
+                progress(done, colours * propagations);
             }
             let here = Place {
                 aberrations,
@@ -369,7 +370,7 @@ pub fn hologram(
             );
             (sum.par_iter_mut().zip(&scratch.columns)).for_each(|(sum, v)| *sum += v);
             done += 2;
-            progress(done, 3 * propagations);
+            progress(done, colours * propagations);
         }
         fft.columns_inverse(&mut sum, |_, _| {}, &mut scratch.work);
         fft.rows_inverse(&sum, &mut scratch.rows, &mut scratch.work);
@@ -418,9 +419,9 @@ mod tests {
         assert!((at(0.6, 0.0)[0] - 0.24).abs() < 1e-12);
         assert!((at(0.1, 0.75)[1] + 0.6).abs() < 1e-12);
         assert_eq!(at(1.0, 1.0)[4], 0.5);
-        let one = Aberrations::new(vec![(0.0, Aberration::NONE)]).unwrap();
+        let one = Aberrations::new(vec![(0.0, Aberration::none(3))]).unwrap();
         let alone = SpatialAberrations::new(vec![([0.3, 0.3], one.clone())]).unwrap();
-        assert_eq!(alone.at(0.9, 0.1, 0.0), Aberration::NONE);
+        assert_eq!(alone.at(0.9, 0.1, 0.0), Aberration::none(3));
         for points in [
             vec![[0.1, 0.1], [0.2, 0.2]],
             vec![[0.1, 0.1], [0.1, 0.1]],

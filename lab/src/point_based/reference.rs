@@ -19,6 +19,7 @@ type Point = ([i64; 2], usize, [f32; 3]);
 pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusion) -> Result<Array3<Complex64>> {
     check_planes(planes)?;
     let (height, width) = ldi.shape();
+    let ldi = ldi.for_display(display);
     let mut points: Vec<Point> = Vec::new();
     let layers = match occlusion {
         Occlusion::Input => 1,
@@ -32,10 +33,10 @@ pub fn hologram(ldi: &Ldi, display: &Display, planes: usize, occlusion: Occlusio
             }
         }
     }
-    let mut sum = Array3::from_elem((3, height, width), Complex64::ZERO);
+    let mut sum = Array3::from_elem((display.colours(), height, width), Complex64::ZERO);
     for point @ ([y, x], plane, rgb) in &points {
         let z_m = plane_z_m(*plane, planes, display);
-        for (c, lambda) in display.wavelengths_m().into_iter().enumerate() {
+        for (c, &lambda) in display.wavelengths_m().iter().enumerate() {
             let pattern = sub_hologram(z_m, lambda, display.pitch_m());
             let radius = radius_px(z_m, lambda, display.pitch_m()) as i64;
             for ((i, j), value) in pattern.indexed_iter() {

@@ -77,7 +77,7 @@ pub fn measure(frame: &RgbdFrame) -> Sharpness {
 /// long, its values `step` apart.
 fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), next: usize) -> (u32, u32) {
     let (rgb, depth) = frame.values();
-    let size = depth.len();
+    let (size, colours) = (depth.len(), frame.colours());
     let (mut sharp, mut all) = (0, 0);
     for line in lines {
         for i in 0..along.saturating_sub(WINDOW) {
@@ -92,7 +92,7 @@ fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), 
             };
             let colour = |j: usize| {
                 let (a, b) = (at + j * step, at + (j + 1) * step);
-                let planes = (0..3).map(|c| c * size);
+                let planes = (0..colours).map(|c| c * size);
                 planes.map(|c| (rgb[c + b] - rgb[c + a]).abs()).sum::<f32>()
             };
             // Each edge is looked at once, where its largest step is in the middle.

@@ -63,7 +63,7 @@ fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
 }
 
 /// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first`
-/// of the stack (3, H, W).
+/// of the stack (C, H, W).
 pub fn encode_row_levels(
     values: &[Complex32],
     y: usize,
@@ -82,7 +82,7 @@ pub fn phase_row(values: &[Complex32], phases: &mut [f32]) {
     wide!(phase_run(values, phases));
 }
 
-/// [`phase_row`] and [`Response::level`] in one sweep. The row begins at value `first` of the stack (3, H, W).
+/// [`phase_row`] and [`Response::level`] in one sweep. The row begins at value `first` of the stack (C, H, W).
 pub fn phase_row_levels(values: &[Complex32], response: &Response, first: usize, levels: &mut [u8]) {
     wide!(levels_by(values, response, first, levels, phase_run));
 }

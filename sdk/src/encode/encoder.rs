@@ -15,6 +15,7 @@ use rayon::prelude::*;
 
 /// A plan for one shape, target and encoding. Immutable; shared between threads.
 pub struct Encoder {
+    colours: usize,
     height: usize,
     width: usize,
     prefilter: Prefilter,
@@ -64,7 +65,7 @@ enum Row<'a> {
 }
 
 impl Encoder {
-    /// Plans the encoding of (3, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
+    /// Plans the encoding of (C, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
     /// divided by the light that falls there.
     ///
     /// # Errors
@@ -78,9 +79,10 @@ impl Encoder {
         }
         target.check()?;
         options.check()?;
-        let prefilter = Prefilter::new(shape, &options.encoding)?;
+        let prefilter = Prefilter::new(shape, &options.encoding, &target.display)?;
         let illumination = target.illumination.clone();
         Ok(Encoder {
+            colours: target.display.colours(),
             height,
             width,
             prefilter,
@@ -98,7 +100,7 @@ impl Encoder {
     pub fn scratch(&self) -> EncoderScratch {
         let prefilter = self.prefilter.scratch();
         let wanted = match (&prefilter, &self.local) {
-            (Some(_), Some(_)) => vec![Complex32::ZERO; 3 * self.height * self.width],
+            (Some(_), Some(_)) => vec![Complex32::ZERO; self.colours * self.height * self.width],
             _ => Vec::new(),
         };
         let part = || PartScratch {
@@ -113,16 +115,16 @@ impl Encoder {
             prefilter,
             wanted,
             parts: (0..2 * rayon::current_num_threads()).map(|_| part()).collect(),
-            most: vec![0.0; 3 * self.height],
+            most: vec![0.0; self.colours * self.height],
         }
     }
 
-    /// Encodes `field`, a stack (3, H, W), into `phase`, (3, H, W) in \[0, 2π); gives the scale it used, the amplitude
+    /// Encodes `field`, a stack (C, H, W), into `phase`, (C, H, W) in \[0, 2π); gives the scale it used, the amplitude
     /// that full light stands for: `scale`, or the largest amplitude of the filtered field. `field` is worked on: what
     /// it holds afterwards means nothing. Allocates nothing.
     ///
     /// # Panics
-    /// If `field` or `phase` has not 3·H·W values.
+    /// If `field` or `phase` has not C·H·W values.
     pub fn encode(
         &self,
         field: &mut [Complex32],
@@ -147,7 +149,7 @@ impl Encoder {
     /// [`Self::encode`] straight to the target's levels.
     ///
     /// # Panics
-    /// If `field` or `levels` has not 3·H·W values.
+    /// If `field` or `levels` has not C·H·W values.
     pub fn encode_levels(
         &self,
         field: &mut [Complex32],
@@ -168,12 +170,12 @@ impl Encoder {
         scale
     }
 
-    /// The target's levels of `phases`, (3, H, W) in \[0, 2π).
+    /// The target's levels of `phases`, (C, H, W) in \[0, 2π).
     ///
     /// # Panics
-    /// If `phases` or `levels` has not 3·H·W values.
+    /// If `phases` or `levels` has not C·H·W values.
     pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
-        assert!(phases.len() == 3 * self.height * self.width && levels.len() == phases.len());
+        assert!(phases.len() == self.colours * self.height * self.width && levels.len() == phases.len());
         let rows = phases
             .par_chunks_exact(self.width)
             .zip(levels.par_chunks_exact_mut(self.width));
@@ -193,7 +195,7 @@ impl Encoder {
     /// The filters that need the whole field at once, and the scale.
     fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
-        assert_eq!(field.len(), 3 * plane);
+        assert_eq!(field.len(), self.colours * plane);
         if !scratch.wanted.is_empty() {
             scratch.wanted.copy_from_slice(field);
         }
@@ -218,7 +220,7 @@ impl Encoder {
     }
 
     /// Hands each row of `field`, worked on, to `then`: its index in the stack, what it is, and its part of `out`,
-    /// which is cut into 3·H parts of one size.
+    /// which is cut into C·H parts of one size.
     fn rows<T: Send>(
         &self,
         field: &[Complex32],
@@ -228,8 +230,8 @@ impl Encoder {
         then: impl Fn(usize, Row<'_>, &mut [T]) + Sync,
     ) {
         let (height, width) = (self.height, self.width);
-        let per_row = out.len() / (3 * height);
-        assert!(out.len() == 3 * height * per_row && (per_row == 1 || per_row == width));
+        let per_row = out.len() / (self.colours * height);
+        assert!(out.len() == self.colours * height * per_row && (per_row == 1 || per_row == width));
         let EncoderScratch { wanted, parts, .. } = scratch;
         let wanted: &[Complex32] = if wanted.is_empty() { field } else { wanted };
         let band = height.div_ceil(parts.len());

@@ -5,6 +5,7 @@ pub mod anti_alias;
 pub mod band_limit;
 pub mod deep;
 
+use crate::display::Display;
 use crate::error::Result;
 use crate::network::Network;
 use crate::wave::fft::ConvolveScratch;
@@ -79,8 +80,8 @@ pub(super) enum PrefilterScratch {
 }
 
 impl Prefilter {
-    /// Plans the filter of `encoding` for (H, W) fields.
-    pub(super) fn new((height, width): (usize, usize), encoding: &Encoding) -> Result<Self> {
+    /// Plans the filter of `encoding` for (H, W) fields of the colours of `display`.
+    pub(super) fn new((height, width): (usize, usize), encoding: &Encoding, display: &Display) -> Result<Self> {
         Ok(match encoding {
             Encoding::DoublePhase => Prefilter::None,
             Encoding::AntiAlias { sigma, width } => Prefilter::AntiAlias(AntiAlias::new(*sigma, *width)?),
@@ -88,7 +89,7 @@ impl Prefilter {
                 let plane = height * width;
                 Prefilter::BandLimit(BandLimit::new(height, width, *k)?, plane)
             }
-            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network)?),
+            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network, display)?),
         })
     }
 
@@ -109,7 +110,7 @@ impl Prefilter {
         }
     }
 
-    /// Filters `field`, (3, H, W), by what needs all of it.
+    /// Filters `field`, (C, H, W), by what needs all of it.
     pub(super) fn filter(&self, field: &mut [Complex32], scratch: &mut PrefilterScratch) {
         match (self, scratch) {
             (Prefilter::BandLimit(plan, plane), PrefilterScratch::Spectrum(scratch)) => {

@@ -37,8 +37,8 @@ pub struct MidpointSteps {
     steps: usize,
     aperture_radius: f64,
     /// From the modulator to the midpoint, and to the modulator.
-    back: [Propagator; 3],
-    forth: [Propagator; 3],
+    back: Vec<Propagator>,
+    forth: Vec<Propagator>,
     /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
 }
@@ -61,7 +61,7 @@ pub struct MidpointScratch {
 }
 
 impl MidpointSteps {
-    /// Plans `steps` for (3, H, W) = `shape` fields at the modulator of `target`.
+    /// Plans `steps` for (C, H, W) = `shape` fields at the modulator of `target`.
     ///
     /// # Errors
     /// An offset or correction that cannot be planned.
@@ -91,23 +91,24 @@ impl MidpointSteps {
 
     /// From the modulator to the midpoint, each colour.
     #[cfg(feature = "gpu")]
-    pub(crate) fn back(&self) -> &[Propagator; 3] {
+    pub(crate) fn back(&self) -> &[Propagator] {
         &self.back
     }
 
     /// From the midpoint to the modulator, each colour.
     #[cfg(feature = "gpu")]
-    pub(crate) fn forth(&self) -> &[Propagator; 3] {
+    pub(crate) fn forth(&self) -> &[Propagator] {
         &self.forth
     }
 
     /// Working memory for one call at a time, for the threads of the current pool.
     pub fn scratch(&self) -> MidpointScratch {
         let plane = || vec![Complex32::ZERO; self.height * self.width];
+        let values = self.back.len() * self.height * self.width;
         MidpointScratch {
             wave: self.back[0].scratch(),
-            field: vec![Complex32::ZERO; 3 * self.height * self.width],
-            before: vec![f32::NAN; 3 * self.height * self.width],
+            field: vec![Complex32::ZERO; values],
+            before: vec![f32::NAN; values],
             wanted: plane(),
             missing: plane(),
             shown: plane(),
@@ -115,11 +116,11 @@ impl MidpointSteps {
         }
     }
 
-    /// Keeps `field`, (3, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward.
+    /// Keeps `field`, (C, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward.
     /// Of a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `field` has not C·H·W values.
     pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut MidpointScratch) {
         assert_eq!(field.len(), scratch.field.len());
         let bound = past.map_or(-1.0, |scale| (STILL * scale).powi(2));
@@ -135,11 +136,11 @@ impl MidpointSteps {
         });
     }
 
-    /// Corrects `phases`, (3, H, W) in \[0, 2π), toward the field that was kept, of which amplitude `scale` stands for
+    /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the field that was kept, of which amplitude `scale` stands for
     /// full light. A colour whose field has values that are no numbers is left as it is. Allocates nothing.
     ///
     /// # Panics
-    /// If `phases` has not 3·H·W values.
+    /// If `phases` has not C·H·W values.
     pub fn correct(&self, scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
         assert_eq!(phases.len(), scratch.field.len());
         if scale <= 0.0 {

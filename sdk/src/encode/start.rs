@@ -13,7 +13,7 @@ pub(super) struct Start<'a> {
     /// (H, W).
     pub(super) plane: &'a [Complex32],
     pub(super) height: usize,
-    /// 0 red, 1 green, 2 blue.
+    /// 0 red, 1 green, 2 blue; of one laser 0.
     pub(super) colour: usize,
     pub(super) dark: Option<Dark>,
     pub(super) blur: Option<&'a AntiAlias>,

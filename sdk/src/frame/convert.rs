@@ -7,6 +7,7 @@ use super::plane::View;
 use super::plane::{Orientation, Plane};
 use super::resample::{Axis, Crop};
 use crate::error::{Error, Result};
+use phasefront_kernels::wide;
 use rayon::prelude::*;
 
 /// Bands of rows for each thread, so that a delayed thread leaves the others work to take.
@@ -273,6 +274,31 @@ fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [
             }
         }
     }
+}
+
+/// The amplitudes of one laser, (H, W), that shows the luminance of `rgb`, (3, H, W): √(Σ w·a²) with the weights of
+/// Rec. 709, for light is the square of amplitude. Allocates nothing.
+///
+/// # Panics
+/// If `rgb` has not three times as many values.
+pub fn luminance(rgb: &[f32], amplitude: &mut [f32]) {
+    const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+    const PART: usize = 1 << 14;
+    let size = amplitude.len();
+    assert_eq!(rgb.len(), 3 * size);
+    amplitude
+        .par_chunks_mut(PART)
+        .enumerate()
+        .for_each(|(part, amplitude)| {
+            let plane = |c: usize| &rgb[c * size + part * PART..][..amplitude.len()];
+            let (red, green, blue) = (plane(0), plane(1), plane(2));
+            wide!({
+                for (((to, r), g), b) in amplitude.iter_mut().zip(red).zip(green).zip(blue) {
+                    let light = WEIGHTS[0] * r * r + WEIGHTS[1] * g * g + WEIGHTS[2] * b * b;
+                    *to = light.sqrt().min(1.0);
+                }
+            });
+        });
 }
 
 /// Luma's and chroma's offset and factor to 0..=1 and −½..=½, and the matrix's red-V, green-U, green-V and blue-U.

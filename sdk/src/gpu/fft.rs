@@ -377,7 +377,7 @@ mod twins {
 
     fn check(size: (usize, usize), distance_m: f64, padding: Padding) {
         let Some(device) = device() else { return };
-        let plans = Propagator::for_colours(size.0, size.1, 8e-6, WAVELENGTHS_M, distance_m, padding).unwrap();
+        let plans = Propagator::for_colours(size.0, size.1, 8e-6, &WAVELENGTHS_M, distance_m, padding).unwrap();
         let given = field(size.0 * size.1);
         let buffer = upload(&device, &given);
         let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
@@ -385,7 +385,7 @@ mod twins {
             field: &buffer,
             size,
             padded: plans[0].padded_shape(),
-            factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
+            factors: &plans.iter().map(|plan| plan.transfer().factors()).collect::<Vec<_>>(),
             turn: Some(&upload(&device, &turns)),
         };
         let convolution = device.guarded(|| Convolution::new(&device, &planes)).unwrap();

@@ -12,7 +12,6 @@ use crate::brightness::Past;
 use crate::encode::{EncoderOptions, Encoding};
 use crate::method::Method;
 use crate::pipeline::StageTimes;
-use crate::registration::Registration;
 use crate::target::Target;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -135,7 +134,12 @@ impl GpuPipeline {
         crate::network::check_size(size.0, size.1, crate::network::MAX_PIXELS)?;
         job.encoder.check()?;
         job.target.check()?;
-        if !job.target.panel.is_plain() || job.target.registration != Registration::default() {
+        if display.colours() != 3 {
+            return Err(GpuError::Refused(
+                "a display of one laser, which is the CPU's; the GPU makes holograms of three colours".into(),
+            ));
+        }
+        if !job.target.panel.is_plain() || job.target.registration.moves() {
             return Err(GpuError::Refused(
                 "a panel's flatness, carrier, lens or range over 2π and colours that are moved, which are the CPU's"
                     .into(),
@@ -169,7 +173,7 @@ impl GpuPipeline {
                     field: method.field(),
                     size,
                     padded: plans[0].padded_shape(),
-                    factors: &plans.each_ref().map(|plan| plan.transfer().factors()),
+                    factors: &plans.iter().map(|plan| plan.transfer().factors()).collect::<Vec<_>>(),
                     turn: turn.take(),
                 },
             )?),

@@ -34,6 +34,8 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
         depth: super::Depth::F32,
         ..job.clone()
     };
+    // What it refuses is known before the CPU works.
+    let mut gpu = GpuPipeline::new(device, &job)?;
     let size = 3 * SIZE.0 * SIZE.1;
     let frame = frame()?;
     let cpu = job.on_cpu()?;
@@ -41,7 +43,6 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let mut field = vec![Complex32::ZERO; size];
     let mut expected = vec![0; size];
     cpu.process(&frame, &mut field, &mut expected, &mut scratch)?;
-    let mut gpu = GpuPipeline::new(device, &job)?;
     let mut levels = vec![0; size];
     // Twice: what one frame leaves behind must not reach the next.
     for _ in 0..2 {

@@ -12,6 +12,8 @@ pub struct FilterPlan {
     pub(super) chain: FusedChain,
     pub(super) input: InputKind,
     pub(super) head: Head,
+    /// Of a display of one laser, the output that is its field.
+    pub(super) colour: Option<usize>,
     pub(super) size: (usize, usize),
     pub(super) engine: Engine,
 }
@@ -20,7 +22,7 @@ pub struct FilterPlan {
 #[derive(Debug, Default)]
 pub struct FilterScratch {
     fused: FusedScratch,
-    /// The rows around each border between bands, as they were: border by border, (3, 2·reach, W).
+    /// The rows around each border between bands, as they were: border by border, (C, 2·reach, W).
     borders: Vec<Complex32>,
 }
 
@@ -35,14 +37,22 @@ impl FilterPlan {
         &self.engine
     }
 
-    /// Replaces `field`, (3, H, W), by what the network makes of it, on the current rayon pool. After the first frame
+    /// Replaces `field`, (C, H, W), by what the network makes of it, on the current rayon pool. After the first frame
     /// nothing is allocated.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `field` has not C·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut FilterScratch) {
+        match self.colour {
+            None => self.filter_of([0, 1, 2], field, scratch),
+            Some(colour) => self.filter_of([colour], field, scratch),
+        }
+    }
+
+    /// By some colours of the output. The field's planes are the network's red, green and blue; a single one is each.
+    fn filter_of<const C: usize>(&self, colours: [usize; C], field: &mut [Complex32], scratch: &mut FilterScratch) {
         let (height, width) = self.size;
-        assert_eq!(field.len(), 3 * height * width, "values of the field");
+        assert_eq!(field.len(), C * height * width, "values of the field");
         // A strip's halo would be overwritten by its neighbour: bands are whole.
         let tiling = Tiling {
             strip_columns: width,
@@ -50,7 +60,7 @@ impl FilterPlan {
         };
         let reach = self.chain.layers();
         let borders = (height - 1) / tiling.band_rows;
-        let kept = 3 * 2 * reach * width;
+        let kept = C * 2 * reach * width;
         scratch.borders.resize(borders * kept, Complex32::default());
         for (border, kept) in scratch.borders.chunks_exact_mut(kept).enumerate() {
             let row = (border + 1) * tiling.band_rows;
@@ -64,6 +74,7 @@ impl FilterPlan {
         let rows = InPlace {
             input: self.input,
             head: self.head,
+            colours,
             tanh: self.chain.has_tanh(),
             borders: &scratch.borders,
             band_rows: tiling.band_rows,
@@ -71,14 +82,15 @@ impl FilterPlan {
             width,
         };
         let mut planes = field.chunks_exact_mut(height * width);
-        let planes: [_; 3] = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        let planes: [_; C] = std::array::from_fn(|_| planes.next().unwrap_or_default());
         self.chain.run_rows(&rows, planes, self.size, tiling, &scratch.fused);
     }
 }
 
-struct InPlace<'a> {
+struct InPlace<'a, const C: usize> {
     input: InputKind,
     head: Head,
+    colours: [usize; C],
     tanh: bool,
     borders: &'a [Complex32],
     band_rows: usize,
@@ -86,19 +98,20 @@ struct InPlace<'a> {
     width: usize,
 }
 
-impl Rows<3> for InPlace<'_> {
+impl<const C: usize> Rows<C> for InPlace<'_, C> {
     type Value = Complex32;
 
-    fn read(&self, row: usize, from: usize, band: &Band<'_, Complex32, 3>, into: &mut [f32]) {
+    fn read(&self, row: usize, from: usize, band: &Band<'_, Complex32, C>, into: &mut [f32]) {
         let count = into.len() / self.input.channels();
         let (field, remainders) = into.split_at_mut(6 * count);
         let (re, im) = field.split_at_mut(3 * count);
         let parts = re.chunks_exact_mut(count).zip(im.chunks_exact_mut(count));
         for (plane, (re, im)) in parts.enumerate() {
+            let plane = plane % C;
             let values = match self.kept_row(row, &band.rows()) {
                 None => band.row(plane, row, from, count),
                 Some((border, kept)) => {
-                    let rows = (border * 3 + plane) * 2 * self.reach + kept;
+                    let rows = (border * C + plane) * 2 * self.reach + kept;
                     &self.borders[rows * self.width + from..][..count]
                 }
             };
@@ -115,16 +128,16 @@ impl Rows<3> for InPlace<'_> {
         });
     }
 
-    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, 3>) {
+    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, C>) {
         let field = band.rows_mut(row, from, values[0].len());
         wide!({
             if self.tanh {
                 tanh(&mut values);
             }
             match self.head {
-                Head::AmplitudePhase => Head::amplitude_phase(values.map(|run| &*run), field),
+                Head::AmplitudePhase => Head::amplitude_phase(&self.colours, values.map(|run| &*run), field),
                 Head::RealImaginary => {
-                    for (c, field) in field.into_iter().enumerate() {
+                    for (&c, field) in self.colours.iter().zip(field) {
                         let parts = values[c].iter().zip(&*values[3 + c]);
                         for (value, (re, im)) in field.iter_mut().zip(parts) {
                             *value = Complex32::new(value.re + re, value.im + im);
@@ -136,7 +149,7 @@ impl Rows<3> for InPlace<'_> {
     }
 }
 
-impl InPlace<'_> {
+impl<const C: usize> InPlace<'_, C> {
     /// Where `row` was kept, if it lies outside `band`: at which border, and which of its rows.
     fn kept_row(&self, row: usize, band: &std::ops::Range<usize>) -> Option<(usize, usize)> {
         let border = match row {

@@ -71,24 +71,23 @@ impl FusedChain {
         }
     }
 
-    /// Runs the chain from `source`, planes of `kind`, through `head` into `field`, (3, H, W), row by row: neither the
-    /// input nor the output lies in memory as a whole.
-    pub(super) fn field<S: Source + ?Sized>(
+    /// Runs the chain from `source` into `field`, (C, H, W), row by row: neither the input nor the output lies in
+    /// memory as a whole.
+    pub(super) fn field<S: Source + ?Sized, const C: usize>(
         &self,
         source: &S,
-        (kind, head): (InputKind, Head),
+        into: FieldOf<C>,
         field: &mut [Complex32],
         size: (usize, usize),
         scratch: &FusedScratch,
     ) {
         let rows = FieldRows {
             source,
-            kind,
-            head,
+            into,
             tanh: self.tanh,
         };
         let mut planes = field.chunks_exact_mut((size.0 * size.1).max(1));
-        let planes: [_; 3] = std::array::from_fn(|_| planes.next().unwrap_or_default());
+        let planes: [_; C] = std::array::from_fn(|_| planes.next().unwrap_or_default());
         self.run_rows(&rows, planes, size, self.tiling(size), scratch);
     }
 
@@ -128,19 +127,27 @@ impl FusedChain {
     }
 }
 
+/// The field that a chain is run into.
+pub(super) struct FieldOf<const C: usize> {
+    /// What the source's planes are.
+    pub(super) kind: InputKind,
+    pub(super) head: Head,
+    /// The colours of the output that are the field's planes.
+    pub(super) colours: [usize; C],
+}
+
 /// Rows of a source in, rows of a field out.
-struct FieldRows<'a, S: ?Sized> {
+struct FieldRows<'a, S: ?Sized, const C: usize> {
     source: &'a S,
-    kind: InputKind,
-    head: Head,
+    into: FieldOf<C>,
     tanh: bool,
 }
 
-impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
+impl<S: Source + ?Sized, const C: usize> Rows<C> for FieldRows<'_, S, C> {
     type Value = Complex32;
 
-    fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, 3>, into: &mut [f32]) {
-        let count = into.len() / self.kind.channels();
+    fn read(&self, row: usize, from: usize, _: &Band<'_, Complex32, C>, into: &mut [f32]) {
+        let count = into.len() / self.into.kind.channels();
         wide!({
             for (plane, into) in into.chunks_exact_mut(count).enumerate() {
                 self.source.read(plane, row, from, into);
@@ -148,7 +155,7 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
         });
     }
 
-    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, 3>) {
+    fn write(&self, row: usize, from: usize, mut values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Complex32, C>) {
         let field = band.rows_mut(row, from, values[0].len());
         let base = |plane: usize, at: usize, into: &mut [f32]| {
             self.source.read(plane, row, from + at, into);
@@ -158,7 +165,8 @@ impl<S: Source + ?Sized> Rows<3> for FieldRows<'_, S> {
                 tanh(&mut values);
             }
             let values = values.map(|run| &*run);
-            self.head.row(self.kind, values, base, field);
+            let FieldOf { kind, head, colours } = &self.into;
+            head.row(*kind, colours, values, base, field);
         });
     }
 }

@@ -39,10 +39,22 @@ impl Head {
     /// # Errors
     /// When the lengths do not fit each other.
     pub fn field(self, kind: InputKind, output: &[f32], input: &[f32], field: &mut [Complex32]) -> Result<()> {
-        let area = field.len() / 3;
-        if field.len() != 3 * area || output.len() != 6 * area || input.len() != kind.channels() * area {
+        self.field_of(kind, &[0, 1, 2], output, input, field)
+    }
+
+    /// [`Self::field`] of some `colours` of the output, in their order.
+    pub(super) fn field_of(
+        self,
+        kind: InputKind,
+        colours: &[usize],
+        output: &[f32],
+        input: &[f32],
+        field: &mut [Complex32],
+    ) -> Result<()> {
+        let (count, area) = (colours.len(), field.len() / colours.len());
+        if field.len() != count * area || output.len() != 6 * area || input.len() != kind.channels() * area {
             return Err(Error::Frame(format!(
-                "head: output {}, input {} and field {} values; 6, {} and 3 planes of one size are right",
+                "head: output {}, input {} and field {} values; 6, {} and {count} planes of one size are right",
                 output.len(),
                 input.len(),
                 field.len(),
@@ -52,34 +64,34 @@ impl Head {
         if area == 0 {
             return Ok(());
         }
-        let mut planes = field.chunks_exact_mut(area);
-        let [red, green, blue] = std::array::from_fn(|_| planes.next().unwrap_or_default().par_chunks_mut(PART));
-        let parts = red.zip(green).zip(blue).enumerate();
-        parts.for_each(|(part, ((red, green), blue))| {
-            let at = part * PART;
-            let values = std::array::from_fn(|k| &output[k * area + at..][..red.len()]);
-            let base = |plane: usize, from: usize, into: &mut [f32]| {
-                into.copy_from_slice(&input[plane * area + at + from..][..into.len()]);
-            };
-            wide!(self.row(kind, values, base, [red, green, blue]));
-        });
+        for (colour, plane) in colours.iter().zip(field.chunks_exact_mut(area)) {
+            plane.par_chunks_mut(PART).enumerate().for_each(|(part, run)| {
+                let at = part * PART;
+                let values = std::array::from_fn(|k| &output[k * area + at..][..run.len()]);
+                let base = |plane: usize, from: usize, into: &mut [f32]| {
+                    into.copy_from_slice(&input[plane * area + at + from..][..into.len()]);
+                };
+                wide!(self.row(kind, &[*colour], values, base, [run]));
+            });
+        }
         Ok(())
     }
 
-    /// A run of pixels of [`Head::field`]: `base` gives pixels of a plane of the input, from the given one of the run
-    /// on.
+    /// A run of pixels of [`Head::field`], of these `colours` of the output: `base` gives pixels of a plane of the
+    /// input, from the given one of the run on.
     #[inline(always)]
-    pub(super) fn row(
+    pub(super) fn row<const C: usize>(
         self,
         kind: InputKind,
+        colours: &[usize; C],
         values: [&[f32]; 6],
         base: impl Fn(usize, usize, &mut [f32]),
-        field: [&mut [Complex32]; 3],
+        field: [&mut [Complex32]; C],
     ) {
         if self == Head::AmplitudePhase {
-            return Self::amplitude_phase(values, field);
+            return Self::amplitude_phase(colours, values, field);
         }
-        for (c, field) in field.into_iter().enumerate() {
+        for (&c, field) in colours.iter().zip(field) {
             let (first, second) = (values[c], values[3 + c]);
             let (mut re, mut im) = ([0.0; PIECE], [0.0; PIECE]);
             for (piece, out) in field.chunks_mut(PIECE).enumerate() {
@@ -122,8 +134,12 @@ impl Head {
 
     /// A run of pixels of [`Head::AmplitudePhase`].
     #[inline(always)]
-    pub(super) fn amplitude_phase(values: [&[f32]; 6], field: [&mut [Complex32]; 3]) {
-        for (c, field) in field.into_iter().enumerate() {
+    pub(super) fn amplitude_phase<const C: usize>(
+        colours: &[usize; C],
+        values: [&[f32]; 6],
+        field: [&mut [Complex32]; C],
+    ) {
+        for (&c, field) in colours.iter().zip(field) {
             for ((out, a), p) in field.iter_mut().zip(values[c]).zip(values[3 + c]) {
                 let amplitude = (a + 1.0) * std::f32::consts::FRAC_1_SQRT_2;
                 let (sin, cos) = sin_cos_pi(*p);

@@ -133,23 +133,40 @@ pub struct TrainedDisplay {
     pub corrected: bool,
 }
 
+/// How a network serves a display.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Served {
+    /// What depths are stretched by about the middle of the volume.
+    pub(super) scale: f64,
+    /// Of a display of one laser, the colour whose output is its field: 0 red, 1 green, 2 blue.
+    pub(super) colour: Option<usize>,
+}
+
 impl TrainedDisplay {
     /// What depths d of frames for `display` are stretched by about the middle of the volume, d' = ½ + s·(d − ½), for a
     /// network for this display to give their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over the colours.
     ///
     /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display
-    /// of another pitch, volume or laser is one for this display with its depth stretched.
+    /// of another pitch, volume or laser is one for this display with its depth stretched. One laser takes the output
+    /// of one colour: the nearest of those whose depths were trained as far as the display's reach.
     ///
     /// # Errors
     /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch;
     /// any other display where an aberration is corrected.
-    pub(super) fn depth_scale(&self, display: &Display) -> Result<f64> {
+    pub(super) fn serve(&self, display: &Display) -> Result<Served> {
         let trained = self.pitch_m.powi(2) / self.volume_depth_m;
         let given = display.volume_depth_m() / display.pitch_m().powi(2);
-        let of_colour = |(trained_m, given_m): (f64, f64)| given_m / trained_m * given * trained;
-        let lasers = self.wavelengths_m.into_iter().zip(display.wavelengths_m());
-        let each: Vec<f64> = lasers.map(of_colour).collect();
-        let scale = each.iter().sum::<f64>() / 3.0;
+        let of_colour = |(trained_m, given_m): (f64, &f64)| given_m / trained_m * given * trained;
+        let lasers = self
+            .wavelengths_m
+            .into_iter()
+            .zip(display.wavelengths_m().iter().cycle());
+        let mut each: Vec<f64> = lasers.map(of_colour).collect();
+        let colour = (display.colours() == 1).then(|| nearest(&self.wavelengths_m, display.wavelengths_m()[0], &each));
+        if let Some(colour) = colour {
+            each = vec![each[colour]];
+        }
+        let scale = each.iter().sum::<f64>() / each.len() as f64;
         let same = |trained: f64, given: f64| (trained - given).abs() <= RANGE_TOLERANCE * trained;
         if self.corrected && !(same(self.pitch_m, display.pitch_m()) && each.iter().all(|own| same(1.0, *own))) {
             return Err(Error::Network(format!(
@@ -159,10 +176,10 @@ impl TrainedDisplay {
             )));
         }
         if each.iter().any(|own| (own - scale).abs() > COLOUR_TOLERANCE * scale) {
-            let nm = |all: [f64; 3]| all.map(|m| format!("{:.0}", m * 1e9)).join(", ");
+            let nm = |all: &[f64]| (all.iter().map(|m| format!("{:.0}", m * 1e9)).collect::<Vec<_>>()).join(", ");
             return Err(Error::Network(format!(
                 "it was trained for wavelengths of {} nm, the display has {}; train one for this display, or use a method without a network",
-                nm(self.wavelengths_m),
+                nm(&self.wavelengths_m),
                 nm(display.wavelengths_m())
             )));
         }
@@ -175,18 +192,21 @@ impl TrainedDisplay {
                 display.pitch_m() * 1e6
             )));
         }
-        Ok(scale)
+        Ok(Served { scale, colour })
     }
 
     /// Checks that a pre-filter for this display is one for `display`: that λ·offset/p² is the same.
     ///
     /// # Errors
-    /// As [`Self::depth_scale`], or an offset that differs by over 20 µm at the pitch it was trained for.
+    /// As [`Self::serve`], or an offset that differs by over 20 µm at the pitch it was trained for.
     pub(super) fn check_offset(&self, display: &Display) -> Result<()> {
-        self.depth_scale(display)?;
-        let mean = |all: [f64; 3]| all.iter().sum::<f64>() / 3.0;
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+        let trained_m = match self.serve(display)?.colour {
+            Some(colour) => self.wavelengths_m[colour],
+            None => mean(&self.wavelengths_m),
+        };
         let finer = (self.pitch_m / display.pitch_m()).powi(2);
-        let longer = mean(display.wavelengths_m()) / mean(self.wavelengths_m);
+        let longer = mean(display.wavelengths_m()) / trained_m;
         let (trained, given) = (self.offset_m, display.offset_m());
         if (trained - given * finer * longer).abs() > OFFSET_TOLERANCE_M {
             return Err(Error::Network(format!(
@@ -197,6 +217,16 @@ impl TrainedDisplay {
         }
         Ok(())
     }
+}
+
+/// The colour of the wavelength nearest to `given_m` of those whose stretch, of `each`, stays within the depths that
+/// were trained; where none does, the one of the least stretch.
+fn nearest(trained_m: &[f64; 3], given_m: f64, each: &[f64]) -> usize {
+    let apart = |colour: &usize| (trained_m[*colour] / given_m).ln().abs();
+    let within = (0..3).filter(|colour| each[*colour] <= 1.0 + RANGE_TOLERANCE);
+    let least = (0..3).min_by(|a, b| each[*a].total_cmp(&each[*b]));
+    let nearest = within.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.or(least).unwrap_or(0)
 }
 
 /// What a file says of its network.

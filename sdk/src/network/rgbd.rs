@@ -3,8 +3,8 @@
 use super::Source;
 use crate::frame::RgbdFrame;
 
-/// The planes of [`super::InputKind::Rgbd`]: red, green, blue, depth, each minus ½; and behind them, for
-/// [`super::InputKind::RgbdXy`], the place in the frame.
+/// The planes of [`super::InputKind::Rgbd`]: red, green, blue, depth, each minus ½, one laser's amplitude being all
+/// three colours; and behind them, for [`super::InputKind::RgbdXy`], the place in the frame.
 impl Source for RgbdFrame {
     #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
@@ -18,7 +18,7 @@ impl Source for RgbdFrame {
             }
             5 => return into.fill(place(row, height)),
             3 => (depth, 0),
-            colour => (rgb, colour),
+            colour => (rgb, colour % self.colours()),
         };
         let at = (plane * height + row) * width + from;
         for (to, from) in into.iter_mut().zip(&values[at..]) {
@@ -31,6 +31,7 @@ impl Source for RgbdFrame {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::display::Display;
     use ndarray::{Array2, Array3};
 
     #[test]
@@ -51,6 +52,12 @@ mod tests {
             assert_eq!(row, [0.125, 0.375]);
             frame.read(5, 1, 2, &mut row);
             assert_eq!(row, [0.25, 0.25]);
+            let one = Display::from_toml("wavelengths_nm = [532]").unwrap();
+            let grey = frame.for_display(&one);
+            for plane in 0..3 {
+                grey.read(plane, 1, 2, &mut row);
+                assert_eq!(row, [grey.rgb()[(0, 1, 2)] - 0.5, grey.rgb()[(0, 1, 3)] - 0.5]);
+            }
         }
     }
 }

@@ -24,7 +24,7 @@ pub(super) struct FrameInput<'a> {
     pub(super) elapsed: Option<Duration>,
 }
 
-/// Where levels go, (3, H, W).
+/// Where levels go, (C, H, W).
 pub(super) struct LevelsOut<'a> {
     pub(super) levels: &'a mut [u8],
     /// Of a display of over 8 bits.

@@ -122,12 +122,18 @@ impl Hologram {
         self.shape
     }
 
-    /// The modulator levels, (3, H, W): red, green, blue; of a display of over 8 bits the upper 8.
+    /// How many colours its levels have, C.
+    pub fn colours(&self) -> usize {
+        self.viewer.target.display.colours()
+    }
+
+    /// The modulator levels, (C, H, W): red, green, blue, or those of the one laser; of a display of over 8 bits the
+    /// upper 8.
     pub fn levels(&self) -> &[u8] {
         &self.levels.values
     }
 
-    /// The levels of a display of over 8 bits, (3, H, W), whose upper 8 bits [`Self::levels`] has; None for others.
+    /// The levels of a display of over 8 bits, (C, H, W), whose upper 8 bits [`Self::levels`] has; None for others.
     pub fn words(&self) -> Option<&[u16]> {
         self.words.as_ref().map(|words| &words.values[..])
     }
@@ -140,7 +146,7 @@ impl Hologram {
         }
     }
 
-    /// The levels of one colour, (H, W): 0 red, 1 green, 2 blue.
+    /// The levels of one colour, (H, W): 0 red, 1 green, 2 blue, or 0 of one laser.
     ///
     /// # Errors
     /// Another colour.
@@ -149,7 +155,10 @@ impl Hologram {
         self.levels()
             .chunks_exact(size)
             .nth(colour)
-            .ok_or_else(|| Error::Plan(format!("there is no plane {colour}; 0 is red, 1 green, 2 blue")))
+            .ok_or_else(|| match self.colours() {
+                1 => Error::Plan(format!("there is no plane {colour}; one laser has plane 0 alone")),
+                _ => Error::Plan(format!("there is no plane {colour}; 0 is red, 1 green, 2 blue")),
+            })
     }
 
     /// The amplitude that full light stands for.

@@ -26,15 +26,16 @@ impl OnCpu {
     pub(super) fn new(options: &SessionOptions, rung: &Rung) -> Result<Self> {
         let (height, width) = (rung.height, rung.width);
         let pipeline = Self::plan(options, rung)?;
-        let bits = options.target.display.bits();
+        let display = &options.target.display;
+        let (bits, values) = (display.bits(), display.colours() * height * width);
         Ok(OnCpu {
             scratch: pipeline.scratch(),
             pipeline,
-            field: vec![Complex32::ZERO; 3 * height * width],
+            field: vec![Complex32::ZERO; values],
             bits,
             phases: match bits {
                 0..=8 => Vec::new(),
-                _ => vec![0.0; 3 * height * width],
+                _ => vec![0.0; values],
             },
         })
     }

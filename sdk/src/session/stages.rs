@@ -11,7 +11,7 @@ use super::{MOST_THREADS, SessionOptions};
 use crate::depth::camera::CameraFrame;
 use crate::depth::stream::{DepthReport, DepthStream};
 use crate::error::{Error, Result};
-use crate::frame::{ColourPlan, ColourScratch, RgbdFrame};
+use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -26,6 +26,8 @@ struct RungPlan {
     frame: RgbdFrame,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
+    /// The picture's red, green and blue, along whose edges depth is refined, where the display has one laser.
+    picture: Vec<f32>,
 }
 
 impl RungPlan {
@@ -44,10 +46,21 @@ impl RungPlan {
             let scratch = colour.scratch();
             self.colour = Some((colour, scratch));
         }
-        let (rgb, depth) = self.frame.planes_mut();
+        let (amplitude, depth) = self.frame.planes_mut();
+        let rgb = match self.picture.is_empty() {
+            true => &mut *amplitude,
+            false => &mut self.picture[..],
+        };
         if let Some((colour, scratch)) = &mut self.colour {
             colour.convert(&frame.colour, rgb, scratch)?;
         }
+        if !self.picture.is_empty() {
+            luminance(&self.picture, amplitude);
+        }
+        let rgb = match self.picture.is_empty() {
+            true => &*amplitude,
+            false => &self.picture,
+        };
         times.colour = start.elapsed();
         let start = Instant::now();
         let report = self.depth.next(frame, elapsed, rgb, depth)?;
@@ -119,12 +132,17 @@ impl Stages {
         let rung = &options.ladder[ladder.rung()];
         let shape = (rung.height, rung.width);
         let depth = DepthStream::new(options.depth, shape)?;
+        let colours = options.target.display.colours();
         let mut context = RungContext { options, rung, gpu };
         Ok(RungPlan {
             engine: pool.install(|| Engine::new(&mut context))?,
-            frame: RgbdFrame::black(shape),
+            frame: RgbdFrame::black(colours, shape),
             depth,
             colour: None,
+            picture: match colours {
+                1 => vec![0.0; 3 * shape.0 * shape.1],
+                _ => Vec::new(),
+            },
         })
     }
 
@@ -161,7 +179,7 @@ impl Stages {
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
-        let mut levels = levels.take(3 * rung.height * rung.width);
+        let mut levels = levels.take(options.target.display.colours() * rung.height * rung.width);
         let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
         let result = pool.install(|| {
@@ -265,9 +283,10 @@ impl Stages {
         } = self;
         let rung = &options.ladder[ladder.rung()];
         let shape = (rung.height, rung.width);
-        let mut levels = levels.take(3 * shape.0 * shape.1);
-        let wide = options.target.display.bits() > 8;
-        let mut words = wide.then(|| words.take(3 * shape.0 * shape.1));
+        let display = &options.target.display;
+        let values = display.colours() * shape.0 * shape.1;
+        let mut levels = levels.take(values);
+        let mut words = (display.bits() > 8).then(|| words.take(values));
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {

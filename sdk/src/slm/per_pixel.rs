@@ -12,11 +12,11 @@
 //! |---|---|
 //! | 8 | `PFPIXEL1` |
 //! | 4 × u32 | height H, width W of the modulator; spacing s; intervals K |
-//! | (3, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
-//! | (3, Gh, Gw) × u16 | `turn`/2π × 65535 |
+//! | (C, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
+//! | (C, Gh, Gw) × u16 | `turn`/2π × 65535 |
 //!
-//! Node (i, j) stands on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and Gw alike, so nodes reach to the last pixel
-//! or beyond it.
+//! C, the colours, is 3 or 1, as the file's length says. Node (i, j) stands on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and
+//! Gw alike, so nodes reach to the last pixel or beyond it.
 //!
 //! # The rule
 //! A phase φ at pixel (x, y), with t = φ·K/2π, k = min(⌊t⌋, K−1): the four nodes around the pixel give their
@@ -41,16 +41,16 @@ pub struct PerPixel {
     /// Of the modulator.
     height: usize,
     width: usize,
-    /// The part of it that a stack (3, H, W) covers: its upper left pixel, and its size.
+    /// The part of it that a stack (C, H, W) covers: its upper left pixel, and its size.
     corner: (usize, usize),
     window: (usize, usize),
     spacing: usize,
     intervals: usize,
     /// (Gh, Gw).
     nodes: (usize, usize),
-    /// (3, Gh, Gw, K+1).
+    /// (C, Gh, Gw, K+1).
     levels: Vec<f32>,
-    /// (3, Gh, Gw), radians.
+    /// (C, Gh, Gw), radians.
     turn: Vec<f32>,
 }
 
@@ -61,10 +61,10 @@ pub fn nodes(height: usize, width: usize, spacing: usize) -> (usize, usize) {
 }
 
 impl PerPixel {
-    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them. `levels`, (3, Gh, Gw,
+    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them. `levels`, (C, Gh, Gw,
     /// `intervals` + 1), are those of the phases 2πk/`intervals`, and may go on over 255 where the modulator does not
-    /// reach the phase; `turn`, (3, Gh, Gw), are the phases from which that of phase 0 is nearer, 2π where the
-    /// modulator reaches all.
+    /// reach the phase; `turn`, (C, Gh, Gw), C being 3 or 1, are the phases from which that of phase 0 is nearer, 2π
+    /// where the modulator reaches all.
     ///
     /// Values are rounded to what the file holds, so that a table is the same before and after.
     ///
@@ -114,10 +114,11 @@ impl PerPixel {
             ));
         }
         let nodes = nodes(height, width, spacing);
-        let count = 3 * nodes.0 * nodes.1;
+        let one = nodes.0 * nodes.1;
+        let count = if turn.len() == one { one } else { 3 * one };
         if turn.len() != count || levels.len() != count * (intervals + 1) {
             return refuse(format!(
-                "{} levels and {} turns; {width}×{height} pixels, a node every {spacing}, need {} and {count}",
+                "{} levels and {} turns; {width}×{height} pixels, a node every {spacing}, need {} and {count}, or a third of both for one colour",
                 levels.len(),
                 turn.len(),
                 count * (intervals + 1)
@@ -158,11 +159,12 @@ impl PerPixel {
             return Err(refuse(format!("holds impossible sizes {sizes:?}")));
         }
         let (rows, columns) = nodes(height, width, spacing);
-        let count = 3 * rows * columns;
-        let needed = 2 * count * (intervals + 2);
-        if rest.len() != needed {
+        // Of one colour.
+        let needed = 2 * rows * columns * (intervals + 2);
+        let count = rest.len() / needed * rows * columns;
+        if ![needed, 3 * needed].contains(&rest.len()) {
             return Err(refuse(format!(
-                "has {} bytes of curves; {width}×{height} pixels, a node every {spacing}, need {needed}",
+                "has {} bytes of curves; {width}×{height} pixels, a node every {spacing}, need {needed} a colour, of which there are 3 or 1",
                 rest.len()
             )));
         }
@@ -210,6 +212,11 @@ impl PerPixel {
         })
     }
 
+    /// How many colours it is of.
+    pub fn colours(&self) -> usize {
+        self.turn.len() / (self.nodes.0 * self.nodes.1)
+    }
+
     /// (H, W) of the stacks that it is for.
     pub fn shape(&self) -> (usize, usize) {
         self.window
@@ -230,17 +237,17 @@ impl PerPixel {
         self.intervals
     }
 
-    /// The knots of all nodes, (3, Gh, Gw, K+1), in levels.
+    /// The knots of all nodes, (C, Gh, Gw, K+1), in levels.
     pub fn knots(&self) -> &[f32] {
         &self.levels
     }
 
-    /// The phase of each node, (3, Gh, Gw), from which phase 0 is nearer than the largest one.
+    /// The phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest one.
     pub fn turns(&self) -> &[f32] {
         &self.turn
     }
 
-    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (3, H, W). The rule as it stands: the oracle
+    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (C, H, W). The rule as it stands: the oracle
     /// of [`Self::levels`].
     ///
     /// # Panics
@@ -273,7 +280,7 @@ impl PerPixel {
     fn place(&self, at: usize) -> (usize, usize, usize) {
         let (height, width) = self.window;
         let plane = height * width;
-        assert!(at < 3 * plane, "a place outside the modulator");
+        assert!(at < self.colours() * plane, "a place outside the modulator");
         let (y, x) = (at % plane / width, at % width);
         (at / plane, y + self.corner.0, x + self.corner.1)
     }
@@ -289,7 +296,7 @@ impl PerPixel {
         (colour * rows + i.min(rows - 1)) * columns + j.min(columns - 1)
     }
 
-    /// [`Self::level`] of each of `phases`, which begin at value `first` of a stack (3, H, W) and stay in one row. The
+    /// [`Self::level`] of each of `phases`, which begin at value `first` of a stack (C, H, W) and stay in one row. The
     /// same bits; allocates nothing.
     ///
     /// # Panics

@@ -7,17 +7,18 @@ use crate::error::Result;
 use crate::frame::RgbdFrame;
 use num_complex::{Complex32, Complex64};
 
-/// The hologram of `frame` at `z_m`, (3, H, W), as [`super::SweepPlan::field`] gives it, slowly.
+/// The hologram of `frame` at `z_m`, (C, H, W), as [`super::SweepPlan::field`] gives it, slowly.
 ///
 /// # Errors
 /// As [`super::SweepPlan::new`].
 pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Result<Vec<Complex32>> {
     sweep.check(display)?;
+    frame.check(frame.shape(), display.colours())?;
     let (height, width) = frame.shape();
     let (rgb, depth) = frame.values();
     let size = height * width;
     let sources = hidden::reference(depth, height, width, hidden_reach(display));
-    let mut result = Vec::with_capacity(3 * size);
+    let mut result = Vec::with_capacity(display.colours() * size);
     for (colour, optics) in optics(display, &sweep, z_m)?.iter().enumerate() {
         let filters = Filters::new(optics, sweep.taps / 2);
         // Light may leave the frame and come back: as much black around it as the filters reach.

@@ -25,7 +25,7 @@ fn join(a: Span, b: Span) -> Span {
 /// The surfaces of a frame: where each pixel's points lie and whose colour they have.
 #[derive(Clone, Copy)]
 pub(super) struct Surfaces<'a> {
-    /// (3, H, W).
+    /// (C, H, W).
     pub(super) rgb: &'a [f32],
     /// Normalized, (H, W).
     pub(super) depth: &'a [f32],
@@ -58,7 +58,7 @@ impl Layout {
         planes: usize,
         reach: impl Fn(usize) -> usize,
         spread: impl Fn(usize) -> usize,
-        filters: &[Filters; 3],
+        filters: &[Filters],
     ) -> Self {
         let halos: Vec<usize> = (0..planes).map(|k| reach(k) + MARGIN).collect();
         let part = (filters.iter().map(Filters::longest_part)).max().unwrap_or(0);

@@ -1,6 +1,6 @@
 //! A target in one file, for an app to carry. `phasefront calibrate pack` writes it from what calibration found.
 //!
-//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the laser's gains as f32, (3, Gh, Gw), the
+//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the lasers' gains as f32, (C, Gh, Gw), the
 //! flatness maps as u16, (1 or 3, H, W), then the bytes of the per-pixel table; numbers little-endian.
 
 use super::Target;
@@ -32,7 +32,7 @@ struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     laser: Option<[usize; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    correction: Option<[Coefficients; 3]>,
+    correction: Option<Vec<Coefficients>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     carrier_rad: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,9 +44,9 @@ struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     levels_turns: Option<Vec<f64>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    shift_px: Option<[[f64; 2]; 3]>,
+    shift_px: Option<Vec<[f64; 2]>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    scale: Option<[f64; 3]>,
+    scale: Option<Vec<f64>>,
     display: Display,
 }
 
@@ -77,7 +77,8 @@ impl Target {
         if maps > 3 {
             return Err(refuse(format!("holds {maps} flatness maps; there are at most 3")));
         }
-        let (laser, rest) = rest.split_at_checked(12 * rows * columns).ok_or_else(short)?;
+        let colours = header.display.colours();
+        let (laser, rest) = (rest.split_at_checked(4 * colours * rows * columns)).ok_or_else(short)?;
         let modulator = (header.display.height(), header.display.width());
         let values = maps * modulator.0 * modulator.1;
         let (flatness, table) = rest.split_at_checked(2 * values).ok_or_else(short)?;
@@ -94,7 +95,7 @@ impl Target {
                 let amplitude: Vec<f32> = (laser.chunks_exact(4))
                     .map(|b| 1.0 / f32::from_le_bytes([b[0], b[1], b[2], b[3]]))
                     .collect();
-                let amplitude = ArrayView3::from_shape((3, rows, columns), &amplitude).map_err(refuse)?;
+                let amplitude = ArrayView3::from_shape((colours, rows, columns), &amplitude).map_err(refuse)?;
                 Some(Illumination::new(amplitude)?)
             }
         };
@@ -133,7 +134,7 @@ impl Target {
             },
             registration: Registration {
                 shift_px: header.shift_px.unwrap_or_default(),
-                scale: header.scale.unwrap_or([1.0; 3]),
+                scale: header.scale.unwrap_or_default(),
             },
         };
         target.check().map_err(refuse)?;
@@ -163,15 +164,15 @@ impl Target {
             lut,
             per_pixel: table.len(),
             laser: (self.illumination.as_ref()).map(|light| [light.nodes().0, light.nodes().1]),
-            correction: self.correction.map(|correction| *correction.coefficients()),
+            correction: (self.correction.as_ref()).map(|correction| correction.coefficients().to_vec()),
             carrier_rad: Some(*carrier_rad).filter(|rad| *rad != [0.0; 2]),
             lens_m: *lens_m,
             flatness: flatness
                 .as_ref()
                 .map(|flatness| flatness.maps().len() / (flatness.shape().0 * flatness.shape().1)),
             levels_turns: levels_turns.clone(),
-            shift_px: Some(self.registration.shift_px).filter(|shift| *shift != [[0.0; 2]; 3]),
-            scale: Some(self.registration.scale).filter(|scale| *scale != [1.0; 3]),
+            shift_px: Some(self.registration.shift_px.clone()).filter(|shift| !shift.is_empty()),
+            scale: Some(self.registration.scale.clone()).filter(|scale| !scale.is_empty()),
             display: self.display.clone(),
         };
         let text = toml::to_string(&header).map_err(refuse)?;
@@ -195,19 +196,25 @@ mod tests {
     use ndarray::Array3;
 
     fn calibration() -> Target {
-        let display = Display::from_toml("width = 40\nheight = 24\noffset_mm = 3.5").unwrap();
+        calibration_of("[638, 520, 450]")
+    }
+
+    fn calibration_of(wavelengths_nm: &str) -> Target {
+        let text = format!("width = 40\nheight = 24\noffset_mm = 3.5\nwavelengths_nm = {wavelengths_nm}");
+        let display = Display::from_toml(&text).unwrap();
+        let colours = display.colours();
         let (rows, columns) = nodes(24, 40, 16);
-        let levels: Vec<f32> = (0..3 * rows * columns)
+        let levels: Vec<f32> = (0..colours * rows * columns)
             .flat_map(|node| (0..=4).map(move |k| (node % 7) as f32 + 50.0 * k as f32))
             .collect();
-        let turns = vec![6.0; 3 * rows * columns];
+        let turns = vec![6.0; colours * rows * columns];
         let table = PerPixel::new(24, 40, 16, 4, &levels, &turns).unwrap();
-        let amplitude = Array3::from_shape_fn((3, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
+        let amplitude = Array3::from_shape_fn((colours, 2, 5), |(c, y, x)| 1.0 - 0.03 * (c + y * x) as f32);
         Target {
             display,
             response: Response::PerPixel(Arc::new(table)),
             illumination: Some(Illumination::new(amplitude.view()).unwrap()),
-            correction: Some(Aberration::new([[0.1, -2.0, 0.0, 0.25, 1e-9]; 3]).unwrap()),
+            correction: Some(Aberration::new(vec![[0.1, -2.0, 0.0, 0.25, 1e-9]; colours]).unwrap()),
             panel: Panel {
                 carrier_rad: [0.01, -0.002],
                 lens_m: Some(0.5),
@@ -215,15 +222,20 @@ mod tests {
                 levels_turns: None,
             },
             registration: Registration {
-                shift_px: [[0.5, 0.0], [0.0, 0.0], [-1.0, 2.25]],
-                scale: [1.001, 1.0, 0.998],
+                shift_px: [[0.5, 0.0], [0.0, 0.0], [-1.0, 2.25]][..colours].into(),
+                scale: [1.001, 1.0, 0.998][..colours].into(),
             },
         }
     }
 
     #[test]
     fn what_is_written_is_read() {
-        let want = calibration();
+        for wavelengths_nm in ["[638, 520, 450]", "[532]"] {
+            is_read(&calibration_of(wavelengths_nm));
+        }
+    }
+
+    fn is_read(want: &Target) {
         let bytes = want.to_bytes().unwrap();
         let got = Target::from_bytes(&bytes).unwrap();
         assert_eq!(got.display, want.display);
@@ -232,7 +244,8 @@ mod tests {
         assert_eq!(got.panel, want.panel);
         assert_eq!(got.registration, want.registration);
         let gains = |of: &Target| of.illumination.as_ref().unwrap().gains().to_vec();
-        for (got, want) in gains(&got).iter().zip(gains(&want)) {
+        assert_eq!(gains(&got).len(), 10 * want.display.colours());
+        for (got, want) in gains(&got).iter().zip(gains(want)) {
             assert!((got / want - 1.0).abs() < 1e-6);
         }
         for response in [
@@ -279,6 +292,24 @@ mod tests {
         huge.extend(text.as_bytes());
         let error = Target::from_bytes(&huge).unwrap_err().to_string();
         assert!(error.contains("cut short"), "{error}");
+        let one = Display::from_toml("width = 40\nheight = 24\nwavelengths_nm = [532]").unwrap();
+        for (word, other) in [
+            ("the per-pixel table has 3 colours, the display 1", calibration()),
+            (
+                "the laser's map has 3 colours, the display 1",
+                Target {
+                    response: Response::Linear { bits: 8 },
+                    ..calibration()
+                },
+            ),
+        ] {
+            let other = Target {
+                display: one.clone(),
+                ..other
+            };
+            let error = other.to_bytes().unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
         let other = Target {
             display: Display::default(),
             ..calibration()

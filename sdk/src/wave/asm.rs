@@ -296,7 +296,7 @@ impl Propagator {
         })
     }
 
-    /// Three plans, one for each wavelength, that share one padded shape (red's, the widest) and so
+    /// A plan for each wavelength, which share one padded shape (that of the longest, the widest) and so
     /// one [`ConvolveScratch`].
     ///
     /// # Errors
@@ -305,44 +305,52 @@ impl Propagator {
         height: usize,
         width: usize,
         pitch_m: f64,
-        wavelengths_m: [f64; 3],
+        wavelengths_m: &[f64],
         distance_m: f64,
         padding: Padding,
-    ) -> Result<[Self; 3]> {
-        let longest = wavelengths_m.into_iter().fold(0.0, f64::max);
+    ) -> Result<Vec<Self>> {
+        let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
         let padded = padded_shape(height, width, pitch_m, longest, distance_m, padding)?;
         let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
-        Ok(wavelengths_m.map(|wavelength_m| {
+        let plan = |&wavelength_m: &f64| {
             let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
             Propagator {
                 shape: (height, width),
                 fft: fft.clone(),
                 transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
             }
-        }))
+        };
+        Ok(wavelengths_m.iter().map(plan).collect())
     }
 
     /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is
     /// that of a modulator of `modulator_pitch_m`, on its way.
     ///
     /// # Errors
-    /// As [`padded_shape`], the light that the correction moves counted in.
+    /// As [`padded_shape`], the light that the correction moves counted in; a correction of other colours.
     pub fn for_colours_corrected(
         height: usize,
         width: usize,
         pitch_m: f64,
-        wavelengths_m: [f64; 3],
+        wavelengths_m: &[f64],
         distance_m: f64,
         aberration: &Aberration,
         modulator_pitch_m: f64,
-    ) -> Result<[Self; 3]> {
-        let longest = wavelengths_m.into_iter().fold(0.0, f64::max);
+    ) -> Result<Vec<Self>> {
+        if aberration.coefficients().len() != wavelengths_m.len() {
+            return Err(Error::Plan(format!(
+                "a correction of {} colours for {}; both must have as many",
+                aberration.coefficients().len(),
+                wavelengths_m.len()
+            )));
+        }
+        let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
         let more = (aberration.reach_m(modulator_pitch_m) / pitch_m).ceil() as usize;
         let (h, w) = (height.saturating_add(more), width.saturating_add(more));
         let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
         let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
-        Ok([0, 1, 2].map(|colour| {
-            let transfer = Transfer::corrected(padded, pitch_m, wavelengths_m[colour], distance_m, |mu, nu| {
+        let plan = |(colour, &wavelength_m): (usize, &f64)| {
+            let transfer = Transfer::corrected(padded, pitch_m, wavelength_m, distance_m, |mu, nu| {
                 aberration.phase(colour, mu, nu, modulator_pitch_m)
             });
             Propagator {
@@ -350,7 +358,8 @@ impl Propagator {
                 fft: fft.clone(),
                 transfer: Arc::new(transfer),
             }
-        }))
+        };
+        Ok(wavelengths_m.iter().enumerate().map(plan).collect())
     }
 
     /// (H, W).

@@ -51,23 +51,32 @@ pub fn terms(a: &Coefficients, x: f64, y: f64) -> f64 {
         + (3.0 * square - 2.0) * (a[3] * x + a[4] * y)
 }
 
-/// The correction of one distance: coefficients of red, green and blue.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The correction of one distance: coefficients of each colour.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Aberration {
-    coefficients: [Coefficients; 3],
+    coefficients: Vec<Coefficients>,
 }
 
 impl Aberration {
-    /// Nothing to correct.
-    pub const NONE: Self = Aberration {
-        coefficients: [[0.0; 5]; 3],
-    };
+    /// Nothing to correct in so many colours.
+    pub fn none(colours: usize) -> Self {
+        Aberration {
+            coefficients: vec![[0.0; 5]; colours],
+        }
+    }
 
-    /// From the coefficients a₃ to a₇ of red, green and blue, radians.
+    /// From the coefficients a₃ to a₇ of red, green and blue or of the one laser, radians.
     ///
     /// # Errors
-    /// A coefficient that is not finite or beyond ±10⁴.
-    pub fn new(coefficients: [Coefficients; 3]) -> Result<Self> {
+    /// Neither three colours nor one; a coefficient that is not finite or beyond ±10⁴.
+    pub fn new(coefficients: impl Into<Vec<Coefficients>>) -> Result<Self> {
+        let coefficients = coefficients.into();
+        if ![1, 3].contains(&coefficients.len()) {
+            return Err(Error::Plan(format!(
+                "an aberration of {} colours; three are right, or one",
+                coefficients.len()
+            )));
+        }
         match coefficients.iter().flatten().find(|a| a.is_nan() || a.abs() > MOST) {
             Some(a) => Err(Error::Plan(format!(
                 "an aberration coefficient of {a} rad; it must lie in -10000..=10000"
@@ -76,8 +85,8 @@ impl Aberration {
         }
     }
 
-    /// The coefficients of red, green and blue, radians.
-    pub fn coefficients(&self) -> &[Coefficients; 3] {
+    /// The coefficients of each colour, radians.
+    pub fn coefficients(&self) -> &[Coefficients] {
         &self.coefficients
     }
 
@@ -102,16 +111,16 @@ impl Aberration {
     /// What this corrects: the aberration itself.
     pub fn reversed(&self) -> Self {
         Aberration {
-            coefficients: self.coefficients.map(|a| a.map(|a| -a)),
+            coefficients: self.coefficients.iter().map(|a| a.map(|a| -a)).collect(),
         }
     }
 
-    /// `1 − t` of this one and `t` of `other`.
+    /// `1 − t` of this one and `t` of `other`, which is of the same colours.
     pub fn mix(&self, other: &Self, t: f64) -> Self {
-        let mix =
-            |c: usize, j: usize| self.coefficients[c][j] + (other.coefficients[c][j] - self.coefficients[c][j]) * t;
+        let colours = self.coefficients.iter().zip(&other.coefficients);
+        let mix = |(a, b): (&Coefficients, &Coefficients)| std::array::from_fn(|j| a[j] + (b[j] - a[j]) * t);
         Aberration {
-            coefficients: std::array::from_fn(|c| std::array::from_fn(|j| mix(c, j))),
+            coefficients: colours.map(mix).collect(),
         }
     }
 }
@@ -127,7 +136,7 @@ impl Aberrations {
     /// From the corrections at z against the midpoint, metres, positive toward the viewer.
     ///
     /// # Errors
-    /// None at all, or z that are not finite or do not ascend.
+    /// None at all, z that are not finite or do not ascend, or corrections of different numbers of colours.
     pub fn new(at: Vec<(f64, Aberration)>) -> Result<Self> {
         if at.is_empty() {
             return Err(Error::Plan(
@@ -139,6 +148,12 @@ impl Aberrations {
             return Err(Error::Plan(format!(
                 "aberrations at z = {z:?} mm; distances must ascend"
             )));
+        }
+        let colours = at[0].1.coefficients.len();
+        if at.iter().any(|(_, a)| a.coefficients.len() != colours) {
+            return Err(Error::Plan(
+                "aberrations of one colour and of three; all distances must have the same".into(),
+            ));
         }
         Ok(Aberrations { at })
     }
@@ -156,15 +171,15 @@ impl Aberrations {
                 let (z0, near) = &self.at[i];
                 near.mix(far, (z_m - z0) / (z - z0))
             }
-            (Some(i), None) => self.at[i].1,
-            (None, _) => self.at[0].1,
+            (Some(i), None) => self.at[i].1.clone(),
+            (None, _) => self.at[0].1.clone(),
         }
     }
 
     /// The correction, where it is one for all depths: what a phone can undo on the way to the modulator.
     pub fn constant(&self) -> Option<Aberration> {
-        let first = self.at[0].1;
-        self.at.iter().all(|(_, a)| *a == first).then_some(first)
+        let first = &self.at[0].1;
+        self.at.iter().all(|(_, a)| a == first).then(|| first.clone())
     }
 }
 

@@ -1051,8 +1051,8 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
     func output(placement: Placement, image: UInt32) throws  -> RawImage
     
     /**
-     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours
-     * follow one another without gaps, too. Valid as long as this object.
+     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
+     * laser. The colours follow one another without gaps, too. Valid as long as this object.
      *
      * # Errors
      * Another colour.
@@ -1172,8 +1172,8 @@ open func output(placement: Placement, image: UInt32)throws  -> RawImage  {
 }
     
     /**
-     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours
-     * follow one another without gaps, too. Valid as long as this object.
+     * Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
+     * laser. The colours follow one another without gaps, too. Valid as long as this object.
      *
      * # Errors
      * Another colour.
@@ -2872,6 +2872,10 @@ public struct Display: Equatable, Hashable {
      */
     public var blueNm: Double
     /**
+     * Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+     */
+    public var laserNm: Double?
+    /**
      * Depth of the volume, mm.
      */
     public var volumeDepthMm: Double
@@ -2910,6 +2914,9 @@ public struct Display: Equatable, Hashable {
          * Wavelength of the blue laser, nm.
          */blueNm: Double = Double(450.0), 
         /**
+         * Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
+         */laserNm: Double? = nil, 
+        /**
          * Depth of the volume, mm.
          */volumeDepthMm: Double = Double(6.0), 
         /**
@@ -2927,6 +2934,7 @@ public struct Display: Equatable, Hashable {
         self.redNm = redNm
         self.greenNm = greenNm
         self.blueNm = blueNm
+        self.laserNm = laserNm
         self.volumeDepthMm = volumeDepthMm
         self.offsetMm = offsetMm
         self.bits = bits
@@ -2955,6 +2963,7 @@ public struct FfiConverterTypeDisplay: FfiConverterRustBuffer {
                 redNm: FfiConverterDouble.read(from: &buf), 
                 greenNm: FfiConverterDouble.read(from: &buf), 
                 blueNm: FfiConverterDouble.read(from: &buf), 
+                laserNm: FfiConverterOptionDouble.read(from: &buf), 
                 volumeDepthMm: FfiConverterDouble.read(from: &buf), 
                 offsetMm: FfiConverterDouble.read(from: &buf), 
                 bits: FfiConverterUInt32.read(from: &buf), 
@@ -2969,6 +2978,7 @@ public struct FfiConverterTypeDisplay: FfiConverterRustBuffer {
         FfiConverterDouble.write(value.redNm, into: &buf)
         FfiConverterDouble.write(value.greenNm, into: &buf)
         FfiConverterDouble.write(value.blueNm, into: &buf)
+        FfiConverterOptionDouble.write(value.laserNm, into: &buf)
         FfiConverterDouble.write(value.volumeDepthMm, into: &buf)
         FfiConverterDouble.write(value.offsetMm, into: &buf)
         FfiConverterUInt32.write(value.bits, into: &buf)
@@ -3336,6 +3346,10 @@ public struct HologramInfo: Equatable, Hashable {
      */
     public var height: UInt32
     /**
+     * How many colours its levels have: 3, or 1 for a display of one laser.
+     */
+    public var colours: UInt32
+    /**
      * The amplitude that full light stands for.
      */
     public var scale: Float
@@ -3373,6 +3387,9 @@ public struct HologramInfo: Equatable, Hashable {
          * Pixels along y.
          */height: UInt32, 
         /**
+         * How many colours its levels have: 3, or 1 for a display of one laser.
+         */colours: UInt32, 
+        /**
          * The amplitude that full light stands for.
          */scale: Float, 
         /**
@@ -3393,6 +3410,7 @@ public struct HologramInfo: Equatable, Hashable {
         self.timestampNs = timestampNs
         self.width = width
         self.height = height
+        self.colours = colours
         self.scale = scale
         self.nearM = nearM
         self.farM = farM
@@ -3420,6 +3438,7 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
                 timestampNs: FfiConverterUInt64.read(from: &buf), 
                 width: FfiConverterUInt32.read(from: &buf), 
                 height: FfiConverterUInt32.read(from: &buf), 
+                colours: FfiConverterUInt32.read(from: &buf), 
                 scale: FfiConverterFloat.read(from: &buf), 
                 nearM: FfiConverterOptionFloat.read(from: &buf), 
                 farM: FfiConverterOptionFloat.read(from: &buf), 
@@ -3433,6 +3452,7 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
         FfiConverterUInt64.write(value.timestampNs, into: &buf)
         FfiConverterUInt32.write(value.width, into: &buf)
         FfiConverterUInt32.write(value.height, into: &buf)
+        FfiConverterUInt32.write(value.colours, into: &buf)
         FfiConverterFloat.write(value.scale, into: &buf)
         FfiConverterOptionFloat.write(value.nearM, into: &buf)
         FfiConverterOptionFloat.write(value.farM, into: &buf)
@@ -5329,7 +5349,7 @@ public enum Layout: Equatable, Hashable {
      */
     case bgra
     /**
-     * Three images, one after another: red, green, blue; a byte a pixel.
+     * An image for each colour, one after another: red, green, blue; a byte a pixel.
      */
     case grey
 
@@ -6798,7 +6818,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_output() != 15573) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 768) {
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_address() != 20456) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len() != 34224) {

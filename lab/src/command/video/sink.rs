@@ -117,8 +117,8 @@ impl Sink {
             hologram.preview(z_m, height, width, &mut rgba)?;
             files::write_rgba(&self.preview(folder, index), width, height, &rgba)?;
         }
-        let levels =
-            ArrayView3::from_shape((3, height, width), hologram.levels()).map_err(|e| Error::Input(e.to_string()))?;
+        let levels = ArrayView3::from_shape((hologram.colours(), height, width), hologram.levels())
+            .map_err(|e| Error::Input(e.to_string()))?;
         let info = HologramInfo {
             scale: Some(hologram.scale()),
             ..self.info.clone()

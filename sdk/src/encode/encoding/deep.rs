@@ -5,6 +5,7 @@
 //! it asks for that, AA-DPM's blur has gone over the field first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
+use crate::display::Display;
 use crate::error::Result;
 use crate::network::{FilterPlan, FilterScratch, Network};
 use num_complex::Complex32;
@@ -32,16 +33,16 @@ pub struct DeepScratch {
 }
 
 impl Deep {
-    /// Plans the filtering of (3, `height`, `width`) fields.
+    /// Plans the filtering of (C, `height`, `width`) fields of the colours of `display`.
     ///
     /// # Errors
-    /// A network that is no pre-filter, or that the kernels do not take.
-    pub fn new(height: usize, width: usize, network: &Network) -> Result<Self> {
+    /// A network that is no pre-filter, that does not serve the display, or that the kernels do not take.
+    pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
         let blurred = network.input().is_blurred();
         Ok(Deep {
             shape: (height, width),
             blur: blurred.then(blur).transpose()?,
-            network: network.filter_plan(height, width)?,
+            network: network.filter_plan_for(height, width, display)?,
         })
     }
 
@@ -53,10 +54,10 @@ impl Deep {
         }
     }
 
-    /// Replaces `field`, (3, H, W) at the modulator, by the pre-encoding field.
+    /// Replaces `field`, (C, H, W) at the modulator, by the pre-encoding field.
     ///
     /// # Panics
-    /// If `field` has not 3·H·W values.
+    /// If `field` has not C·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut DeepScratch) {
         let (height, width) = self.shape;
         if let (Some(blur), Some(scratch)) = (&self.blur, &mut scratch.blur) {

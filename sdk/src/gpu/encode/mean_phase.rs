@@ -56,7 +56,7 @@ mod tests {
                 })
                 .collect();
             assert!(apart(&turn, &expected) < 1e-4, "{turn:?} {expected:?}");
-            remove_mean_phase(&mut sums);
+            remove_mean_phase(&mut sums, 3);
         }
         // Darkness has no phase and is left alone.
         let buffer = upload(&device, &[Complex32::ZERO; 3]);

@@ -53,21 +53,24 @@ impl Midpoint {
                 .on(device, &arguments, by_rows)
         };
         let ways = MidpointSteps::new(job.size, job.target, job.options.midpoint_steps)?;
-        let convolution = |field: &wgpu::Buffer, factors: [&[Complex32]; 3], padded| {
+        let convolution = |field: &wgpu::Buffer, factors: &[&[Complex32]], padded| {
             let planes = Planes {
                 field,
                 size: job.size,
                 padded,
-                factors: &factors,
+                factors,
                 turn: None,
             };
             Convolution::new(device, &planes)
         };
         let radius = job.target.display.aperture_radius();
         let [back, forth] = [ways.back(), ways.forth()];
-        let free = back.each_ref().map(|way| way.transfer().factors());
-        let stopped = [back, forth].map(|way| way.each_ref().map(|way| way.transfer().factors_through(radius)));
-        let [there, here] = stopped.each_ref().map(|way| way.each_ref().map(Vec::as_slice));
+        let free: Vec<_> = back.iter().map(|way| way.transfer().factors()).collect();
+        let stopped = [back, forth].map(|ways| {
+            let through = ways.iter().map(|way| way.transfer().factors_through(radius));
+            through.collect::<Vec<_>>()
+        });
+        let [there, here] = (stopped.each_ref()).map(|ways| ways.iter().map(Vec::as_slice).collect::<Vec<_>>());
         let arrive = device.program("levels after the midpoint", source.clone(), "arrive");
         let mut arguments = shared.arguments(&[0, 8]);
         arguments.push((16, phasors.as_entire_binding()));
@@ -86,15 +89,15 @@ impl Midpoint {
                     (18, &bound.buffer),
                 ],
             )?,
-            aim: convolution(&aim, free, back[0].padded_shape())?,
-            back: convolution(missing, there, back[0].padded_shape())?,
+            aim: convolution(&aim, &free, back[0].padded_shape())?,
+            back: convolution(missing, &there, back[0].padded_shape())?,
             ask: dispatch(
                 "what is missing at the midpoint",
                 "ask",
                 &[0],
                 &[(14, &aim), (15, missing)],
             )?,
-            forth: convolution(missing, here, forth[0].padded_shape())?,
+            forth: convolution(missing, &here, forth[0].padded_shape())?,
             follow: dispatch(
                 "a step at the midpoint",
                 "follow",

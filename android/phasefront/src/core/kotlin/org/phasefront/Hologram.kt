@@ -13,11 +13,17 @@ public enum class Colour {
 
     /** The blue laser's. */
     BLUE,
+    ;
+
+    public companion object {
+        /** The one of a display of one laser. */
+        public val LASER: Colour = RED
+    }
 }
 
 /**
- * The hologram of one frame: modulator levels of three colours, and what is known of them. Close it, so that its memory
- * goes back to the session at once and not whenever garbage is collected.
+ * The hologram of one frame: modulator levels of three colours, or of one laser, and what is known of them. Close it, so
+ * that its memory goes back to the session at once and not whenever garbage is collected.
  */
 public class Hologram internal constructor(private val raw: RawHologram) : AutoCloseable {
     /** What is known of it. */

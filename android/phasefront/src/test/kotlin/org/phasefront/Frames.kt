@@ -41,10 +41,11 @@ internal fun still(
     DepthImage(DepthFormat.METRES_F32, 32, 24, depth),
 )
 
-/** The levels of all three colours. */
+/** The levels of all colours. */
 internal fun Hologram.levels(): ByteArray {
     val size = info.width.toInt() * info.height.toInt()
-    val all = ByteArray(3 * size)
-    for (colour in Colour.entries) usePlane(colour) { it.get(all, colour.ordinal * size, size) }
+    val colours = Colour.entries.take(info.colours.toInt())
+    val all = ByteArray(colours.size * size)
+    for (colour in colours) usePlane(colour) { it.get(all, colour.ordinal * size, size) }
     return all
 }
