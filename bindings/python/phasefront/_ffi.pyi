@@ -112,7 +112,7 @@ class Layout(enum.Enum):
         RGB: One image, bytes red, green, blue.
         RGBA: One image, bytes red, green, blue, alpha 255.
         BGRA: One image, bytes blue, green, red, alpha 255.
-        GREY: Three images, one after another: red, green, blue; a byte a pixel.
+        GREY: An image for each colour, one after another: red, green, blue; a byte a pixel.
     """
     RGB = 0
     RGBA = 1
@@ -506,6 +506,7 @@ class Display:
         red_nm: Wavelength of the red laser, nm.
         green_nm: Wavelength of the green laser, nm.
         blue_nm: Wavelength of the blue laser, nm.
+        laser_nm: Wavelength of the laser of a display that has one, nm, in the place of the three; none where there are three.
         volume_depth_mm: Depth of the volume, mm.
         offset_mm: z of the modulator against the middle of the volume, mm, positive toward the viewer.
         bits: Bits of a modulator level.
@@ -517,11 +518,12 @@ class Display:
     red_nm: float
     green_nm: float
     blue_nm: float
+    laser_nm: float | None
     volume_depth_mm: float
     offset_mm: float
     bits: int
     aperture_radius: float
-    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0) -> None: ...
+    def __init__(self, *, width: int = 1920, height: int = 1080, pitch_um: float = 8.0, red_nm: float = 638.0, green_nm: float = 520.0, blue_nm: float = 450.0, laser_nm: float | None = ..., volume_depth_mm: float = 6.0, offset_mm: float = 0.0, bits: int = 8, aperture_radius: float = 1.0) -> None: ...
 
 class Drops:
     """Dropped frames by reason.
@@ -598,6 +600,7 @@ class HologramInfo:
         timestamp_ns: The frame's timestamp.
         width: Pixels along x.
         height: Pixels along y.
+        colours: How many colours its levels have: 3, or 1 for a display of one laser.
         scale: The amplitude that full light stands for.
         near_m: Metres at the near end of the volume; none for normalized depth.
         far_m: Metres at the far end of the volume; none for normalized depth.
@@ -608,13 +611,14 @@ class HologramInfo:
     timestamp_ns: int
     width: int
     height: int
+    colours: int
     scale: float
     near_m: float | None
     far_m: float | None
     valid_depth: float
     rung: int
     times: FrameTimes
-    def __init__(self, *, timestamp_ns: int, width: int, height: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, rung: int, times: FrameTimes) -> None: ...
+    def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, rung: int, times: FrameTimes) -> None: ...
 
 class Placement:
     """How a hologram is put on its modulator.
@@ -851,8 +855,8 @@ class RawHologram:
         Errors: An image that the layout has not.
         """
     def plane_address(self, colour: int) -> int:
-        """Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue. The colours
-        follow one another without gaps, too. Valid as long as this object.
+        """Where the levels of one colour lie, a byte each, row by row without gaps: 0 red, 1 green, 2 blue, or 0 of one
+        laser. The colours follow one another without gaps, too. Valid as long as this object.
 
         Errors: Another colour.
         """
