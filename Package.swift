@@ -15,7 +15,9 @@ let package = Package(
             name: "PhasefrontFFI",
             url: "https://example.org/phasefront/releases/download/v\(version)/PhasefrontFFI.xcframework.zip",
             checksum: checksum),
-        .target(name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], path: "ios/Sources/PhasefrontCore"),
+        .target(
+            name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], path: "ios/Sources/PhasefrontCore",
+            resources: [.copy("PrivacyInfo.xcprivacy")]),
         .target(name: "Phasefront", dependencies: ["PhasefrontCore"], path: "ios/Sources/Phasefront"),
     ]
 )

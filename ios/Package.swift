@@ -24,7 +24,9 @@ let package = Package(
     products: [product],
     targets: [
         ffi,
-        .target(name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], linkerSettings: link),
+        .target(
+            name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], resources: [.copy("PrivacyInfo.xcprivacy")],
+            linkerSettings: link),
         .testTarget(name: "PhasefrontCoreTests", dependencies: ["PhasefrontCore"]),
     ] + apple
 )

@@ -19,6 +19,7 @@ library() { echo "${CARGO_TARGET_DIR:-target}/$1/mobile/libphasefront_ffi.a"; }
 # Headers in a folder of their own: module maps of several frameworks would meet in one.
 cp ios/Generated/PhasefrontFFI.h ios/Generated/module.modulemap "$build/Headers/PhasefrontFFI/"
 for target in "${targets[@]}"; do strip -S "$(library "$target")"; done
+ios/required-reasons "$(library aarch64-apple-ios)"
 lipo -create "$(library aarch64-apple-ios-sim)" "$(library x86_64-apple-ios)" -output "$build/simulator/libphasefront_ffi.a"
 xcodebuild -create-xcframework \
     -library "$(library aarch64-apple-ios)" -headers "$build/Headers" \
