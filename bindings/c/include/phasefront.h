@@ -510,7 +510,7 @@ void pf_network_free(struct PfNetwork *network);
 // What is usual for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for those
 // that take one, else NULL.
 enum PfStatus pf_options_new(const struct PfTarget *target,
-                             uint32_t method_,
+                             uint32_t method,
                              const struct PfNetwork *network,
                              struct PfOptions **options);
 

@@ -152,8 +152,10 @@ pub unsafe extern "C" fn pf_hologram_levels(
     call(|| unsafe {
         let hologram = &read(hologram, "hologram")?.0;
         let address = hologram.plane_address(colour)?;
-        give(length, "length", || Ok(hologram.plane_len()? as usize))?;
-        give(levels, "levels", || Ok(address as usize as *const u8))
+        give(levels, "levels", || {
+            give(length, "length", || Ok(hologram.plane_len()? as usize))?;
+            Ok(address as usize as *const u8)
+        })
     })
 }
 

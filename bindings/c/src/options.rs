@@ -32,7 +32,7 @@ pub enum PfBackend {
     Gpu = 1,
 }
 
-pub(crate) const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
+const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 
 /// One quality: a method, a resolution, and how what is shown is corrected.
 #[repr(C)]
@@ -57,7 +57,7 @@ pub struct PfOptions(pub(crate) SessionOptions);
 
 /// # Safety
 /// `network` is NULL or valid.
-unsafe fn method(method: u32, network: *const PfNetwork) -> Result<Option<Method>> {
+unsafe fn method_of(method: u32, network: *const PfNetwork) -> Result<Option<Method>> {
     // SAFETY: the caller's promise.
     let network = || unsafe { read(network, "network") }.map(|network| network.0.clone());
     Ok(match method {
@@ -74,7 +74,7 @@ unsafe fn method(method: u32, network: *const PfNetwork) -> Result<Option<Method
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_new(
     target: *const PfTarget,
-    method_: u32,
+    method: u32,
     network: *const PfNetwork,
     options: *mut *mut PfOptions,
 ) -> PfStatus {
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn pf_options_new(
     call(|| unsafe {
         give(options, "options", || {
             let target = read(target, "target")?.0.clone();
-            Ok(object(PfOptions(session_options(target, method(method_, network)?)?)))
+            Ok(object(PfOptions(session_options(target, method_of(method, network)?)?)))
         })
     })
 }
@@ -127,7 +127,7 @@ pub unsafe extern "C" fn pf_options_push_rung(options: *mut PfOptions, rung: *co
     unsafe {
         try_set(options, |options| {
             let rung = read(rung, "rung")?;
-            let method = method(rung.method, rung.network)?.ok_or_else(|| {
+            let method = method_of(rung.method, rung.network)?.ok_or_else(|| {
                 PhasefrontError::Setting("method of a rung is PF_METHOD_USUAL; name one of the others".into())
             })?;
             options.ladder.push(Rung {

@@ -242,6 +242,13 @@ fn cut<const N: usize>(text: &str) -> [c_char; N] {
 /// A session. Every call may come from any thread, at any moment, but for pf_session_free, which is the last.
 pub struct PfSession(Arc<RawSession>);
 
+impl Drop for PfSession {
+    fn drop(&mut self) {
+        // It only fails by a fault of ours, which nobody is left to hear of.
+        let _ = self.0.shut_down();
+    }
+}
+
 /// # Safety
 /// `session` is NULL or valid.
 unsafe fn with(session: *const PfSession, how: impl FnOnce(&RawSession) -> Result<()>) -> PfStatus {
@@ -276,10 +283,7 @@ pub unsafe extern "C" fn pf_session_new(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_free(session: *mut PfSession) {
     // SAFETY: the rules of this border.
-    unsafe {
-        with(session, RawSession::shut_down);
-        free(session);
-    }
+    unsafe { free(session) };
 }
 
 /// The hologram of a frame, in an image or a video session.
