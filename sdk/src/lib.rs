@@ -71,6 +71,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod brightness;
+mod clock;
 mod depth;
 pub mod device;
 mod display;

@@ -4,6 +4,7 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::brightness::{Brightness, Past, Percentile};
+use crate::clock::Instant;
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::error::Result;
@@ -16,7 +17,7 @@ use crate::wave::fft::ConvolveScratch;
 use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A plan for one shape, target and encoding. Immutable; shared between threads.
 pub struct Modulator {

@@ -2,6 +2,7 @@
 //! of each. Many frames are a session's work.
 
 use crate::brightness::Past;
+use crate::clock::Instant;
 use crate::encode::EncoderOptions;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
@@ -9,7 +10,7 @@ use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
 use crate::target::Target;
 use num_complex::Complex32;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A plan for one frame shape, method and target. Immutable; shared between threads.
 pub struct Pipeline {

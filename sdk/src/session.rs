@@ -22,6 +22,7 @@ mod quality;
 mod queue;
 mod stages;
 mod statistics;
+mod threads;
 
 use crate::depth::stream::DepthOptions;
 pub use event::{DropReason, Event};
@@ -31,6 +32,7 @@ pub use on_gpu::GpuOptions;
 pub use quality::{Backend, Quality, QualityChange, QualityReason, Rung, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
+use crate::clock::Instant;
 use crate::depth::camera::CameraFrame;
 use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
@@ -44,7 +46,6 @@ use stages::{Made, Stages};
 use statistics::Recent;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
 
 /// What a session makes, and how. [`SessionOptions::new`] has what is usual; change what is not.
 #[derive(Clone)]
@@ -289,6 +290,13 @@ impl Session {
         let mode = match mode {
             RunningMode::Image => Mode::Image(Mutex::new(Gate::new())),
             RunningMode::Video => Mode::Video(Mutex::new(Gate::new())),
+            RunningMode::Live(_) if cfg!(target_family = "wasm") => {
+                return Err(Error::Session(
+                    "a live one has a thread of its own, and WebAssembly has none; make a video session, and process frames \
+                     as they come"
+                        .into(),
+                ));
+            }
             RunningMode::Live(mut listener) => {
                 let of = shared.clone();
                 let listener = move |report| tell(&of, &mut listener, report);

@@ -44,14 +44,7 @@ const F32_BLOCKS: usize = 3;
 
 /// `[4 filters][ky][group][kx][filter][even, odd]`: words of two 16-bit weights.
 fn pack(taps: &Taps<'_>) -> Vec<i32> {
-    let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
-    let dots = taps.dot_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)]);
-    dots.iter()
-        .flat_map(|word| {
-            let [a, b, c, d] = word.to_le_bytes().map(|w| w as i8);
-            [pair(a, c), pair(b, d)]
-        })
-        .collect()
+    taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
 }
 
 fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {

@@ -50,6 +50,8 @@ fn kernels(isa: Isa) -> Option<Kernels> {
         Isa::Avx2 => crate::avx2::f32_kernels(),
         #[cfg(target_arch = "aarch64")]
         Isa::Neon => Some(crate::neon::KERNELS),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Isa::Simd128 => Some(crate::simd128::F32),
         _ => None,
     }
 }

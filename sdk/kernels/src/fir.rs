@@ -1,7 +1,7 @@
 //! Symmetric complex filters along one axis of a plane: half of a separable step of a wave.
 //!
 //! A plane is two runs of f32, real and imaginary. The arithmetic of every value is the same sequence of additions and
-//! fused multiply-adds on every instruction set, so all give the same bits.
+//! fused multiply-adds on every instruction set, so all give the same bits; but for WebAssembly, which cannot fuse.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -11,6 +11,8 @@ mod avx512;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod simd128;
 
 use crate::Isa;
 
@@ -32,9 +34,9 @@ trait Lanes: Copy {
     unsafe fn store(self, to: *mut f32);
     fn add(self, other: Self) -> Self;
     fn mul(self, other: Self) -> Self;
-    /// self + a·b, rounded once.
+    /// self + a·b, rounded once where the instruction set can.
     fn plus(self, a: Self, b: Self) -> Self;
-    /// self − a·b, rounded once.
+    /// self − a·b, likewise.
     fn minus(self, a: Self, b: Self) -> Self;
 }
 
@@ -67,6 +69,8 @@ impl Fir {
             Isa::Avx2 => avx2::kernel(),
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => Some(neon::kernel as Kernel),
+            #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+            Isa::Simd128 => Some(simd128::kernel as Kernel),
             _ => None,
         }?;
         Some(Fir { isa, kernel })

@@ -165,6 +165,19 @@ impl Taps<'_> {
         }
         words
     }
+
+    /// Each of [`Self::dot_words`] as two words of two 16-bit weights, of the even channels and of the odd ones.
+    #[cfg(any(target_arch = "x86_64", target_arch = "wasm32"))]
+    pub(crate) fn pair_words(&self, sizes: &[usize]) -> Vec<i32> {
+        let pair = |low: i8, high: i8| i32::from(low) & 0xffff | i32::from(high) << 16;
+        let dots = self.dot_words(sizes);
+        dots.iter()
+            .flat_map(|word| {
+                let [a, b, c, d] = word.to_le_bytes().map(|w| w as i8);
+                [pair(a, c), pair(b, d)]
+            })
+            .collect()
+    }
 }
 
 /// An instruction set's kernels.
@@ -205,6 +218,8 @@ fn kernels(isa: Isa) -> Option<Kernels> {
         Isa::NeonDotprod => crate::neon_dotprod::kernels(),
         #[cfg(target_arch = "aarch64")]
         Isa::NeonI8mm => crate::neon_i8mm::kernels(),
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Isa::Simd128 => Some(crate::simd128::INT8),
         _ => None,
     }
 }

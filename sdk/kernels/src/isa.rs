@@ -20,6 +20,8 @@ pub enum Isa {
     NeonDotprod,
     /// ARM64 NEON with mixed-sign dot products (i8mm); int8 only.
     NeonI8mm,
+    /// WebAssembly's 128-bit vectors.
+    Simd128,
 }
 
 impl Isa {
@@ -34,6 +36,7 @@ impl Isa {
             Isa::Neon => "neon",
             Isa::NeonDotprod => "neon-dotprod",
             Isa::NeonI8mm => "neon-i8mm",
+            Isa::Simd128 => "simd128",
         }
     }
 
@@ -62,6 +65,9 @@ impl Isa {
             if std::arch::is_aarch64_feature_detected!("dotprod") {
                 found.push(Isa::NeonDotprod);
             }
+        }
+        if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+            found.push(Isa::Simd128);
         }
         found.push(Isa::Portable);
         found
@@ -92,6 +98,9 @@ impl Isa {
         // NEON is part of every ARM64 processor.
         if cfg!(target_arch = "aarch64") {
             found.push(Isa::Neon);
+        }
+        if cfg!(all(target_arch = "wasm32", target_feature = "simd128")) {
+            found.push(Isa::Simd128);
         }
         found.push(Isa::Portable);
         found

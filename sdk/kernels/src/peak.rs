@@ -24,6 +24,8 @@ pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
         Isa::NeonDotprod => crate::neon_dotprod::burn,
         #[cfg(target_arch = "aarch64")]
         Isa::NeonI8mm => crate::neon_i8mm::burn,
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Isa::Simd128 => crate::simd128::int8_burn,
         _ => return None,
     };
     Isa::int8().contains(&isa).then(|| rate(burn, duration))
@@ -38,6 +40,8 @@ pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
         Isa::Avx2 => crate::avx2::f32_burn,
         #[cfg(target_arch = "aarch64")]
         Isa::Neon => crate::neon::burn,
+        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+        Isa::Simd128 => crate::simd128::f32_burn,
         _ => return None,
     };
     Isa::f32().contains(&isa).then(|| rate(burn, duration))

@@ -364,6 +364,18 @@ fn extreme_values_saturate_alike() {
     }
 }
 
+/// In a pool of one thread; WebAssembly has no other.
+fn on_one_thread(work: impl FnOnce() + Send) {
+    match cfg!(target_family = "wasm") {
+        true => work(),
+        false => rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .unwrap()
+            .install(work),
+    }
+}
+
 #[test]
 fn scratch_is_reused_and_small() {
     let case = Int8Case::random(4, 24, 8, 3);
@@ -371,8 +383,9 @@ fn scratch_is_reused_and_small() {
     let size = (300, 700);
     let (input, mut output) = (frame(4, size, 1), vec![0.0; 6 * 300 * 700]);
     let scratch = Scratch::default();
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    let run = |output: &mut [f32]| pool.install(|| chain.run(&input, output, size, chain.tiling(300, 700), &scratch));
+    let run = |output: &mut [f32]| {
+        on_one_thread(|| chain.run(&input, output, size, chain.tiling(300, 700), &scratch));
+    };
     run(&mut output);
     let (first, bytes) = (output.clone(), scratch.bytes());
     assert!(bytes > 0 && bytes < 2 << 20, "{bytes} bytes");

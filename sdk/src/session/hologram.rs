@@ -3,11 +3,11 @@
 use super::home::Home;
 use super::live::lock;
 use super::statistics::FrameTimes;
+use super::threads::Threads;
 use crate::error::{Error, Result};
 use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch, check_screen};
 use crate::target::Target;
-use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -60,7 +60,7 @@ pub(super) struct Viewer {
     home: Home,
     target: Target,
     /// The session's threads, so that views are computed on no others.
-    pool: Arc<ThreadPool>,
+    pool: Arc<Threads>,
     plan: Mutex<Option<ViewPlan>>,
 }
 
@@ -72,7 +72,7 @@ struct ViewPlan {
 }
 
 impl Viewer {
-    pub(super) fn new(target: Target, pool: Arc<ThreadPool>) -> Self {
+    pub(super) fn new(target: Target, pool: Arc<Threads>) -> Self {
         Viewer {
             home: Home::here(),
             target,

@@ -5,12 +5,12 @@ use super::engine::{Encoded, LevelsOut};
 use super::quality::Rung;
 use super::statistics::BackendReport;
 use crate::brightness::Past;
+use crate::clock::Instant;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
 use crate::pipeline::{Pipeline, PipelineScratch};
 use crate::slm;
 use num_complex::Complex32;
-use std::time::Instant;
 
 /// Plan and memory.
 pub(super) struct OnCpu {

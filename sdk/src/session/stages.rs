@@ -1,5 +1,6 @@
 //! All stages of a session's frames, and what one frame leaves for the next. Which frame is next is not known here.
 
+use super::SessionOptions;
 use super::brightness::BrightnessTracker;
 use super::engine::{Engine, FrameInput, GpuState, LevelsOut, RungContext};
 use super::hologram::{Hologram, Pool, Viewer};
@@ -7,15 +8,14 @@ use super::live::guarded;
 use super::on_cpu::OnCpu;
 use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
-use super::{MOST_THREADS, SessionOptions};
+use super::threads::Threads;
+use crate::clock::Instant;
 use crate::depth::camera::CameraFrame;
 use crate::depth::stream::{DepthReport, DepthStream};
 use crate::error::{Error, Result};
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
-use rayon::ThreadPool;
-use std::num::NonZeroUsize;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A gap between frames after which the past is no guide.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
@@ -73,7 +73,7 @@ impl RungPlan {
 pub(super) struct Stages {
     options: SessionOptions,
     /// Shared with the viewer, so that views need no other threads.
-    pool: Arc<ThreadPool>,
+    pool: Arc<Threads>,
     ladder: Ladder,
     gpu: GpuState,
     /// None after a panic: it is made anew.
@@ -94,7 +94,7 @@ pub(super) struct Made {
 
 impl Stages {
     pub(super) fn new(options: SessionOptions) -> Result<Self> {
-        let pool = start_threads(options.threads)?;
+        let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
             Quality::Fixed(rung) => rung,
@@ -327,21 +327,6 @@ impl Stages {
             viewer: self.viewer.clone(),
         })
     }
-}
-
-/// The threads of a session.
-fn start_threads(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>> {
-    let pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("phasefront {i}"));
-    let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let pool = match threads {
-        Some(threads) => pool.num_threads(threads.get()),
-        None if device > MOST_THREADS => pool.num_threads(MOST_THREADS),
-        None => pool,
-    };
-    let started = pool.build();
-    Ok(Arc::new(started.map_err(|e| {
-        Error::Session(format!("its threads cannot be started: {e}"))
-    })?))
 }
 
 #[cfg(test)]

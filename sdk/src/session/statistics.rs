@@ -1,8 +1,9 @@
 //! What a session has done so far, and how fast.
 
 use super::event::DropReason;
+use crate::clock::Instant;
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Results over which rates and times are averaged.
 const RECENT: usize = 30;

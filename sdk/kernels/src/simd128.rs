@@ -1,0 +1,291 @@
+//! WebAssembly's 128-bit vectors: 4 filters at a time, 8 pixels of int8 or 12 of f32. Nothing is detected: a module
+//! with these instructions does not load where they are missing.
+//!
+//! Pixels are widened to 16 bits, the even and the odd channels of a group apart, and multiplied and summed in pairs.
+#![allow(unsafe_code)]
+
+use crate::OUTPUTS;
+use crate::f32;
+use crate::int8::{self, GROUP, Packed, SkipSum, Taps, quantise_row, rescale_row};
+use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use std::arch::wasm32::*;
+use std::hint::black_box;
+
+pub(crate) const INT8: int8::Kernels = int8::Kernels {
+    pack,
+    hidden_row,
+    last_row,
+    offset: 0,
+    quantise_row,
+    rescale_row,
+};
+
+pub(crate) const F32: f32::Kernels = f32::Kernels {
+    size: |left| left.min(GROUP),
+    hidden_row: f32_hidden_row,
+    last_row: f32_last_row,
+};
+
+/// Registers of pixels computed together.
+const INT8_BLOCKS: usize = 2;
+const F32_BLOCKS: usize = 3;
+
+/// `[4 filters][ky][group][kx][filter][even, odd]`: words of two 16-bit weights.
+fn pack(taps: &Taps<'_>) -> Vec<i32> {
+    taps.pair_words(&vec![GROUP; taps.outputs().div_ceil(GROUP)])
+}
+
+fn hidden_row(layer: &Packed, window: Window<'_, u8>, skip: Option<&[u8]>, out: &mut [u8], geometry: Geometry) {
+    let rows = window.rows();
+    let groups = layer.outputs / GROUP;
+    assert!(out.len() >= groups * geometry.stride());
+    assert!(skip.is_none_or(|skip| skip.len() >= groups * geometry.stride()));
+    let zero = u8x16_splat(layer.zero_point);
+    for g in 0..groups {
+        let multiplier = &layer.multiplier[g * GROUP..][..GROUP];
+        for x in (0..geometry.width).step_by(4 * INT8_BLOCKS) {
+            let sums = int8_sums(layer, g, &rows, x, geometry);
+            #[allow(clippy::needless_range_loop)]
+            for b in 0..INT8_BLOCKS {
+                let at = g * geometry.stride() + geometry.start() + (x + 4 * b) * GROUP;
+                let four = std::array::from_fn(|k| sums[k][b]);
+                // SAFETY: 16 bytes at `at` lie in the group, whose blocks are whole.
+                unsafe {
+                    let value = match (layer.skip, skip) {
+                        (Some(factors), Some(skip)) => {
+                            requantise_sum(four, multiplier, factors, v128_load(skip.as_ptr().add(at).cast()))
+                        }
+                        _ => requantise(four, multiplier),
+                    };
+                    v128_store(out.as_mut_ptr().add(at).cast(), u8x16_add_sat(value, zero));
+                }
+            }
+        }
+    }
+}
+
+/// The sums of the four filters of group `g` at `4·INT8_BLOCKS` pixels from `x`.
+#[inline(always)]
+fn int8_sums(
+    layer: &Packed,
+    g: usize,
+    rows: &[&[u8]; 3],
+    x: usize,
+    geometry: Geometry,
+) -> [[v128; INT8_BLOCKS]; GROUP] {
+    let words = 9 * layer.groups * GROUP * 2;
+    let weights = &layer.weights[g * words..][..words];
+    assert!(rows.iter().all(|row| row.len() >= layer.groups * geometry.stride()));
+    assert!(x + 4 * INT8_BLOCKS <= geometry.padded && MARGIN >= 1 && geometry.group == GROUP);
+    let even = i16x8_splat(255);
+    let mut sums = [[i32x4_splat(0); INT8_BLOCKS]; GROUP];
+    for (sums, bias) in sums.iter_mut().zip(&layer.bias[g * GROUP..]) {
+        *sums = [i32x4_splat(*bias); INT8_BLOCKS];
+    }
+    // SAFETY: the asserts above: rows reach one pixel past the block, weights are as many as the loops take.
+    unsafe {
+        let mut weight = weights.as_ptr();
+        for row in rows {
+            let mut pixels = row.as_ptr().add(geometry.start() + x * GROUP - GROUP);
+            for _ in 0..layer.groups {
+                for kx in 0..3 {
+                    let halves: [[v128; 2]; INT8_BLOCKS] = std::array::from_fn(|b| {
+                        let bytes = v128_load(pixels.add((kx + 4 * b) * GROUP).cast());
+                        [v128_and(bytes, even), u16x8_shr(bytes, 8)]
+                    });
+                    for sums in &mut sums {
+                        for half in 0..2 {
+                            let pair = v128_load32_splat(weight.cast());
+                            weight = weight.add(1);
+                            for (sum, halves) in sums.iter_mut().zip(halves) {
+                                *sum = i32x4_add(*sum, i32x4_dot_i16x8(halves[half], pair));
+                            }
+                        }
+                    }
+                }
+                pixels = pixels.add(geometry.stride());
+            }
+        }
+    }
+    sums
+}
+
+/// `sat(rint(v))` in 32 bits: a sum with 1.5·2²³ leaves no room for a fraction.
+#[inline(always)]
+fn rounded(v: v128) -> v128 {
+    let magic = f32x4_splat(12_582_912.0);
+    let inside = f32x4_pmin(f32x4_splat(255.0), f32x4_pmax(f32x4_splat(0.0), v));
+    i32x4_sub(f32x4_add(inside, magic), magic)
+}
+
+/// `sum · multiplier` of four filters.
+#[inline(always)]
+fn scaled(sums: [v128; GROUP], multiplier: &[f32]) -> [v128; GROUP] {
+    std::array::from_fn(|k| f32x4_mul(f32x4_convert_i32x4(sums[k]), f32x4_splat(multiplier[k])))
+}
+
+/// `sat(rint(sum · multiplier))` of four filters, as one register of groups.
+#[inline(always)]
+fn requantise(sums: [v128; GROUP], multiplier: &[f32]) -> v128 {
+    pack_groups(scaled(sums, multiplier).map(rounded))
+}
+
+/// The same with the sum of a skip.
+#[inline(always)]
+fn requantise_sum(sums: [v128; GROUP], multiplier: &[f32], factors: SkipSum, skip: v128) -> v128 {
+    let values = scaled(sums, multiplier);
+    pack_groups(std::array::from_fn(|k| {
+        let a = match factors.relu {
+            Some(factor) => f32x4_mul(f32x4_convert_i32x4(rounded(values[k])), f32x4_splat(factor)),
+            None => f32x4_pmax(f32x4_splat(0.0), values[k]),
+        };
+        // Byte k of each group, widened.
+        let byte = v128_and(u32x4_shr(skip, 8 * k as u32), u32x4_splat(255));
+        rounded(f32x4_add(
+            a,
+            f32x4_mul(f32x4_convert_i32x4(byte), f32x4_splat(factors.skip)),
+        ))
+    }))
+}
+
+/// Four registers of one channel's 4 pixels, 0…255, to 4 groups of bytes.
+#[inline(always)]
+fn pack_groups([a, b, c, d]: [v128; GROUP]) -> v128 {
+    let (ab, cd) = (v128_or(a, i32x4_shl(b, 8)), v128_or(c, i32x4_shl(d, 8)));
+    v128_or(ab, i32x4_shl(cd, 16))
+}
+
+fn last_row(layer: &Packed, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    let rows = window.rows();
+    last_row_by_blocks(out, from, |x, values| {
+        for g in 0..OUTPUTS.div_ceil(GROUP) {
+            for start in (0..BLOCK).step_by(4 * INT8_BLOCKS) {
+                let sums = int8_sums(layer, g, &rows, x + start, geometry);
+                for (o, sums) in (g * GROUP..OUTPUTS).zip(sums) {
+                    let multiplier = f32x4_splat(layer.multiplier[o]);
+                    store(
+                        &mut values[o][start..],
+                        sums.map(|sum| f32x4_mul(f32x4_convert_i32x4(sum), multiplier)),
+                    );
+                }
+            }
+        }
+    });
+}
+
+/// Stores the registers that fall into the block.
+#[inline(always)]
+fn store<const BLOCKS: usize>(values: &mut [f32], sums: [v128; BLOCKS]) {
+    for (values, sum) in values.as_chunks_mut::<4>().0.iter_mut().zip(sums) {
+        // SAFETY: four values.
+        unsafe { v128_store(values.as_mut_ptr().cast(), sum) };
+    }
+}
+
+fn f32_hidden_row(layer: &f32::Packed, rows: &[&[f32]; 3], skip: Option<&[f32]>, out: &mut [f32], geometry: Geometry) {
+    for first in (0..layer.outputs).step_by(GROUP) {
+        let range = first * geometry.stride()..(first + GROUP) * geometry.stride();
+        let skip = skip.map(|skip| &skip[range.clone()]);
+        let out = &mut out[range];
+        for x in (0..geometry.width).step_by(4 * F32_BLOCKS) {
+            let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
+            for (o, sums) in sums.iter().enumerate() {
+                for (b, sum) in sums.iter().enumerate() {
+                    let at = o * geometry.stride() + geometry.start() + x + 4 * b;
+                    let out = &mut out[at..at + 4];
+                    let mut value = f32x4_pmax(f32x4_splat(0.0), *sum);
+                    // SAFETY: the slices hold four values.
+                    unsafe {
+                        if let Some(skip) = skip {
+                            value = f32x4_add(value, v128_load(skip[at..at + 4].as_ptr().cast()));
+                        }
+                        v128_store(out.as_mut_ptr().cast(), value);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn f32_last_row(layer: &f32::Packed, rows: &[&[f32]; 3], out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
+    last_row_by_blocks(out, from, |x, values| {
+        let (wide, narrow) = values.split_at_mut(GROUP);
+        for start in (0..BLOCK).step_by(4 * F32_BLOCKS) {
+            let sums = f32_sums::<GROUP>(layer, 0, rows, x + start, geometry);
+            wide.iter_mut()
+                .zip(sums)
+                .for_each(|(values, sums)| store(&mut values[start..], sums));
+            let sums = f32_sums::<{ OUTPUTS - GROUP }>(layer, GROUP, rows, x + start, geometry);
+            narrow
+                .iter_mut()
+                .zip(sums)
+                .for_each(|(values, sums)| store(&mut values[start..], sums));
+        }
+    });
+}
+
+/// The sums of `O` filters at `4·F32_BLOCKS` pixels from `x`.
+#[inline(always)]
+fn f32_sums<const O: usize>(
+    layer: &f32::Packed,
+    first: usize,
+    rows: &[&[f32]; 3],
+    x: usize,
+    geometry: Geometry,
+) -> [[v128; F32_BLOCKS]; O] {
+    let weights = &layer.weights[first * 9 * layer.inputs..][..O * 9 * layer.inputs];
+    assert!(rows.iter().all(|row| row.len() >= layer.inputs * geometry.stride()));
+    assert!(x + 4 * F32_BLOCKS < geometry.padded + MARGIN);
+    let mut sums = [[f32x4_splat(0.0); F32_BLOCKS]; O];
+    for (sums, bias) in sums.iter_mut().zip(&layer.bias[first..first + O]) {
+        *sums = [f32x4_splat(*bias); F32_BLOCKS];
+    }
+    // SAFETY: the asserts above: rows with their margin reach past the block, weights are as many as the loops take.
+    unsafe {
+        let mut weight = weights.as_ptr();
+        for row in rows {
+            let mut pixels = row.as_ptr().add(geometry.start() + x - 1);
+            for _ in 0..layer.inputs {
+                for kx in 0..3 {
+                    let values: [v128; F32_BLOCKS] = std::array::from_fn(|b| v128_load(pixels.add(kx + 4 * b).cast()));
+                    for sums in &mut sums {
+                        let w = v128_load32_splat(weight.cast());
+                        weight = weight.add(1);
+                        for (sum, value) in sums.iter_mut().zip(values) {
+                            *sum = f32x4_add(*sum, f32x4_mul(value, w));
+                        }
+                    }
+                }
+                pixels = pixels.add(geometry.stride());
+            }
+        }
+    }
+    sums
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn int8_burn(rounds: u64) -> u64 {
+    let x = black_box(i32x4_splat(0));
+    // Each hidden by itself, so that they are not found to be one.
+    let mut sums: [v128; 12] = std::array::from_fn(|_| black_box(x));
+    for _ in 0..rounds {
+        for sum in &mut sums {
+            *sum = i32x4_add(*sum, i32x4_dot_i16x8(*sum, x));
+        }
+    }
+    black_box(sums);
+    rounds * 12 * 8
+}
+
+/// Multiply-accumulates in registers, for the machine's peak.
+pub(crate) fn f32_burn(rounds: u64) -> u64 {
+    let x = black_box(f32x4_splat(0.0));
+    let mut sums: [v128; 12] = std::array::from_fn(|_| black_box(x));
+    for _ in 0..rounds {
+        for sum in &mut sums {
+            *sum = f32x4_add(*sum, f32x4_mul(*sum, x));
+        }
+    }
+    black_box(sums);
+    rounds * 12 * 4
+}

@@ -1,0 +1,44 @@
+//! The threads that a session computes with.
+
+use super::MOST_THREADS;
+use crate::error::{Error, Result};
+use rayon::ThreadPool;
+use std::num::NonZeroUsize;
+
+/// A pool of threads; None where there are none to start, as in WebAssembly: then the caller's computes.
+pub(super) struct Threads(Option<ThreadPool>);
+
+impl Threads {
+    /// So many threads, or as many as the device has.
+    ///
+    /// # Errors
+    /// Threads that cannot be started.
+    pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
+        let refused = |why: &dyn std::fmt::Display| Error::Session(format!("its threads cannot be started: {why}"));
+        if cfg!(target_family = "wasm") {
+            return match threads.map_or(1, NonZeroUsize::get) {
+                1 => Ok(Threads(None)),
+                many => Err(refused(&format!(
+                    "{many} are asked for, and WebAssembly has one; give 1, or none"
+                ))),
+            };
+        }
+        let pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("phasefront {i}"));
+        let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let pool = match threads {
+            Some(threads) => pool.num_threads(threads.get()),
+            None if device > MOST_THREADS => pool.num_threads(MOST_THREADS),
+            None => pool,
+        };
+        let started = pool.build();
+        Ok(Threads(Some(started.map_err(|e| refused(&e))?)))
+    }
+
+    /// What `work` gives, computed on these threads.
+    pub(super) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
+        match &self.0 {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
+}
