@@ -12,7 +12,7 @@ use super::threads::Threads;
 use crate::clock::Instant;
 use crate::depth::camera::CameraFrame;
 use crate::depth::stream::{DepthReport, DepthStream};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
 use std::sync::Arc;
 use std::time::Duration;

@@ -1,0 +1,240 @@
+//! Camera frames: bytes, and what lies where in them.
+
+use crate::error::{Answer, error, of_core};
+use phasefront::input::{
+    Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
+    Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
+};
+use wasm_bindgen::prelude::*;
+
+/// Bytes in the module's memory, and where pixels lie in them.
+struct Bytes {
+    bytes: Vec<u8>,
+    row_stride: usize,
+    pixel_stride: usize,
+}
+
+impl Bytes {
+    fn new(bytes: Vec<u8>, row_stride: u32, pixel_stride: u32) -> Self {
+        Bytes {
+            bytes,
+            row_stride: row_stride as usize,
+            pixel_stride: pixel_stride as usize,
+        }
+    }
+
+    fn plane(&self) -> Plane<'_> {
+        Plane::new(&self.bytes, self.row_stride, self.pixel_stride)
+    }
+}
+
+/// An image of one plane.
+struct Image<F> {
+    format: F,
+    /// (width, height).
+    size: (usize, usize),
+    memory: Bytes,
+}
+
+/// One frame, put together part by part, then given to a session.
+#[wasm_bindgen]
+pub struct RawFrame {
+    timestamp_ns: u64,
+    colour_format: ColourFormat,
+    /// (width, height).
+    colour_size: (usize, usize),
+    colour: Vec<Bytes>,
+    depth: Option<Image<DepthFormat>>,
+    confidence: Option<Image<ConfidenceFormat>>,
+    orientation: Orientation,
+    alignment: Alignment,
+}
+
+fn unknown(what: &str, name: &str, known: &str) -> JsValue {
+    error(
+        "frame",
+        &format!("frame: there is no {what} '{name}'; there are {known}"),
+    )
+}
+
+#[wasm_bindgen]
+impl RawFrame {
+    /// A frame with a colour image of `format`, whose planes follow; `bt709` and `video_range` say what luma and
+    /// chroma are.
+    ///
+    /// # Errors
+    /// `frame`: an unknown format.
+    #[wasm_bindgen(constructor)]
+    pub fn new(
+        timestamp_ns: u64,
+        format: &str,
+        width: u32,
+        height: u32,
+        bt709: bool,
+        video_range: bool,
+    ) -> Answer<RawFrame> {
+        let matrix = if bt709 { YuvMatrix::Bt709 } else { YuvMatrix::Bt601 };
+        let yuv = YuvEncoding { matrix, video_range };
+        let colour_format = match format {
+            "rgba" => ColourFormat::Rgba,
+            "bgra" => ColourFormat::Bgra,
+            "rgb" => ColourFormat::Rgb,
+            "nv12" => ColourFormat::Nv12(yuv),
+            "yuv420" => ColourFormat::Yuv420(yuv),
+            other => return Err(unknown("colour format", other, "rgba, bgra, rgb, nv12, yuv420")),
+        };
+        Ok(RawFrame {
+            timestamp_ns,
+            colour_format,
+            colour_size: (width as usize, height as usize),
+            colour: Vec::new(),
+            depth: None,
+            confidence: None,
+            orientation: Orientation::default(),
+            alignment: Alignment::default(),
+        })
+    }
+
+    /// The next plane of the colour image: bytes from one row to the next, and from one pixel to the next.
+    #[wasm_bindgen(js_name = colourPlane)]
+    pub fn colour_plane(&mut self, bytes: Vec<u8>, row_stride: u32, pixel_stride: u32) {
+        self.colour.push(Bytes::new(bytes, row_stride, pixel_stride));
+    }
+
+    /// The depth image; strides as [`Self::colour_plane`] takes them.
+    ///
+    /// # Errors
+    /// `frame`: an unknown format.
+    pub fn depth(
+        &mut self,
+        format: &str,
+        width: u32,
+        height: u32,
+        bytes: Vec<u8>,
+        row_stride: u32,
+        pixel_stride: u32,
+    ) -> Answer<()> {
+        let format = match format {
+            "metres-f32" => DepthFormat::MetresF32,
+            "metres-f16" => DepthFormat::MetresF16,
+            "disparity-f32" => DepthFormat::DisparityF32,
+            "disparity-f16" => DepthFormat::DisparityF16,
+            "millimetres-u16" => DepthFormat::MillimetresU16,
+            "android-depth16" => DepthFormat::AndroidDepth16,
+            "normalized-u8" => DepthFormat::NormalizedU8,
+            "normalized-u16" => DepthFormat::NormalizedU16,
+            other => {
+                let known = "metres-f32, metres-f16, disparity-f32, disparity-f16, millimetres-u16, android-depth16, \
+                             normalized-u8, normalized-u16";
+                return Err(unknown("depth format", other, known));
+            }
+        };
+        self.depth = Some(Image {
+            format,
+            size: (width as usize, height as usize),
+            memory: Bytes::new(bytes, row_stride, pixel_stride),
+        });
+        Ok(())
+    }
+
+    /// How sure the depth is: an image of its size; strides as [`Self::colour_plane`] takes them.
+    ///
+    /// # Errors
+    /// `frame`: an unknown format.
+    pub fn confidence(
+        &mut self,
+        format: &str,
+        width: u32,
+        height: u32,
+        bytes: Vec<u8>,
+        row_stride: u32,
+        pixel_stride: u32,
+    ) -> Answer<()> {
+        let format = match format {
+            "low-medium-high" => ConfidenceFormat::LowMediumHigh,
+            "u8" => ConfidenceFormat::U8,
+            other => return Err(unknown("confidence format", other, "low-medium-high, u8")),
+        };
+        self.confidence = Some(Image {
+            format,
+            size: (width as usize, height as usize),
+            memory: Bytes::new(bytes, row_stride, pixel_stride),
+        });
+        Ok(())
+    }
+
+    /// How the sensor's picture becomes the one that is shown: turned clockwise by `degrees`, then mirrored.
+    ///
+    /// # Errors
+    /// `frame`: another turn than 0, 90, 180, 270.
+    pub fn orientation(&mut self, degrees: u32, mirrored: bool) -> Answer<()> {
+        let rotation = match degrees {
+            0 => Rotation::None,
+            90 => Rotation::Clockwise90,
+            180 => Rotation::Half,
+            270 => Rotation::Clockwise270,
+            other => return Err(unknown("rotation", &other.to_string(), "0, 90, 180, 270")),
+        };
+        self.orientation = Orientation { rotation, mirrored };
+        Ok(())
+    }
+
+    /// How depth and colour camera stand to each other: fx, fy, cx, cy of the colour, the same of the depth, then, for
+    /// cameras apart, the nine numbers of the rotation and the three of the translation.
+    ///
+    /// # Errors
+    /// `frame`: another count of numbers.
+    pub fn cameras(&mut self, numbers: &[f64]) -> Answer<()> {
+        let of = |n: &[f64; 4]| Intrinsics {
+            fx: n[0],
+            fy: n[1],
+            cx: n[2],
+            cy: n[3],
+        };
+        let (parts, rest) = numbers.as_chunks::<4>();
+        self.alignment = Alignment::Cameras(match (parts, rest) {
+            ([colour, depth], []) => Cameras::concentric(of(colour), of(depth)),
+            ([colour, depth, ..], []) if numbers.len() == 20 => Cameras {
+                colour: of(colour),
+                depth: of(depth),
+                rotation: std::array::from_fn(|row| std::array::from_fn(|column| numbers[8 + 3 * row + column])),
+                translation_m: [numbers[17], numbers[18], numbers[19]],
+            },
+            _ => {
+                let count = numbers.len();
+                let message = format!("frame: the cameras have {count} numbers; 8 are right, or 20 with a pose");
+                return Err(error("frame", &message));
+            }
+        });
+        Ok(())
+    }
+}
+
+impl RawFrame {
+    /// The core's frame.
+    ///
+    /// # Errors
+    /// `frame`: what [`ColourImage::new`] or [`DepthImage::new`] refuses, or a frame without depth.
+    pub(crate) fn frame(&self) -> Answer<CameraFrame<'_>> {
+        let planes: Vec<Plane<'_>> = self.colour.iter().map(Bytes::plane).collect();
+        let (width, height) = self.colour_size;
+        let colour = ColourImage::new(self.colour_format, width, height, &planes).map_err(of_core)?;
+        let depth = self
+            .depth
+            .as_ref()
+            .ok_or_else(|| error("frame", "frame: it has no depth"))?;
+        let (width, height) = depth.size;
+        let mut image = DepthImage::new(depth.format, width, height, depth.memory.plane()).map_err(of_core)?;
+        if let Some(confidence) = &self.confidence {
+            let (width, height) = confidence.size;
+            let plane = confidence.memory.plane();
+            image = image
+                .with_confidence(confidence.format, width, height, plane)
+                .map_err(of_core)?;
+        }
+        let mut frame = CameraFrame::new(self.timestamp_ns, colour, image);
+        frame.orientation = self.orientation;
+        frame.alignment = self.alignment;
+        Ok(frame)
+    }
+}

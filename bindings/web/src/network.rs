@@ -1,0 +1,81 @@
+//! Networks: from bytes, or built in.
+
+use crate::error::{Answer, error, object, of_core};
+use phasefront::{Display, Network};
+use phasefront_models::Precision::Int8;
+use std::sync::Arc;
+use wasm_bindgen::prelude::*;
+
+/// A trained network.
+#[wasm_bindgen]
+pub struct RawNetwork {
+    pub(crate) core: Arc<Network>,
+}
+
+#[wasm_bindgen]
+impl RawNetwork {
+    /// A network from the bytes of an `.onnx` file.
+    ///
+    /// # Errors
+    /// `network`: what is no hologram network, or one that the kernels do not take.
+    #[wasm_bindgen(js_name = fromBytes)]
+    pub fn from_bytes(onnx: &[u8]) -> Answer<RawNetwork> {
+        let core = Network::from_onnx(onnx).map_err(of_core)?;
+        Ok(RawNetwork { core: Arc::new(core) })
+    }
+
+    /// The int8 network of this name that is in the module.
+    ///
+    /// # Errors
+    /// `network`: another name.
+    #[wasm_bindgen(js_name = builtIn)]
+    pub fn built_in(name: &str) -> Answer<RawNetwork> {
+        let core = phasefront_models::network(name, Int8).ok_or_else(|| {
+            let names: Vec<_> = phasefront_models::NETWORKS.iter().map(|model| model.name).collect();
+            let names = names.join(", ");
+            error(
+                "network",
+                &format!(
+                    "network: no '{name}' is built in ({names}); fetch one and give its bytes to Network.fromBytes"
+                ),
+            )
+        })?;
+        Ok(RawNetwork { core })
+    }
+
+    /// The hologram network of the pair for a modulator at `offset_mm`, and its pre-filter.
+    ///
+    /// # Errors
+    /// `display`: an offset that cannot be. `network`: one that no pair was trained for.
+    #[wasm_bindgen(js_name = builtInPair)]
+    pub fn built_in_pair(offset_mm: f64) -> Answer<Vec<RawNetwork>> {
+        let display = Display::default().with_offset_m(offset_mm * 1e-3).map_err(of_core)?;
+        let pair = phasefront_models::pair_for(&display, Int8).ok_or_else(|| {
+            let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+            let offsets = offsets.collect::<Vec<_>>().join(", ");
+            error(
+                "network",
+                &format!(
+                    "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for {offsets} mm, or \
+                     take a network without a pre-filter"
+                ),
+            )
+        })?;
+        Ok(vec![
+            RawNetwork { core: pair.hologram },
+            RawNetwork { core: pair.prefilter },
+        ])
+    }
+
+    /// What it is: an object of the form `NetworkInfo`.
+    pub fn info(&self) -> js_sys::Object {
+        let display = self.core.display();
+        object([
+            ("layers", self.core.layers().into()),
+            ("filters", self.core.filters().into()),
+            ("precision", self.core.precision().to_string().into()),
+            ("pitchUm", (display.pitch_m * 1e6).into()),
+            ("volumeDepthMm", (display.volume_depth_m * 1e3).into()),
+        ])
+    }
+}

@@ -1,0 +1,197 @@
+//! What a session makes, and how.
+
+use crate::error::{Answer, setting};
+use crate::network::RawNetwork;
+use crate::target::RawTarget;
+use phasefront::input::DepthRange;
+use phasefront::session::{Quality, Rung, SessionOptions};
+use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
+use std::sync::Arc;
+use wasm_bindgen::prelude::*;
+
+/// What makes holograms; of a sweep it is known for which display only where it is used.
+enum Maker {
+    Trained(Arc<Network>),
+    Sweep,
+    BySharpness(Arc<Network>),
+}
+
+/// What makes holograms.
+#[wasm_bindgen]
+pub struct RawMethod(Maker);
+
+#[wasm_bindgen]
+impl RawMethod {
+    /// A trained network.
+    pub fn trained(network: &RawNetwork) -> RawMethod {
+        RawMethod(Maker::Trained(network.core.clone()))
+    }
+
+    /// The plane sweep.
+    pub fn sweep() -> RawMethod {
+        RawMethod(Maker::Sweep)
+    }
+
+    /// What suits each frame's depth.
+    #[wasm_bindgen(js_name = bySharpness)]
+    pub fn by_sharpness(network: &RawNetwork) -> RawMethod {
+        RawMethod(Maker::BySharpness(network.core.clone()))
+    }
+}
+
+impl RawMethod {
+    fn core(&self, target: &phasefront::Target) -> Method {
+        match &self.0 {
+            Maker::Trained(network) => Method::trained(network.clone()),
+            Maker::Sweep => Method::Sweep(Sweep::for_display(&target.display)),
+            Maker::BySharpness(network) => Method::BySharpness(Sweep::for_display(&target.display), network.clone()),
+        }
+    }
+}
+
+/// Options of a session. Encoding, then the corrections, then rungs: each takes up what was set before.
+#[wasm_bindgen]
+pub struct RawOptions {
+    pub(crate) core: SessionOptions,
+}
+
+#[wasm_bindgen]
+impl RawOptions {
+    /// What is usual for `target`.
+    pub fn usual(target: &RawTarget) -> RawOptions {
+        RawOptions {
+            core: phasefront_models::session_options(target.core.clone()),
+        }
+    }
+
+    /// The same with `method`.
+    #[wasm_bindgen(js_name = withMethod)]
+    pub fn with_method(target: &RawTarget, method: &RawMethod) -> RawOptions {
+        RawOptions {
+            core: SessionOptions::new(target.core.clone(), method.core(&target.core)),
+        }
+    }
+
+    /// `double-phase`; `anti-alias` with a standard deviation in pixels and a count of taps; `band-limit` with its
+    /// bound. Those that are not given are as published.
+    ///
+    /// # Errors
+    /// `setting`: an unknown name.
+    pub fn encoding(&mut self, name: &str, sigma_or_k: Option<f32>, width: Option<u32>) -> Answer<()> {
+        self.core.encoder = EncoderOptions::from(match name {
+            "double-phase" => Encoding::DoublePhase,
+            "anti-alias" => Encoding::AntiAlias {
+                sigma: sigma_or_k.unwrap_or(0.7),
+                width: width.map_or(3, |width| width as usize),
+            },
+            "band-limit" => Encoding::BandLimit {
+                k: sigma_or_k.unwrap_or(1.0),
+            },
+            other => {
+                return Err(setting(&format!(
+                    "there is no encoding '{other}'; there are double-phase, anti-alias, band-limit, deep"
+                )));
+            }
+        });
+        Ok(())
+    }
+
+    /// The encoding `deep`, with its pre-filter.
+    pub fn deep(&mut self, prefilter: &RawNetwork) {
+        self.core.encoder = EncoderOptions::from(Encoding::Deep(prefilter.core.clone()));
+    }
+
+    /// `steady`, `frame-max`, or `fixed` at an amplitude.
+    ///
+    /// # Errors
+    /// `setting`: an unknown name, or a fixed brightness without its amplitude.
+    pub fn brightness(&mut self, name: &str, scale: Option<f32>) -> Answer<()> {
+        self.core.encoder.brightness = match (name, scale) {
+            ("steady", _) => Brightness::Steady,
+            ("frame-max", _) => Brightness::FrameMax,
+            ("fixed", Some(scale)) => Brightness::Fixed(scale),
+            (other, _) => {
+                return Err(setting(&format!(
+                    "there is no brightness '{other}'; there are steady, frame-max, and fixed with its scale"
+                )));
+            }
+        };
+        Ok(())
+    }
+
+    /// Corrections; none for what suits the encoding.
+    pub fn corrections(&mut self, dark: Option<f32>, local_steps: Option<u32>, midpoint_steps: Option<u32>) {
+        let encoder = &mut self.core.encoder;
+        encoder.dark = dark.unwrap_or(encoder.dark);
+        *encoder = stepped(encoder, local_steps, midpoint_steps);
+    }
+
+    /// Metres that are shown at the ends of the volume.
+    #[wasm_bindgen(js_name = depthRange)]
+    pub fn depth_range(&mut self, near_m: f32, far_m: f32) {
+        self.core.depth.range = DepthRange::Fixed { near_m, far_m };
+    }
+
+    /// Readings less sure than this, in 0..=1, are none.
+    #[wasm_bindgen(js_name = leastConfidence)]
+    pub fn least_confidence(&mut self, least: f32) {
+        self.core.depth.least_confidence = least;
+    }
+
+    /// Frames a second that are aimed at.
+    #[wasm_bindgen(js_name = targetRateHz)]
+    pub fn target_rate_hz(&mut self, rate: f64) {
+        self.core.target_rate_hz = Some(rate);
+    }
+
+    /// Most pixels of a rung and of the modulator.
+    #[wasm_bindgen(js_name = mostPixels)]
+    pub fn most_pixels(&mut self, pixels: u32) {
+        self.core.most_pixels = pixels as usize;
+    }
+
+    /// The rung that the session stays on; none lets it step.
+    pub fn quality(&mut self, rung: Option<u32>) {
+        self.core.quality = quality(rung);
+    }
+
+    /// An empty ladder.
+    #[wasm_bindgen(js_name = clearLadder)]
+    pub fn clear_ladder(&mut self) {
+        self.core.ladder.clear();
+    }
+
+    /// Another rung, below those that are there.
+    #[wasm_bindgen(js_name = pushRung)]
+    pub fn push_rung(
+        &mut self,
+        method: &RawMethod,
+        width: u32,
+        height: u32,
+        local_steps: Option<u32>,
+        midpoint_steps: Option<u32>,
+    ) {
+        self.core.ladder.push(Rung {
+            method: method.core(&self.core.target),
+            width: width as usize,
+            height: height as usize,
+            backend: None,
+            encoder: Some(stepped(&self.core.encoder, local_steps, midpoint_steps)),
+        });
+    }
+}
+
+/// `encoder` with other counts of steps, where they are given.
+fn stepped(encoder: &EncoderOptions, local_steps: Option<u32>, midpoint_steps: Option<u32>) -> EncoderOptions {
+    let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
+    EncoderOptions {
+        local_steps: steps(local_steps, encoder.local_steps),
+        midpoint_steps: steps(midpoint_steps, encoder.midpoint_steps),
+        ..encoder.clone()
+    }
+}
+
+/// The rung that a session stays on, or none.
+pub(crate) fn quality(rung: Option<u32>) -> Quality {
+    rung.map_or(Quality::Adaptive, |rung| Quality::Fixed(rung as usize))
+}
