@@ -45,7 +45,7 @@ pub(crate) fn object<const N: usize>(fields: [(&str, JsValue); N]) -> Object {
 
 /// Makes panics errors that are thrown; called once, when the module is loaded.
 #[wasm_bindgen(start)]
-pub(crate) fn start() {
+pub fn start() {
     std::panic::set_hook(Box::new(|info| {
         let said = info.payload_as_str().unwrap_or("a panic").replace('\n', " ");
         let place = info.location().map(|at| format!(" at {}:{}", at.file(), at.line()));
@@ -55,6 +55,6 @@ pub(crate) fn start() {
 
 /// The version of the library.
 #[wasm_bindgen]
-pub(crate) fn version() -> String {
+pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()
 }

@@ -22,3 +22,6 @@ mod options;
 mod session;
 #[cfg(target_arch = "wasm32")]
 mod target;
+
+#[cfg(target_arch = "wasm32")]
+pub use error::{start, version};

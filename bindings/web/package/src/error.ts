@@ -1,0 +1,57 @@
+/** What apps can act on. */
+export type ErrorKind = "display" | "frame" | "timestamp" | "setting" | "network" | "session" | "internal";
+
+/** Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right. */
+export class PhasefrontError extends Error {
+  override readonly name = "PhasefrontError";
+
+  constructor(
+    /** What kind of fault it is. `internal` is one of Phasefront; please report it. */
+    readonly kind: ErrorKind,
+    message: string,
+  ) {
+    super(message);
+  }
+}
+
+let state: "not loaded" | "ready" | PhasefrontError = "not loaded";
+
+/** Says that the module is there. */
+export function ready(): void {
+  state = "ready";
+}
+
+/** What `call` gives of the module. Memory of a module that panicked may be half written, so it is not called again. */
+export function guard<T>(call: () => T): T {
+  if (state === "not loaded") throw new PhasefrontError("session", "the module is not loaded; await load() first");
+  if (state !== "ready") throw state;
+  try {
+    return call();
+  } catch (error) {
+    if (!(error instanceof Error)) throw error;
+    const kind = (error as { kind?: string }).kind;
+    if (kind === "panic" || error instanceof WebAssembly.RuntimeError || error instanceof RangeError) {
+      const line = error.message.replaceAll("\n", " ");
+      state = new PhasefrontError(
+        "internal",
+        `internal error: ${line}; the module cannot go on: load the page or the worker anew, and please report it`,
+      );
+      throw state;
+    }
+    if (kind !== undefined) throw new PhasefrontError(kind as ErrorKind, error.message);
+    throw error;
+  }
+}
+
+/** `value`, which must be whole and fit the module's 32 bits. */
+export function whole(what: string, value: number, kind: ErrorKind = "setting"): number {
+  if (Number.isInteger(value) && value >= 0 && value < 2 ** 32) return value;
+  throw new PhasefrontError(kind, `${what} is ${value}; a whole number from 0 to ${2 ** 32 - 1} is right`);
+}
+
+/** Bytes of any array, where they lie. */
+export function bytesOf(what: string, data: unknown, kind: ErrorKind): Uint8Array {
+  if (ArrayBuffer.isView(data)) return new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
+  if (data instanceof ArrayBuffer) return new Uint8Array(data);
+  throw new PhasefrontError(kind, `${what} is ${typeof data}; a typed array or an ArrayBuffer is right`);
+}

@@ -1,0 +1,74 @@
+/**
+ * RGB-D frames to phase-only 3D holograms, in a browser.
+ *
+ * ```ts
+ * import { Frame, Session, load } from "phasefront";
+ *
+ * await load();
+ * const session = new Session({ target: { width: 640, height: 480 } });
+ * const frame = new Frame(context.getImageData(0, 0, 640, 480), { width: 160, height: 120, data: metres });
+ * const hologram = session.process(frame);
+ * console.log(hologram.levels.length, hologram.info.times.totalMs);
+ * ```
+ *
+ * Lengths are in the unit of their name; planes row by row, (H, W), stacks (C, H, W). Every error is a
+ * {@link PhasefrontError}, whose message is one line that names what is wrong and what would be right.
+ */
+
+import { PhasefrontError, guard, ready } from "./error.js";
+import init, { version as rawVersion } from "./raw/phasefront_web.js";
+
+export { PhasefrontError, type ErrorKind } from "./error.js";
+export {
+  Frame,
+  type Cameras,
+  type ColourFormat,
+  type ConfidenceFormat,
+  type ConfidenceImage,
+  type DepthFormat,
+  type DepthImage,
+  type FrameOptions,
+  type Intrinsics,
+  type Orientation,
+  type PackedColour,
+  type PlanarColour,
+  type Plane,
+} from "./frame.js";
+export { Hologram, type FrameTimes, type HologramInfo, type OutputImage, type Placement } from "./hologram.js";
+export { Network, type DeepPair, type NetworkInfo } from "./network.js";
+export {
+  Session,
+  type Brightness,
+  type Encoding,
+  type Method,
+  type Quality,
+  type RunningMode,
+  type Rung,
+  type SessionOptions,
+  type Statistics,
+} from "./session.js";
+export { Target, displayFromToml, type Display } from "./target.js";
+
+/** Where the module comes from: an address, a response, its bytes, or compiled as a page hands it to its workers. */
+export type ModuleSource = string | URL | Request | Response | BufferSource | WebAssembly.Module;
+
+let loading: Promise<void> | undefined;
+
+/**
+ * Loads the module: from beside this file, or from `source`. Called again it waits for the first.
+ *
+ * @throws PhasefrontError `session`: a module that cannot be loaded, or a browser without WebAssembly SIMD.
+ */
+export function load(source?: ModuleSource | Promise<ModuleSource>): Promise<void> {
+  loading ??= init(source === undefined ? undefined : { module_or_path: source }).then(ready, (error: unknown) => {
+    loading = undefined;
+    const why = error instanceof Error ? error.message : String(error);
+    throw new PhasefrontError("session", `the module cannot be loaded: ${why.replaceAll("\n", " ")}`);
+  });
+  return loading;
+}
+
+/** The version of the library. */
+export function version(): string {
+  return guard(rawVersion);
+}

@@ -1,0 +1,58 @@
+// The session, away from the page, which stays live while a frame is computed.
+import { Frame, Network, Session, load } from "./phasefront/phasefront.js";
+
+const METHODS = {
+  "rgbd-8": () => ({ kind: "trained", network: Network.builtIn("rgbd-8") }),
+  "rgbd-15": () => ({ kind: "trained", network: Network.builtIn("rgbd-15") }),
+  sweep: () => ({ kind: "sweep" }),
+};
+
+let session, planned, hologram;
+
+function plan({ method, localSteps, width, height, video }) {
+  const wanted = JSON.stringify([method, localSteps, width, height, video]);
+  if (wanted === planned) return;
+  session?.close();
+  session = planned = undefined;
+  session = new Session({ target: { width, height }, method: METHODS[method](), localSteps }, video ? "video" : "image");
+  session.warmUp();
+  planned = wanted;
+}
+
+const answers = {
+  async load() {
+    await load();
+  },
+
+  frame({ options, colour, depth, timestampNs }) {
+    plan(options);
+    const start = performance.now();
+    const made = session.process(new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestampNs }));
+    const ms = performance.now() - start;
+    hologram?.close();
+    hologram = made;
+    const { data, width, height } = hologram.output({ layout: "rgba" });
+    return { ms, times: hologram.info.times, backend: session.statistics.backend, width, height, levels: data };
+  },
+
+  view({ zMm }) {
+    const { width, height } = hologram.info;
+    const start = performance.now();
+    const pixels = hologram.preview(zMm, width, height);
+    return { ms: performance.now() - start, width, height, pixels };
+  },
+
+  focus({ x, y }) {
+    return { zMm: hologram.zAt(x, y) };
+  },
+};
+
+addEventListener("message", async ({ data: { id, kind, ...said } }) => {
+  try {
+    const answer = (await answers[kind](said)) ?? {};
+    const memory = [answer.levels?.buffer, answer.pixels?.buffer].filter(Boolean);
+    postMessage({ id, answer }, memory);
+  } catch (error) {
+    postMessage({ id, error: error.message });
+  }
+});
