@@ -1,0 +1,73 @@
+// What the border refuses: each fault with its kind and the start of its one line, and that what follows is not harmed.
+import { Frame, Network, PhasefrontError, Session, Target, load, version } from "/phasefront/phasefront.js";
+
+const bytes = (n) => new Uint8Array(n).fill(90);
+const colour = (width = 16, height = 12) => ({ width, height, data: bytes(4 * width * height) });
+const depth = (width = 16, height = 12) => ({ width, height, data: bytes(width * height) });
+const target = { width: 16, height: 12 };
+
+function refused(kind, start, call) {
+  try {
+    call();
+  } catch (error) {
+    if (error instanceof PhasefrontError && error.kind === kind && error.message.includes(start) && !error.message.includes("\n")) return;
+    throw new Error(`${kind} ${start}: ${error.kind} ${error.message}`);
+  }
+  throw new Error(`not refused: ${start}`);
+}
+
+/** Runs all; throws where something is not as it should be. */
+export async function run() {
+  refused("session", "not loaded", () => version());
+  await load();
+  const session = new Session({ target });
+  const video = new Session({ target }, "video");
+  refused("display", "width", () => Target.ofDisplay({ width: 0 }));
+  refused("display", "depht", () => Target.ofDisplay({ depht: 1 }));
+  refused("display", "pitch_um", () => Target.ofDisplay({ pitchUm: NaN }));
+  refused("setting", "look-up table has 3 levels", () => Target.withLookUpTable({}, bytes(3)));
+  refused("network", "", () => Network.fromBytes(bytes(100)));
+  refused("network", "no 'rgbd-9' is built in", () => Network.builtIn("rgbd-9"));
+  refused("network", "no pair", () => Network.builtInPair(3));
+  refused("session", "has a thread of its own", () => new Session({ target }, "live-stream"));
+  refused("setting", "no mode 'film'", () => new Session({ target }, "film"));
+  refused("setting", "no method 'magic'", () => new Session({ target, method: { kind: "magic" } }));
+  refused("setting", "no encoding 'triple-phase'", () => new Session({ target, encoding: { kind: "triple-phase" } }));
+  refused("setting", "fixed with its scale", () => new Session({ target, brightness: { kind: "fixed" } }));
+  refused("setting", "most_pixels", () => new Session({ target: { width: 8192, height: 8192 } }));
+  refused("frame", "no colour format 'cmyk'", () => session.process(new Frame({ ...colour(), format: "cmyk" }, depth())));
+  refused("frame", "", () => session.process(new Frame({ ...colour(), data: bytes(7) }, depth())));
+  refused("frame", "is -16; a whole number", () => session.process(new Frame({ ...colour(), width: -16 }, depth())));
+  refused("frame", "say its format", () => session.process(new Frame(colour(), { ...depth(), data: new Int8Array(192) })));
+  refused("frame", "aspect ratios differ", () => session.process(new Frame(colour(), depth(12, 12))));
+  refused("frame", "8 are right, or 20", () => {
+    const camera = { fx: 1, fy: 1, cx: 1, cy: 1 };
+    const pose = { rotation: [1], translationM: [] };
+    session.process(new Frame(colour(), depth(), { cameras: { colour: camera, depth: camera, pose } }));
+  });
+  video.process(new Frame(colour(), depth(), { timestampNs: 9n })).close();
+  refused("timestamp", "", () => video.process(new Frame(colour(), depth(), { timestampNs: 8n })));
+
+  const hologram = session.process(new Frame(colour(), depth()));
+  refused("setting", "", () => hologram.preview(0, 0, 10));
+  refused("setting", "", () => hologram.preview(1e9, 10, 10));
+  refused("setting", "no layout 'cyan'", () => hologram.output({ layout: "cyan" }));
+  refused("setting", "", () => hologram.output({}, 1));
+  const { info, levels } = hologram;
+  const grey = hologram.output({ layout: "grey" }, 1);
+  const same = grey.data.every((level, index) => level === levels[16 * 12 + index]);
+  if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0) throw new Error(JSON.stringify(info));
+  hologram.close();
+  hologram.close();
+  refused("session", "hologram is closed", () => hologram.levels);
+  session.close();
+  refused("session", "closed", () => session.process(new Frame(colour(), depth())));
+  const pair = Network.builtInPair(6);
+  const deep = new Session({
+    target: { ...target, offsetMm: 6 },
+    method: { kind: "trained", network: pair.hologram },
+    encoding: { kind: "deep", prefilter: pair.prefilter },
+  });
+  deep.process(new Frame(colour(), depth()));
+  return version();
+}

@@ -1,0 +1,29 @@
+// Compiled, not run: the types as an app sees them.
+import { Frame, Network, Session, Target, load, type Display, type SessionOptions } from "phasefront";
+
+const display: Display = { width: 640, height: 480, wavelengthsNm: [532] };
+const options: SessionOptions = {
+  target: Target.ofDisplay(display),
+  ladder: [{ method: { kind: "trained", network: Network.builtIn() }, width: 640, height: 480 }],
+  encoding: { kind: "anti-alias", sigma: 0.7, width: 3 },
+  quality: { kind: "fixed", rung: 0 },
+};
+
+export async function show(context: CanvasRenderingContext2D, metres: Float32Array): Promise<ImageData> {
+  await load();
+  const session = new Session(options, "video");
+  const frame = new Frame(context.getImageData(0, 0, 640, 480), { width: 160, height: 120, data: metres }, { timestampNs: 1n });
+  const hologram = session.process(frame);
+  const near: number | undefined = hologram.info.rangeM?.[0];
+  console.log(near, hologram.levels.byteLength, session.statistics.times.totalMs);
+  return new ImageData(hologram.preview(hologram.zAt(0.5, 0.5), 640, 480), 640);
+}
+
+// @ts-expect-error: there is no such mode
+new Session(options, "live-stream");
+// @ts-expect-error: an encoding has a kind of its own
+new Session({ encoding: "anti-alias" });
+// @ts-expect-error: networks are made by name or bytes
+new Network();
+// @ts-expect-error: what is raw is nobody's business
+Network.builtIn().raw;
