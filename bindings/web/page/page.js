@@ -80,51 +80,51 @@ const view = newest(look);
 let picture, stream;
 async function show() {
   if (!picture) return;
-  const { colour, depth } = picture;
   const { method, localSteps, width } = state;
-  const height = 2 * Math.round((width * colour.height) / colour.width / 2);
+  const height = Math.round((width * picture.depth.height) / picture.depth.width);
   const options = { method, localSteps, width, height, video: Boolean(stream) };
+  const colour = pixels(picture.colour, width, height, true);
+  // Depth between two depths is at neither: it is not smoothed.
+  const depth = pixels(picture.depth, width, height, false);
+  if (at("white").checked) depth.data = depth.data.map((value) => 255 - value);
   const timestampNs = BigInt(Math.round(performance.now() * 1e6));
-  made = await ask("frame", { options, colour, depth: at("white").checked ? inverted(depth) : depth, timestampNs });
+  made = await ask("frame", { options, colour, depth, timestampNs });
   draw("phases", made.width, made.height, made.levels);
   state.frames++;
   await look();
 }
 const refresh = newest(show);
 
-function inverted(depth) {
-  return { ...depth, data: depth.data.map((value) => 255 - value) };
+// The middle of a picture, which has these sides' ratio, as so many pixels.
+function pixels(source, width, height, smooth) {
+  const [wide, high] = [source.videoWidth ?? source.width, source.videoHeight ?? source.height];
+  const across = Math.min(wide, (high * width) / height), down = (across * height) / width;
+  const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
+  context.imageSmoothingEnabled = smooth;
+  context.imageSmoothingQuality = "high";
+  context.drawImage(source, (wide - across) / 2, (high - down) / 2, across, down, 0, 0, width, height);
+  return { width, height, data: context.getImageData(0, 0, width, height).data };
 }
 
-function pixels(source, width, height, aspect = width / height) {
-  const across = Math.min(width, height * aspect), down = Math.min(height, width / aspect);
-  const scale = Math.min(1, 1920 / across);
-  const context = new OffscreenCanvas(Math.round(across * scale), Math.round(down * scale)).getContext("2d");
-  const { canvas } = context;
-  context.drawImage(source, (width - across) / 2, (height - down) / 2, across, down, 0, 0, canvas.width, canvas.height);
-  const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
-  return { width: canvas.width, height: canvas.height, data };
-}
-
-async function read(blob) {
-  const image = await createImageBitmap(blob).catch(() => {
-    throw new Error(`${blob.name ?? "the file"} is no picture that this browser reads`);
+function read(file) {
+  return createImageBitmap(file).catch(() => {
+    throw new Error(`${file.name} is no picture that this browser reads`);
   });
-  return pixels(image, image.width, image.height);
 }
 
-function isGrey({ data }) {
+function isGrey(image) {
+  const { data } = pixels(image, 64, 64, false);
   for (let i = 0; i < data.length; i += 4) {
     if (Math.abs(data[i] - data[i + 1]) > 2 || Math.abs(data[i] - data[i + 2]) > 2) return false;
   }
   return true;
 }
 
-async function take(source, blobs) {
+async function take(source, files) {
   stopCamera();
-  if (blobs.length !== 2) throw new Error(`${blobs.length} files; give two: a colour picture and its depth picture`);
-  const images = await Promise.all(blobs.map(read));
-  const named = blobs.findIndex(({ name }) => /depth/i.test(name ?? ""));
+  if (files.length !== 2) throw new Error(`${files.length} files; give two: a colour picture and its depth picture`);
+  const images = await Promise.all(files.map(read));
+  const named = files.findIndex(({ name }) => /depth/i.test(name));
   const grey = images.findIndex(isGrey);
   if (named < 0 && grey < 0) throw new Error("both pictures are coloured; depth is a grey one, black near and white far");
   const depth = named < 0 ? grey : named;
@@ -132,17 +132,17 @@ async function take(source, blobs) {
   state.source = source;
 }
 
-const open = newest(async (source, blobs) => {
-  await take(source, blobs);
+const open = newest(async (source, files) => {
+  await take(source, files);
   await show();
 });
 
 async function sample() {
-  const blobs = ["scene_rgb.jpg", "scene_depth.png"].map(async (name) => {
+  const files = ["scene_rgb.jpg", "scene_depth.png"].map(async (name) => {
     const response = await fetch(name);
     return new File([await response.blob()], name);
   });
-  await open("sample", await Promise.all(blobs));
+  await open("sample", await Promise.all(files));
 }
 
 function stopCamera() {
@@ -156,7 +156,6 @@ async function camera() {
   const was = stream;
   stopCamera();
   if (was || !picture) return;
-  const { depth } = picture;
   try {
     stream = await navigator.mediaDevices.getUserMedia({ video: { width: 640, facingMode: "environment" } });
   } catch (error) {
@@ -167,9 +166,8 @@ async function camera() {
   state.source = "camera";
   const video = Object.assign(document.createElement("video"), { srcObject: mine, muted: true, playsInline: true });
   await video.play();
+  picture = { ...picture, colour: video };
   while (stream === mine) {
-    const colour = pixels(video, video.videoWidth, video.videoHeight, depth.width / depth.height);
-    picture = { colour, depth };
     const before = state.frames;
     await refresh();
     if (state.frames === before) return stopCamera();
