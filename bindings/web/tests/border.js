@@ -69,5 +69,11 @@ export async function run() {
     encoding: { kind: "deep", prefilter: pair.prefilter },
   });
   deep.process(new Frame(colour(), depth()));
-  return version();
+  const said = version();
+
+  // What no memory holds ends the module, in order: this call says so, and every other.
+  const huge = { target: { width: 40000, height: 40000 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
+  refused("internal", "the module cannot go on", () => new Session(huge));
+  refused("internal", "the module cannot go on", () => version());
+  return said;
 }

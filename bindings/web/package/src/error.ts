@@ -43,6 +43,11 @@ export function guard<T>(call: () => T): T {
   }
 }
 
+/** Gives back what the module holds; of one that panicked nothing can be given back. */
+export function release(raw: { free(): void } | undefined): void {
+  if (state === "ready") raw?.free();
+}
+
 /** `value`, which must be whole and fit the module's 32 bits. */
 export function whole(what: string, value: number, kind: ErrorKind = "setting"): number {
   if (Number.isInteger(value) && value >= 0 && value < 2 ** 32) return value;

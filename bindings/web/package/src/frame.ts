@@ -1,4 +1,4 @@
-import { PhasefrontError, bytesOf, guard, whole } from "./error.js";
+import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
 import { RawFrame } from "./raw/phasefront_web.js";
 
 /** How a colour image lies in memory. `nv12` has two planes, `yuv420` three, the others one. */
@@ -158,7 +158,7 @@ export class Frame {
       guard(() => raw.depth(of, ...size("depth", depth), ...parts));
       this.describe(raw);
     } catch (error) {
-      raw.free();
+      release(raw);
       throw error;
     }
     return raw;

@@ -1,4 +1,4 @@
-import { PhasefrontError, guard, whole } from "./error.js";
+import { PhasefrontError, guard, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
 /** How long each stage of a frame took. */
@@ -103,7 +103,7 @@ export class Hologram {
 
   /** Gives its memory back now. Closing twice does nothing. */
   close(): void {
-    this.#raw?.free();
+    release(this.#raw);
     this.#raw = undefined;
   }
 

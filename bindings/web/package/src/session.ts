@@ -1,4 +1,4 @@
-import { PhasefrontError, guard, whole } from "./error.js";
+import { PhasefrontError, guard, release, whole } from "./error.js";
 import type { Frame } from "./frame.js";
 import { Hologram, type FrameTimes } from "./hologram.js";
 import type { Network } from "./network.js";
@@ -154,7 +154,7 @@ export class Session {
     try {
       this.#raw = guard(() => new RawSession(raw, mode));
     } finally {
-      raw.free();
+      release(raw);
     }
   }
 
@@ -170,7 +170,7 @@ export class Session {
     try {
       return Hologram.of(guard(() => session.process(raw)));
     } finally {
-      raw.free();
+      release(raw);
     }
   }
 
@@ -204,7 +204,7 @@ export class Session {
 
   /** Takes no more frames and gives the memory back. Holograms stay as they are. Closing twice does nothing. */
   close(): void {
-    this.#raw?.free();
+    release(this.#raw);
     this.#raw = undefined;
   }
 
