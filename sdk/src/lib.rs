@@ -57,7 +57,8 @@
 //!   calls allocate nothing.
 //! - Take int8 networks: three to four times as fast as f32, for some hundredths to 0.3 dB.
 //! - Compile with optimisation, also in development: `[profile.dev.package."*"] opt-level = 3`. The kernels choose the
-//!   processor's instructions when they run (AVX2, AVX-512, AMX, NEON); no flags are needed.
+//!   processor's instructions when they run (AVX2, AVX-512, AMX, NEON); no flags are needed, but for WebAssembly, whose
+//!   vectors are known before: `-C target-feature=+simd128`.
 //! - Stages use the current rayon pool. `ThreadPool::install` bounds their threads; a session has a pool of its own.
 //! - A modulator at the midpoint (`offset_mm = 0`) or a sweep, which goes on to the modulator by itself, needs no
 //!   Fourier transforms.

@@ -34,21 +34,22 @@ function work(change) {
   document.documentElement.setAttribute("aria-busy", String(busy > 0));
 }
 
-// The newest wish alone is fulfilled: what the slider passed meanwhile is not.
+// The newest wish alone is fulfilled: what the slider passed meanwhile is not. Who wishes waits until all are.
 function newest(fulfil) {
-  let running = false, next;
-  return async function wish(...said) {
-    next = said;
-    if (running) return;
-    running = true;
+  let running, next;
+  async function run() {
     work(1);
     while (next) {
       const now = next;
       next = undefined;
       await fulfil(...now).then(() => say(), say);
     }
-    running = false;
     work(-1);
+    running = undefined;
+  }
+  return (...said) => {
+    next = said;
+    return (running ??= run());
   };
 }
 
@@ -71,9 +72,10 @@ async function look() {
   const { ms, width, height, pixels } = await ask("view", { zMm });
   draw("shown", width, height, pixels);
   const { times } = made;
-  at("times").textContent = `${made.width}×${made.height} in ${made.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, `
-    + `encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; `
-    + `this view ${ms.toFixed(0)} ms; ${made.backend || "plane sweep"}`;
+  at("times").textContent =
+    `${made.width}×${made.height} in ${made.ms.toFixed(0)} ms: method ${times.methodMs.toFixed(0)}, ` +
+    `encoding ${times.encodeMs.toFixed(0)}, depth and colour ${(times.depthMs + times.colourMs).toFixed(0)}; ` +
+    `this view ${ms.toFixed(0)} ms; ${made.backend || "plane sweep"}`;
 }
 const view = newest(look);
 
@@ -97,12 +99,13 @@ const refresh = newest(show);
 
 // The middle of a picture, which has these sides' ratio, as so many pixels.
 function pixels(source, width, height, smooth) {
-  const [wide, high] = [source.videoWidth ?? source.width, source.videoHeight ?? source.height];
-  const across = Math.min(wide, (high * width) / height), down = (across * height) / width;
+  const across = Math.min(source.width, (source.height * width) / height);
+  const down = (across * height) / width;
   const context = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
   context.imageSmoothingEnabled = smooth;
   context.imageSmoothingQuality = "high";
-  context.drawImage(source, (wide - across) / 2, (high - down) / 2, across, down, 0, 0, width, height);
+  const [x, y] = [(source.width - across) / 2, (source.height - down) / 2];
+  context.drawImage(source, x, y, across, down, 0, 0, width, height);
   return { width, height, data: context.getImageData(0, 0, width, height).data };
 }
 
@@ -126,7 +129,8 @@ async function take(source, files) {
   const images = await Promise.all(files.map(read));
   const named = files.findIndex(({ name }) => /depth/i.test(name));
   const grey = images.findIndex(isGrey);
-  if (named < 0 && grey < 0) throw new Error("both pictures are coloured; depth is a grey one, black near and white far");
+  if (named < 0 && grey < 0)
+    throw new Error("both pictures are coloured; depth is a grey one, black near and white far");
   const depth = named < 0 ? grey : named;
   picture = { colour: images[1 - depth], depth: images[depth] };
   state.source = source;
@@ -156,6 +160,7 @@ async function camera() {
   const was = stream;
   stopCamera();
   if (was || !picture) return;
+  if (!navigator.mediaDevices) return say(new Error("the camera needs a page served by https, or from localhost"));
   try {
     stream = await navigator.mediaDevices.getUserMedia({ video: { width: 640, facingMode: "environment" } });
   } catch (error) {
@@ -166,11 +171,13 @@ async function camera() {
   state.source = "camera";
   const video = Object.assign(document.createElement("video"), { srcObject: mine, muted: true, playsInline: true });
   await video.play();
-  picture = { ...picture, colour: video };
   while (stream === mine) {
+    const colour = await createImageBitmap(video);
+    if (stream !== mine) return;
+    picture = { ...picture, colour };
     const before = state.frames;
     await refresh();
-    if (state.frames === before) return stopCamera();
+    if (stream === mine && state.frames === before) return stopCamera();
     await new Promise(requestAnimationFrame);
   }
 }
@@ -199,7 +206,10 @@ function play() {
   }, 60);
 }
 
-at("focus").addEventListener("input", () => { stop(); focus(Number(at("focus").value)); });
+at("focus").addEventListener("input", () => {
+  stop();
+  focus(Number(at("focus").value));
+});
 at("play").addEventListener("click", play);
 at("sample").addEventListener("click", sample);
 at("camera").addEventListener("click", camera);
@@ -211,21 +221,32 @@ for (const id of ["method", "width", "localSteps"]) {
     refresh();
   });
 }
-at("shown").querySelector("canvas").addEventListener("click", async (event) => {
-  const box = event.currentTarget.getBoundingClientRect();
-  const { zMm } = await ask("focus", { x: (event.clientX - box.left) / box.width, y: (event.clientY - box.top) / box.height });
-  stop();
-  focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
-});
+at("shown")
+  .querySelector("canvas")
+  .addEventListener("click", async (event) => {
+    const box = event.currentTarget.getBoundingClientRect();
+    const { zMm } = await ask("focus", {
+      x: (event.clientX - box.left) / box.width,
+      y: (event.clientY - box.top) / box.height,
+    });
+    stop();
+    focus(Math.round((0.5 - zMm / DEPTH_MM) * STEPS));
+  });
 at("save").addEventListener("click", async () => {
   const canvas = at("phases").querySelector("canvas");
   const blob = await new Promise((done) => canvas.toBlob(done, "image/png"));
-  const link = Object.assign(document.createElement("a"), { href: URL.createObjectURL(blob), download: "hologram.png" });
+  const link = Object.assign(document.createElement("a"), {
+    href: URL.createObjectURL(blob),
+    download: "hologram.png",
+  });
   link.click();
   URL.revokeObjectURL(link.href);
 });
 
-addEventListener("dragover", (event) => { event.preventDefault(); document.body.classList.add("over"); });
+addEventListener("dragover", (event) => {
+  event.preventDefault();
+  document.body.classList.add("over");
+});
 addEventListener("dragleave", () => document.body.classList.remove("over"));
 addEventListener("drop", (event) => {
   event.preventDefault();
@@ -237,11 +258,19 @@ addEventListener("keydown", (event) => {
   const { tagName, type } = document.activeElement ?? {};
   if (event.key === " " && tagName !== "BUTTON" && tagName !== "SELECT" && type !== "checkbox") play();
   else if (type === "range" || tagName === "SELECT") return;
-  else if (event.key === "ArrowLeft") { stop(); focus(state.focus - 1); }
-  else if (event.key === "ArrowRight") { stop(); focus(state.focus + 1); }
-  else if (event.key === "Home") { stop(); focus(0); }
-  else if (event.key === "End") { stop(); focus(STEPS); }
-  else return;
+  else if (event.key === "ArrowLeft") {
+    stop();
+    focus(state.focus - 1);
+  } else if (event.key === "ArrowRight") {
+    stop();
+    focus(state.focus + 1);
+  } else if (event.key === "Home") {
+    stop();
+    focus(0);
+  } else if (event.key === "End") {
+    stop();
+    focus(STEPS);
+  } else return;
   event.preventDefault();
 });
 

@@ -14,7 +14,10 @@ function plan({ method, localSteps, width, height, video }) {
   if (wanted === planned) return;
   session?.close();
   session = planned = undefined;
-  session = new Session({ target: { width, height }, method: METHODS[method](), localSteps }, video ? "video" : "image");
+  session = new Session(
+    { target: { width, height }, method: METHODS[method](), localSteps },
+    video ? "video" : "image",
+  );
   session.warmUp();
   planned = wanted;
 }
@@ -27,7 +30,9 @@ const answers = {
   frame({ options, colour, depth, timestampNs }) {
     plan(options);
     const start = performance.now();
-    const made = session.process(new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestampNs }));
+    const made = session.process(
+      new Frame(colour, { ...depth, pixelStride: 4, format: "normalized-u8" }, { timestampNs }),
+    );
     const ms = performance.now() - start;
     hologram?.close();
     hologram = made;

@@ -56,8 +56,8 @@ impl RawNetwork {
             error(
                 "network",
                 &format!(
-                    "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for {offsets} mm, or \
-                     take a network without a pre-filter"
+                    "network: no pair for an offset of {offset_mm} mm is built in; there are pairs for {offsets} mm, \
+                     or take a network without a pre-filter"
                 ),
             )
         })?;

@@ -19,7 +19,8 @@ impl RawSession {
     /// A session that runs in `mode`: `image` or `video`.
     ///
     /// # Errors
-    /// `setting` and others: options that cannot be meant or planned for. `session`: a live stream, which needs a thread.
+    /// `setting` and others: options that cannot be meant or planned for. `session`: a live stream, which needs a
+    /// thread.
     #[wasm_bindgen(constructor)]
     pub fn new(options: &RawOptions, mode: &str) -> Answer<RawSession> {
         let mode = match mode {

@@ -24,7 +24,8 @@ impl RawTarget {
         Ok(RawTarget { core })
     }
 
-    /// The same display, whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+    /// The same display, whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase
+    /// 2πi/256.
     ///
     /// # Errors
     /// `setting`: another number of levels.

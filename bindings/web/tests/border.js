@@ -10,7 +10,13 @@ function refused(kind, start, call) {
   try {
     call();
   } catch (error) {
-    if (error instanceof PhasefrontError && error.kind === kind && error.message.includes(start) && !error.message.includes("\n")) return;
+    if (
+      error instanceof PhasefrontError &&
+      error.kind === kind &&
+      error.message.includes(start) &&
+      !error.message.includes("\n")
+    )
+      return;
     throw new Error(`${kind} ${start}: ${error.kind} ${error.message}`);
   }
   throw new Error(`not refused: ${start}`);
@@ -35,10 +41,14 @@ export async function run() {
   refused("setting", "no encoding 'triple-phase'", () => new Session({ target, encoding: { kind: "triple-phase" } }));
   refused("setting", "fixed with its scale", () => new Session({ target, brightness: { kind: "fixed" } }));
   refused("setting", "most_pixels", () => new Session({ target: { width: 8192, height: 8192 } }));
-  refused("frame", "no colour format 'cmyk'", () => session.process(new Frame({ ...colour(), format: "cmyk" }, depth())));
+  refused("frame", "no colour format 'cmyk'", () =>
+    session.process(new Frame({ ...colour(), format: "cmyk" }, depth())),
+  );
   refused("frame", "", () => session.process(new Frame({ ...colour(), data: bytes(7) }, depth())));
   refused("frame", "is -16; a whole number", () => session.process(new Frame({ ...colour(), width: -16 }, depth())));
-  refused("frame", "say its format", () => session.process(new Frame(colour(), { ...depth(), data: new Int8Array(192) })));
+  refused("frame", "say its format", () =>
+    session.process(new Frame(colour(), { ...depth(), data: new Int8Array(192) })),
+  );
   refused("frame", "aspect ratios differ", () => session.process(new Frame(colour(), depth(12, 12))));
   refused("frame", "8 are right, or 20", () => {
     const camera = { fx: 1, fy: 1, cx: 1, cy: 1 };
@@ -56,7 +66,8 @@ export async function run() {
   const { info, levels } = hologram;
   const grey = hologram.output({ layout: "grey" }, 1);
   const same = grey.data.every((level, index) => level === levels[16 * 12 + index]);
-  if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0) throw new Error(JSON.stringify(info));
+  if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0)
+    throw new Error(JSON.stringify(info));
   hologram.close();
   hologram.close();
   refused("session", "hologram is closed", () => hologram.levels);

@@ -43,7 +43,8 @@ export async function run() {
       hologram.preview(-2 + i / 5, WIDTH, HEIGHT);
       best.previewMs = Math.min(best.previewMs, performance.now() - made);
       best.frameMs = Math.min(best.frameMs, made - before);
-      for (const [stage, ms] of Object.entries(hologram.info.times)) best[stage] = Math.min(best[stage] ?? Infinity, ms);
+      for (const [stage, ms] of Object.entries(hologram.info.times))
+        best[stage] = Math.min(best[stage] ?? Infinity, ms);
       hologram.close();
     }
     session.close();

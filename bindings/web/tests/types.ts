@@ -12,7 +12,11 @@ const options: SessionOptions = {
 export async function show(context: CanvasRenderingContext2D, metres: Float32Array): Promise<ImageData> {
   await load();
   const session = new Session(options, "video");
-  const frame = new Frame(context.getImageData(0, 0, 640, 480), { width: 160, height: 120, data: metres }, { timestampNs: 1n });
+  const frame = new Frame(
+    context.getImageData(0, 0, 640, 480),
+    { width: 160, height: 120, data: metres },
+    { timestampNs: 1n },
+  );
   const hologram = session.process(frame);
   const near: number | undefined = hologram.info.rangeM?.[0];
   console.log(near, hologram.levels.byteLength, session.statistics.times.totalMs);

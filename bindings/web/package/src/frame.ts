@@ -127,7 +127,10 @@ function strides(what: string, plane: Plane, width: number, pixel: number): [Uin
 }
 
 function size(what: string, image: { readonly width: number; readonly height: number }): [number, number] {
-  return [whole(`frame: the width of ${what}`, image.width, "frame"), whole(`frame: the height of ${what}`, image.height, "frame")];
+  return [
+    whole(`frame: the width of ${what}`, image.width, "frame"),
+    whole(`frame: the height of ${what}`, image.height, "frame"),
+  ];
 }
 
 /** Colour and depth of one moment. Arrays are read when a session processes the frame. */
@@ -145,8 +148,11 @@ export class Frame {
     const planes = "planes" in colour ? colour.planes : [colour];
     const pixels = COLOUR_BYTES[format] ?? [];
     const [width, height] = size("colour", colour);
-    const [matrix, videoRange] = "planes" in colour ? [colour.matrix ?? "bt601", colour.videoRange ?? false] : ["bt601", false];
-    const raw = guard(() => new RawFrame(options.timestampNs ?? 0n, format, width, height, matrix === "bt709", videoRange));
+    const [matrix, videoRange] =
+      "planes" in colour ? [colour.matrix ?? "bt601", colour.videoRange ?? false] : ["bt601", false];
+    const raw = guard(
+      () => new RawFrame(options.timestampNs ?? 0n, format, width, height, matrix === "bt709", videoRange),
+    );
     try {
       planes.forEach((plane, index) => {
         const across = index === 0 ? width : Math.ceil(width / 2);

@@ -69,7 +69,7 @@ export class Hologram {
     return new Hologram(raw);
   }
 
-  /** The modulator levels, (C, H, W): red, green, blue, or those of the one laser. A copy; keep it rather than ask twice. */
+  /** The modulator levels, (C, H, W): red, green, blue, or those of the one laser. A copy, made at each call. */
   get levels(): Uint8Array {
     return this.#call((raw) => raw.levels());
   }

@@ -24,11 +24,9 @@ export type Encoding =
   | { readonly kind: "band-limit"; readonly k?: number }
   | { readonly kind: "deep"; readonly prefilter: Network };
 
-/** Which amplitude full light stands for: near the frame's largest, moving smoothly; the frame's largest; or this one. */
+/** Which amplitude full light stands for: near the frame's largest, moving smoothly; the largest; or this one. */
 export type Brightness =
-  | { readonly kind: "steady" }
-  | { readonly kind: "frame-max" }
-  | { readonly kind: "fixed"; readonly scale: number };
+  { readonly kind: "steady" } | { readonly kind: "frame-max" } | { readonly kind: "fixed"; readonly scale: number };
 
 /** Whether the session steps on its ladder by itself, or stays on a rung, 0 the best. */
 export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly rung: number };
@@ -60,7 +58,7 @@ export interface SessionOptions {
   readonly encoding?: Encoding;
   /** `steady` unless it is said. */
   readonly brightness?: Brightness;
-  /** Where the amplitude is below this share of full light phases are drawn to 0; what suits the encoding unless it is said. */
+  /** The share of full light below which phases are drawn to 0; what suits the encoding unless it is said. */
   readonly dark?: number;
   /** Steps of correction, 0 to 8; what suits the encoding unless it is said. */
   readonly localSteps?: number;
@@ -121,7 +119,9 @@ function rung(quality: Quality): number | undefined {
 function rawOptions(options: SessionOptions): RawOptions {
   const target = options.target instanceof Target ? options.target : Target.ofDisplay(options.target);
   return guard(() => {
-    const raw = options.method ? RawOptions.withMethod(target.raw, rawMethod(options.method)) : RawOptions.usual(target.raw);
+    const raw = options.method
+      ? RawOptions.withMethod(target.raw, rawMethod(options.method))
+      : RawOptions.usual(target.raw);
     setEncoder(raw, options);
     if (options.depthRange) raw.depthRange(options.depthRange.nearM, options.depthRange.farM);
     if (options.leastConfidence !== undefined) raw.leastConfidence(options.leastConfidence);
