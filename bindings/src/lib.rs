@@ -19,6 +19,7 @@ mod options;
 mod session;
 mod statistics;
 mod target;
+mod trace;
 
 pub use display::{Display, display_from_toml};
 #[doc(hidden)]
@@ -38,6 +39,7 @@ pub use options::{
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};
 pub use target::Target;
+pub use trace::{Stage, StageListener, set_stage_listener};
 
 uniffi::setup_scaffolding!();
 

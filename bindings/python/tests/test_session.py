@@ -441,6 +441,18 @@ def test_messages_reach_the_log(options):
     assert [level for level, _ in messages] == [LogLevel.INFO] and "IMAGE" in messages[0][1].upper()
 
 
+def test_stages_begin_and_end(options):
+    stages = []
+    with Session(options) as session:
+        phasefront.send_stages(lambda stage, begins: stages.append((stage.name.lower(), begins)))
+        session.process(still())
+        phasefront.send_stages(None)
+        session.process(still())
+    inside = ["colour", "depth", "method", "propagate", "encode"]
+    within = [(stage, begins) for stage in inside for begins in (True, False)]
+    assert stages == [("frame", True), *within, ("frame", False)]
+
+
 def test_a_log_handler_that_raises_is_told_of_the_next_message(options):
     messages = []
 

@@ -330,6 +330,19 @@ final class SessionTests: XCTestCase {
         XCTAssert(heard[0].1.contains("Image"))
     }
 
+    func testStagesBeginAndEnd() throws {
+        let stages = Locked<[(Stage, Bool)]>([])
+        let session = try Session(options(), mode: .image)
+        try Trace.send { stage, begins in stages.withLock { $0.append((stage, begins)) } }
+        _ = try session.process(still())
+        try Trace.send(to: nil)
+        _ = try session.process(still())
+        let heard = stages.withLock { $0 }
+        XCTAssertEqual(heard.first?.0, .frame)
+        XCTAssertEqual(heard.filter(\.1).map(\.0), [.frame, .colour, .depth, .method, .propagate, .encode])
+        XCTAssertEqual(heard.filter { !$0.1 }.map(\.0), [.colour, .depth, .method, .propagate, .encode, .frame])
+    }
+
     func testMemoryOfTenThousandFramesIsFlat() throws {
         func residentMb() throws -> Double {
             let statm = try String(contentsOfFile: "/proc/self/statm", encoding: .utf8)

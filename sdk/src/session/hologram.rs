@@ -6,6 +6,7 @@ use super::statistics::FrameTimes;
 use crate::error::{Error, Result};
 use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch, check_screen};
+use crate::stage::stage;
 use crate::target::Target;
 use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, Weak};
@@ -241,7 +242,10 @@ impl Hologram {
             })?);
         }
         if let Some(ViewPlan { preview, scratch, .. }) = &mut *plan {
-            let look = || preview.look(self.levels(), self.scale, rgba, scratch);
+            let look = || {
+                let _stage = stage!("preview");
+                preview.look(self.levels(), self.scale, rgba, scratch);
+            };
             self.viewer.pool.install(look);
         }
         Ok(())

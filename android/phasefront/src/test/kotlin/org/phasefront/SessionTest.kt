@@ -370,6 +370,19 @@ class SessionTest {
     }
 
     @Test
+    fun stagesBeginAndEnd() {
+        val stages = Collections.synchronizedList(mutableListOf<Pair<Stage, Boolean>>())
+        Trace.send { stage, begins -> stages.add(stage to begins) }
+        image { it.process(still()).close() }
+        Trace.send(null)
+        image { it.process(still()).close() }
+        val inside = listOf(Stage.COLOUR, Stage.DEPTH, Stage.METHOD, Stage.PROPAGATE, Stage.ENCODE)
+        val ended = stages.filterNot { it.second }.map { it.first }
+        assertEquals(listOf(Stage.PLAN, Stage.FRAME) + inside, stages.filter { it.second }.map { it.first })
+        assertEquals(listOf(Stage.PLAN) + inside + Stage.FRAME, ended)
+    }
+
+    @Test
     fun memoryOfTenThousandFramesIsFlat() {
         val statm = File("/proc/self/statm")
         assumeTrue(statm.exists(), "only Linux tells a process's memory")
