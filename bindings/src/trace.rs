@@ -79,10 +79,7 @@ fn listener() -> Option<Arc<dyn StageListener>> {
 pub fn set_stage_listener(listener: Option<Arc<dyn StageListener>>) -> Result<(), PhasefrontError> {
     static COLLECTING: OnceLock<bool> = OnceLock::new();
     guard(|| {
-        let before = std::mem::replace(
-            &mut *LISTENER.write().unwrap_or_else(PoisonError::into_inner),
-            listener,
-        );
+        let before = std::mem::replace(&mut *LISTENER.write().unwrap_or_else(PoisonError::into_inner), listener);
         // Not under the lock: what ends with the listener may call the library.
         drop(before);
         let collecting = *COLLECTING.get_or_init(|| {
@@ -170,7 +167,13 @@ mod tests {
         set_stage_listener(None).unwrap();
         frame(&session);
         let heard = std::mem::take(&mut *heard.0.lock().unwrap());
-        let inside = [Stage::Colour, Stage::Depth, Stage::Method, Stage::Propagate, Stage::Encode];
+        let inside = [
+            Stage::Colour,
+            Stage::Depth,
+            Stage::Method,
+            Stage::Propagate,
+            Stage::Encode,
+        ];
         let mut expected = vec![(true, Stage::Frame)];
         expected.extend(inside.iter().flat_map(|stage| [(true, *stage), (false, *stage)]));
         expected.push((false, Stage::Frame));

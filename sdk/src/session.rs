@@ -22,6 +22,7 @@ mod quality;
 mod queue;
 mod stages;
 mod statistics;
+mod sync;
 
 use crate::depth::stream::DepthOptions;
 pub use event::{DropReason, Event};
