@@ -81,6 +81,11 @@ final class SessionTests: XCTestCase {
         assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
     }
 
+    func testNoticesComeAlong() throws {
+        let notices = try thirdPartyNotices()
+        XCTAssert(notices.hasPrefix("# Third-party notices") && notices.contains("uniffi"))
+    }
+
     func testAWholeViewIsTheFieldWithoutItsPhases() throws {
         let hologram = try Session(options(), mode: .image).process(still())
         let (seen, field) = try (hologram.refocus(zMm: 0), hologram.field())

@@ -103,6 +103,12 @@ class SessionTest {
     }
 
     @Test
+    fun noticesComeAlong() {
+        assertContains(thirdPartyNotices(), "# Third-party notices")
+        assertContains(thirdPartyNotices(), "uniffi")
+    }
+
+    @Test
     fun aWholeViewIsTheFieldWithoutItsPhases() {
         image { it.process(still()) }.use { hologram ->
             hologram.field().use { field ->
