@@ -132,6 +132,10 @@ final class ConformanceTests: XCTestCase {
         return all
     }
 
+    private func floats(_ bytes: Data) -> [Float] {
+        bytes.withUnsafeBytes { Array($0.bindMemory(to: Float.self)) }
+    }
+
     func testFramesBecomeTheLevelsThatAreExpected() throws {
         let folder = Self.root.appendingPathComponent("tests/conformance")
         let suite = try JSONDecoder().decode(Suite.self, from: Data(contentsOf: folder.appendingPathComponent("cases.json")))
@@ -142,7 +146,11 @@ final class ConformanceTests: XCTestCase {
             let rust = URL(fileURLWithPath: rust)
             let levels = try Data(contentsOf: rust.appendingPathComponent("levels.bin"))
             XCTAssertEqual(got.reduce(Data(), +), levels, "not the bits that Rust has")
-            XCTAssertEqual(seen, try Data(contentsOf: rust.appendingPathComponent("seen.bin")), "not what Rust sees")
+            // Sines are the C library's, which need not be the one that Rust had.
+            let apart = try zip(floats(seen), floats(Data(contentsOf: rust.appendingPathComponent("seen.bin"))))
+                .map { abs($0 - $1) }
+            XCTAssertEqual(4 * apart.count, seen.count)
+            XCTAssertLessThan(apart.max() ?? 1, 1e-4, "not what Rust sees")
         }
         let expected = [UInt8](try Data(contentsOf: folder.appendingPathComponent("levels.bin")))
         var from = 0
