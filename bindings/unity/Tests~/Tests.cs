@@ -29,8 +29,8 @@ internal static class Tests
             return 2;
         }
         Require(Library.Version == arguments[3], "version " + Library.Version);
-        byte[] Left(string name) => File.ReadAllBytes(Path.Combine(arguments[2], name));
-        Conformance(arguments[0], arguments[1], Left("levels.bin"), Left("seen.bin"));
+        Func<string, byte[]> left = name => File.ReadAllBytes(Path.Combine(arguments[2], name));
+        Conformance(arguments[0], arguments[1], left("levels.bin"), left("seen.bin"));
         Mistakes();
         Live();
         return 0;
