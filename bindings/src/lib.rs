@@ -29,7 +29,7 @@ pub use frame::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
     Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
 };
-pub use hologram::{HologramInfo, RawHologram, RawImage};
+pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{

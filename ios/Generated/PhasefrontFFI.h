@@ -309,6 +309,11 @@ uint64_t uniffi_phasefront_ffi_fn_clone_rawhologram(uint64_t handle, RustCallSta
 void uniffi_phasefront_ffi_fn_free_rawhologram(uint64_t handle, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
+uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_field(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_INFO
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_INFO
 RustBuffer uniffi_phasefront_ffi_fn_method_rawhologram_info(uint64_t ptr, RustCallStatus *_Nonnull out_status
@@ -332,6 +337,11 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_plane_len(uint64_t ptr, Rus
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_preview(uint64_t ptr, double z_mm, uint32_t width, uint32_t height, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
+uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_refocus(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_SHARE
@@ -382,6 +392,46 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawimage_share(uint64_t ptr, RustCallSt
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
 uint32_t uniffi_phasefront_ffi_fn_method_rawimage_width(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWPLANES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWPLANES
+uint64_t uniffi_phasefront_ffi_fn_clone_rawplanes(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWPLANES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWPLANES
+void uniffi_phasefront_ffi_fn_free_rawplanes(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_COLOURS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_COLOURS
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_colours(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_HEIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_HEIGHT
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_height(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PIXEL_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PIXEL_BYTES
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_pixel_bytes(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PLANE_ADDRESS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PLANE_ADDRESS
+uint64_t uniffi_phasefront_ffi_fn_method_rawplanes_plane_address(uint64_t ptr, uint32_t colour, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_SHARE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_SHARE
+uint64_t uniffi_phasefront_ffi_fn_method_rawplanes_share(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_WIDTH
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_WIDTH
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_width(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_LOGLISTENER
@@ -885,6 +935,12 @@ uint16_t uniffi_phasefront_ffi_checksum_func_session_options(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_field(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_INFO
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_INFO
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_info(void
@@ -912,6 +968,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_preview(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_refocus(void
     
 );
 #endif
@@ -960,6 +1022,42 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_share(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
 uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_width(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_COLOURS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_COLOURS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_colours(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_HEIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_HEIGHT
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_height(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PIXEL_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PIXEL_BYTES
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PLANE_ADDRESS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PLANE_ADDRESS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_SHARE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_SHARE
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_share(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_WIDTH
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_WIDTH
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_width(void
     
 );
 #endif

@@ -825,6 +825,27 @@ class LogListener:
     def on_log(self, level: LogLevel, message: str) -> None:
         """One message."""
 
+class RawPlanes:
+    """Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+    by hand.
+    """
+    def __init__(self, *args: object, **kwargs: object) -> None: ...
+    def colours(self) -> int:
+        """Planes: 3, or 1 of a display of one laser."""
+    def height(self) -> int:
+        """Pixels along y."""
+    def pixel_bytes(self) -> int:
+        """Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part."""
+    def plane_address(self, colour: int) -> int:
+        """Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+
+        Errors: Another colour.
+        """
+    def share(self) -> RawPlanes:
+        """Another handle to the same planes: whoever reads their memory holds one."""
+    def width(self) -> int:
+        """Pixels along x."""
+
 class RawImage:
     """An image, row by row without gaps. For the layers by hand."""
     def __init__(self, *args: object, **kwargs: object) -> None: ...
@@ -846,6 +867,12 @@ class RawHologram:
     planes are read.
     """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
+    def field(self, z_mm: float) -> RawPlanes:
+        """The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+        and imaginary part of each pixel.
+
+        Errors: A z too far away.
+        """
     def info(self) -> HologramInfo:
         """What is known of it."""
     def output(self, placement: Placement, image: int) -> RawImage:
@@ -866,6 +893,11 @@ class RawHologram:
         """What an eye focused at `z_mm` sees, `width` × `height` pixels.
 
         Errors: An empty image, or a z too far away.
+        """
+    def refocus(self, z_mm: float) -> RawPlanes:
+        """What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+
+        Errors: A z too far away.
         """
     def share(self) -> RawHologram:
         """Another handle to the same hologram: whoever reads its memory holds one."""

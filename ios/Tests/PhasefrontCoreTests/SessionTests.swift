@@ -81,6 +81,28 @@ final class SessionTests: XCTestCase {
         assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
     }
 
+    func testNoticesComeAlong() throws {
+        let notices = try thirdPartyNotices()
+        XCTAssert(notices.hasPrefix("# Third-party notices") && notices.contains("uniffi"))
+    }
+
+    func testAWholeViewIsTheFieldWithoutItsPhases() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let (seen, field) = try (hologram.refocus(zMm: 0), hologram.field())
+        XCTAssertEqual([seen.width, seen.height, seen.colours, seen.numbers, field.numbers], [64, 48, 3, 1, 2])
+        try seen.withPlane(.blue) { amplitudes in
+            try field.withPlane(.blue) { parts in
+                XCTAssertEqual([amplitudes.count, parts.count], [64 * 48, 2 * 64 * 48])
+                for i in 0..<64 * 48 {
+                    let (re, im) = (parts[2 * i], parts[2 * i + 1])
+                    XCTAssertEqual(amplitudes[i], (re * re + im * im).squareRoot(), accuracy: 1e-6)
+                }
+            }
+        }
+        assertRefused("a shorter distance") { try hologram.refocus(zMm: 1e5) }
+        assertRefused("must be finite") { try hologram.field(zMm: .nan) }
+    }
+
     func testOutputIsWhatTheModulatorTakes() throws {
         let hologram = try Session(options(), mode: .image).process(still())
         let levels = [UInt8](try hologram.levels())

@@ -1037,6 +1037,15 @@ public func FfiConverterTypeNetwork_lower(_ value: Network) -> UInt64 {
 public protocol RawHologramProtocol: AnyObject, Sendable {
     
     /**
+     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+     * and imaginary part of each pixel.
+     *
+     * # Errors
+     * A z too far away.
+     */
+    func field(zMm: Double) throws  -> RawPlanes
+    
+    /**
      * What is known of it.
      */
     func info() throws  -> HologramInfo
@@ -1071,6 +1080,14 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * An empty image, or a z too far away.
      */
     func preview(zMm: Double, width: UInt32, height: UInt32) throws  -> RawImage
+    
+    /**
+     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     *
+     * # Errors
+     * A z too far away.
+     */
+    func refocus(zMm: Double) throws  -> RawPlanes
     
     /**
      * Another handle to the same hologram: whoever reads its memory holds one.
@@ -1140,6 +1157,23 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
 
     
 
+    
+    /**
+     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+     * and imaginary part of each pixel.
+     *
+     * # Errors
+     * A z too far away.
+     */
+open func field(zMm: Double)throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_field(
+            self.uniffiCloneHandle(),
+        FfiConverterDouble.lower(zMm),uniffiCallStatus
+    )
+})
+}
     
     /**
      * What is known of it.
@@ -1214,6 +1248,22 @@ open func preview(zMm: Double, width: UInt32, height: UInt32)throws  -> RawImage
         FfiConverterDouble.lower(zMm),
         FfiConverterUInt32.lower(width),
         FfiConverterUInt32.lower(height),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     *
+     * # Errors
+     * A z too far away.
+     */
+open func refocus(zMm: Double)throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_refocus(
+            self.uniffiCloneHandle(),
+        FfiConverterDouble.lower(zMm),uniffiCallStatus
     )
 })
 }
@@ -1502,6 +1552,229 @@ public func FfiConverterTypeRawImage_lift(_ handle: UInt64) throws -> RawImage {
 #endif
 public func FfiConverterTypeRawImage_lower(_ value: RawImage) -> UInt64 {
     return FfiConverterTypeRawImage.lower(value)
+}
+
+
+
+
+
+
+/**
+ * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+ * by hand.
+ */
+public protocol RawPlanesProtocol: AnyObject, Sendable {
+    
+    /**
+     * Planes: 3, or 1 of a display of one laser.
+     */
+    func colours() throws  -> UInt32
+    
+    /**
+     * Pixels along y.
+     */
+    func height() throws  -> UInt32
+    
+    /**
+     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     */
+    func pixelBytes() throws  -> UInt32
+    
+    /**
+     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     *
+     * # Errors
+     * Another colour.
+     */
+    func planeAddress(colour: UInt32) throws  -> UInt64
+    
+    /**
+     * Another handle to the same planes: whoever reads their memory holds one.
+     */
+    func share() throws  -> RawPlanes
+    
+    /**
+     * Pixels along x.
+     */
+    func width() throws  -> UInt32
+    
+}
+/**
+ * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+ * by hand.
+ */
+open class RawPlanes: RawPlanesProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_rawplanes(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_rawplanes(handle, $0) }
+    }
+
+    
+
+    
+    /**
+     * Planes: 3, or 1 of a display of one laser.
+     */
+open func colours()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_colours(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Pixels along y.
+     */
+open func height()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_height(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     */
+open func pixelBytes()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_pixel_bytes(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     *
+     * # Errors
+     * Another colour.
+     */
+open func planeAddress(colour: UInt32)throws  -> UInt64  {
+    return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_plane_address(
+            self.uniffiCloneHandle(),
+        FfiConverterUInt32.lower(colour),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Another handle to the same planes: whoever reads their memory holds one.
+     */
+open func share()throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_share(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Pixels along x.
+     */
+open func width()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_width(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeRawPlanes: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = RawPlanes
+
+    public static func lift(_ handle: UInt64) throws -> RawPlanes {
+        return RawPlanes(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: RawPlanes) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RawPlanes {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: RawPlanes, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawPlanes_lift(_ handle: UInt64) throws -> RawPlanes {
+    return try FfiConverterTypeRawPlanes.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawPlanes_lower(_ value: RawPlanes) -> UInt64 {
+    return FfiConverterTypeRawPlanes.lower(value)
 }
 
 
@@ -6812,6 +7085,9 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_session_options() != 35800) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 38987) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -6825,6 +7101,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 24206) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 40122) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 7272) {
@@ -6849,6 +7128,24 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 63189) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 30921) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 11107) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 24405) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 44421) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 4678) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 48334) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 28371) {

@@ -8,6 +8,7 @@ import java.util.concurrent.CountDownLatch
 import java.util.concurrent.LinkedBlockingQueue
 import java.util.concurrent.TimeUnit
 import kotlin.concurrent.thread
+import kotlin.math.hypot
 import kotlin.test.Test
 import kotlin.test.assertContains
 import kotlin.test.assertContentEquals
@@ -98,6 +99,35 @@ class SessionTest {
             }
             assertTrue(hologram.zAt(0.5, 0.5) > hologram.zAt(0.02, 0.02))
             assertRefused<PhasefrontException.Setting>("0×24") { hologram.preview(0.0, 0, 24) }
+        }
+    }
+
+    @Test
+    fun noticesComeAlong() {
+        assertContains(thirdPartyNotices(), "# Third-party notices")
+        assertContains(thirdPartyNotices(), "uniffi")
+    }
+
+    @Test
+    fun aWholeViewIsTheFieldWithoutItsPhases() {
+        image { it.process(still()) }.use { hologram ->
+            hologram.field().use { field ->
+                hologram.refocus(0.0).use { seen ->
+                    assertEquals(listOf(64, 48, 3, 1), listOf(seen.width, seen.height, seen.colours, seen.numbers))
+                    assertEquals(2, field.numbers)
+                    seen.usePlane(Colour.BLUE) { amplitudes ->
+                        field.usePlane(Colour.BLUE) { parts ->
+                            for (i in 0 until 64 * 48) {
+                                assertEquals(hypot(parts.get(2 * i), parts.get(2 * i + 1)), amplitudes.get(i), 1e-6f)
+                            }
+                        }
+                    }
+                }
+                field.close()
+                assertRefused<PhasefrontException.Session>("closed") { field.usePlane(Colour.RED) {} }
+            }
+            assertRefused<PhasefrontException.Setting>("a shorter distance") { hologram.refocus(1e5) }
+            assertRefused<PhasefrontException.Setting>("must be finite") { hologram.field(Double.NaN) }
         }
     }
 
