@@ -278,6 +278,20 @@ typedef void (*UniffiCallbackInterfaceSessionListenerMethod3)(uint64_t, uint64_t
     );
 
 #endif
+#ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
+#define UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
+typedef void (*UniffiCallbackInterfaceStageListenerMethod0)(uint64_t, RustBuffer, void* _Nonnull, 
+        RustCallStatus *_Nonnull uniffiCallStatus
+    );
+
+#endif
+#ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD1
+#define UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD1
+typedef void (*UniffiCallbackInterfaceStageListenerMethod1)(uint64_t, RustBuffer, void* _Nonnull, 
+        RustCallStatus *_Nonnull uniffiCallStatus
+    );
+
+#endif
 #ifndef UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_LOG_LISTENER
 #define UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_LOG_LISTENER
 typedef struct UniffiVTableCallbackInterfaceLogListener {
@@ -297,6 +311,16 @@ typedef struct UniffiVTableCallbackInterfaceSessionListener {
     UniffiCallbackInterfaceSessionListenerMethod2 _Nonnull onFailed;
     UniffiCallbackInterfaceSessionListenerMethod3 _Nonnull onQualityChanged;
 } UniffiVTableCallbackInterfaceSessionListener;
+
+#endif
+#ifndef UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_STAGE_LISTENER
+#define UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_STAGE_LISTENER
+typedef struct UniffiVTableCallbackInterfaceStageListener {
+    UniffiCallbackInterfaceFree _Nonnull uniffiFree;
+    UniffiCallbackInterfaceClone _Nonnull uniffiClone;
+    UniffiCallbackInterfaceStageListenerMethod0 _Nonnull onBegin;
+    UniffiCallbackInterfaceStageListenerMethod1 _Nonnull onEnd;
+} UniffiVTableCallbackInterfaceStageListener;
 
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWHOLOGRAM
@@ -619,6 +643,31 @@ uint64_t uniffi_phasefront_ffi_fn_constructor_target_with_look_up_table(RustBuff
 RustBuffer uniffi_phasefront_ffi_fn_method_target_display(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_STAGELISTENER
+uint64_t uniffi_phasefront_ffi_fn_clone_stagelistener(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_STAGELISTENER
+void uniffi_phasefront_ffi_fn_free_stagelistener(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_INIT_CALLBACK_VTABLE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_INIT_CALLBACK_VTABLE_STAGELISTENER
+void uniffi_phasefront_ffi_fn_init_callback_vtable_stagelistener(const UniffiVTableCallbackInterfaceStageListener* _Nonnull vtable
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_BEGIN
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_BEGIN
+void uniffi_phasefront_ffi_fn_method_stagelistener_on_begin(uint64_t ptr, RustBuffer stage, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_END
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_END
+void uniffi_phasefront_ffi_fn_method_stagelistener_on_end(uint64_t ptr, RustBuffer stage, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_VERSION
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_VERSION
 RustBuffer uniffi_phasefront_ffi_fn_func_version(RustCallStatus *_Nonnull out_status
@@ -643,6 +692,11 @@ RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(double offset_mm, RustCal
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SESSION_OPTIONS
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SESSION_OPTIONS
 RustBuffer uniffi_phasefront_ffi_fn_func_session_options(uint64_t target, RustBuffer method, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SET_STAGE_LISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SET_STAGE_LISTENER
+void uniffi_phasefront_ffi_fn_func_set_stage_listener(RustBuffer listener, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_FFI_PHASEFRONT_FFI_RUSTBUFFER_ALLOC
@@ -935,6 +989,12 @@ uint16_t uniffi_phasefront_ffi_checksum_func_session_options(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_STAGE_LISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_STAGE_LISTENER
+uint16_t uniffi_phasefront_ffi_checksum_func_set_stage_listener(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_field(void
@@ -1160,6 +1220,18 @@ uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_change
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_TARGET_DISPLAY
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_TARGET_DISPLAY
 uint16_t uniffi_phasefront_ffi_checksum_method_target_display(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
+uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
+uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_end(void
     
 );
 #endif

@@ -40,6 +40,7 @@ DOCUMENTS = {
     'DropReason': "Why a frame was not made into a hologram, without fault.\n\nValues:\n    SUPERSEDED: A newer frame came while it waited.\n    ABOVE_TARGET_RATE: It came sooner than the target rate asks for.\n    PAUSED: The session was paused.\n    RESET: The session was reset before it was done.\n    CLOSED: The session was closed before it was done.\n    UNREAD: It became a hologram, but newer ones came before the app took it from its stream of events. Only the packages' streams say so.\n    OTHER: For a reason that this version of the bindings does not know.",
     'LogLevel': 'How much a message matters.\n\nValues:\n    ERROR: What went wrong.\n    WARNING: What looks wrong.\n    INFO: What is done.\n    DEBUG: Details.',
     'RunningMode': 'How a session runs; fixed when it is made.\n\nValues:\n    IMAGE: Each frame is answered by itself.\n    VIDEO: Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.\n    LIVE_STREAM: Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.',
+    'Stage': "A part of the work on a frame.\n\nValues:\n    FRAME: All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.\n    COLOUR: Colour: turned, converted, resized.\n    DEPTH: Depth: read, aligned, steadied, refined.\n    METHOD: From the frame to the midpoint hologram.\n    PROPAGATE: From the midpoint to the modulator.\n    ENCODE: From the field to levels.\n    MIDPOINT: Steps at the midpoint, within `Encode`.\n    GPU: A frame that a GPU computes, with the ways there and back.\n    PLAN: Plans and memory of a rung are made.\n    PREVIEW: A small view.",
     'Thermal': 'How hot the device is, as its system says.\n\nValues:\n    NOMINAL: Nothing to heed.\n    FAIR: Warm: frames may take a little less time.\n    SERIOUS: Hot: half the time.\n    CRITICAL: Too hot: the lowest rung.',
     'Intrinsics': 'The pinhole model of a camera, in pixels of its image before it is turned upright. The middle of the first pixel is\n(0, 0).\n\nFields:\n    fx: Focal length along x.\n    fy: Focal length along y.\n    cx: x of the principal point.\n    cy: y of the principal point.',
     'Pose': 'Where a point p of the depth camera (x right, y down, z forward) is for the colour camera: R·p + t.\n\nFields:\n    rotation: R, its 9 numbers row by row.\n    translation_m: t, 3 numbers, metres.',
@@ -65,6 +66,7 @@ DOCUMENTS = {
     'display_from_toml': 'Reads a display from its TOML form; what is left out has the default value.\n\nErrors: Text that is not TOML, an unknown key, or a value out of its range.',
     'session_options': "What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of\ncorrection, or, without a method, by the network that is built in, by the plane sweep where it was not trained for\nthe display; steady brightness, near and far by percentiles.",
     'set_log_listener': 'Sends messages of `level` and above to `listener`; none for silence. Of the libraries underneath, warnings and\nerrors are sent.\n\nErrors: A process that already logs elsewhere.',
+    'set_stage_listener': "Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a\nstage that is under way it may hear the end alone.\n\nErrors: A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.",
     'version': 'The version of the library.',
     'Network': 'A hologram network. Immutable; one serves many sessions.',
     'Network.built_in': "A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default\ndisplay's pitch, colours and volume.\n\nErrors: A name that none has, or a library that was built without them.",
@@ -120,4 +122,7 @@ DOCUMENTS = {
     'SessionListener.on_dropped': 'A frame was dropped.',
     'SessionListener.on_failed': 'A frame could not be processed. The session goes on.',
     'SessionListener.on_quality_changed': 'The frames after this one are made on another rung of the ladder.',
+    'StageListener': 'Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must\nnot call the library. What it throws is ignored.',
+    'StageListener.on_begin': 'A stage begins on this thread.',
+    'StageListener.on_end': 'The stage that began last on this thread ends.',
 }

@@ -2488,6 +2488,261 @@ public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> U
 
 
 /**
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
+ * not call the library. What it throws is ignored.
+ */
+public protocol StageListener: AnyObject, Sendable {
+    
+    /**
+     * A stage begins on this thread.
+     */
+    func onBegin(stage: Stage) throws 
+    
+    /**
+     * The stage that began last on this thread ends.
+     */
+    func onEnd(stage: Stage) throws 
+    
+}
+/**
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
+ * not call the library. What it throws is ignored.
+ */
+open class StageListenerImpl: StageListener, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_stagelistener(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_stagelistener(handle, $0) }
+    }
+
+    
+
+    
+    /**
+     * A stage begins on this thread.
+     */
+open func onBegin(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_stagelistener_on_begin(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeStage_lower(stage),uniffiCallStatus
+    )
+}
+}
+    
+    /**
+     * The stage that began last on this thread ends.
+     */
+open func onEnd(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_stagelistener_on_end(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeStage_lower(stage),uniffiCallStatus
+    )
+}
+}
+    
+
+    
+}
+
+
+
+// Put the implementation in a struct so we don't pollute the top-level namespace
+fileprivate struct UniffiCallbackInterfaceStageListener {
+
+    // Create the VTable using a series of closures.
+    // Swift automatically converts these into C callback functions.
+    //
+    // Store the vtable directly.
+    static let vtable: UniffiVTableCallbackInterfaceStageListener = UniffiVTableCallbackInterfaceStageListener(
+        uniffiFree: { (uniffiHandle: UInt64) -> () in
+            do {
+                try FfiConverterTypeStageListener.handleMap.remove(handle: uniffiHandle)
+            } catch {
+                print("Uniffi callback interface StageListener: handle missing in uniffiFree")
+            }
+        },
+        uniffiClone: { (uniffiHandle: UInt64) -> UInt64 in
+            do {
+                return try FfiConverterTypeStageListener.handleMap.clone(handle: uniffiHandle)
+            } catch {
+                fatalError("Uniffi callback interface StageListener: handle missing in uniffiClone")
+            }
+        },
+        onBegin: { (
+            uniffiHandle: UInt64,
+            stage: RustBuffer,
+            uniffiOutReturn: UnsafeMutableRawPointer,
+            uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
+        ) in
+            let makeCall = {
+                () throws -> () in
+                guard let uniffiObj = try? FfiConverterTypeStageListener.handleMap.get(handle: uniffiHandle) else {
+                    throw UniffiInternalError.unexpectedStaleHandle
+                }
+                return try uniffiObj.onBegin(
+                     stage: try FfiConverterTypeStage_lift(stage)
+                )
+            }
+
+            
+            let writeReturn = { () }
+            uniffiTraitInterfaceCallWithError(
+                callStatus: uniffiCallStatus,
+                makeCall: makeCall,
+                writeReturn: writeReturn,
+                lowerError: FfiConverterTypeListenerError_lower
+            )
+        },
+        onEnd: { (
+            uniffiHandle: UInt64,
+            stage: RustBuffer,
+            uniffiOutReturn: UnsafeMutableRawPointer,
+            uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
+        ) in
+            let makeCall = {
+                () throws -> () in
+                guard let uniffiObj = try? FfiConverterTypeStageListener.handleMap.get(handle: uniffiHandle) else {
+                    throw UniffiInternalError.unexpectedStaleHandle
+                }
+                return try uniffiObj.onEnd(
+                     stage: try FfiConverterTypeStage_lift(stage)
+                )
+            }
+
+            
+            let writeReturn = { () }
+            uniffiTraitInterfaceCallWithError(
+                callStatus: uniffiCallStatus,
+                makeCall: makeCall,
+                writeReturn: writeReturn,
+                lowerError: FfiConverterTypeListenerError_lower
+            )
+        }
+    )
+
+    // Rust stores this pointer for future callback invocations, so it must live
+    // for the process lifetime (not just for the init function call).
+    //
+    // `nonisolated(unsafe)` is needed under Swift 6 strict concurrency.
+    // This is safe because the pointee is initialized once during static init
+    // and never mutated by either side of the FFI.  Its fields are C function pointers.
+    nonisolated(unsafe) static let vtablePtr: UnsafePointer<UniffiVTableCallbackInterfaceStageListener> = {
+        let ptr = UnsafeMutablePointer<UniffiVTableCallbackInterfaceStageListener>.allocate(capacity: 1)
+        ptr.initialize(to: vtable)
+        return UnsafePointer(ptr)
+    }()
+}
+
+private func uniffiCallbackInitStageListener() {
+    uniffi_phasefront_ffi_fn_init_callback_vtable_stagelistener(UniffiCallbackInterfaceStageListener.vtablePtr)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeStageListener: FfiConverter {
+    fileprivate static let handleMap = UniffiHandleMap<StageListener>()
+
+    typealias FfiType = UInt64
+    typealias SwiftType = StageListener
+
+    public static func lift(_ handle: UInt64) throws -> StageListener {
+        if ((handle & 1) == 0) {
+            // Rust-generated handle, construct a new class that uses the handle to implement the
+            // interface
+            return StageListenerImpl(unsafeFromHandle: handle)
+        } else {
+            // Swift-generated handle, get the object from the handle map
+            return try handleMap.remove(handle: handle)
+        }
+    }
+
+    public static func lower(_ value: StageListener) -> UInt64 {
+         if let rustImpl = value as? StageListenerImpl {
+             // Rust-implemented object.  Clone the handle and return it
+            return rustImpl.uniffiCloneHandle()
+         } else {
+            // Swift object, generate a new vtable handle and return that.
+            return handleMap.insert(obj: value)
+         }
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> StageListener {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: StageListener, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStageListener_lift(_ handle: UInt64) throws -> StageListener {
+    return try FfiConverterTypeStageListener.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStageListener_lower(_ value: StageListener) -> UInt64 {
+    return FfiConverterTypeStageListener.lower(value)
+}
+
+
+
+
+
+
+/**
  * What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
  * lasers' light, what corrects its optics. Immutable; one serves many sessions.
  */
@@ -6504,6 +6759,161 @@ public func FfiConverterTypeRunningMode_lower(_ value: RunningMode) -> RustBuffe
 
 
 /**
+ * A part of the work on a frame.
+ */
+
+public enum Stage: Equatable, Hashable {
+    
+    /**
+     * All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
+     */
+    case frame
+    /**
+     * Colour: turned, converted, resized.
+     */
+    case colour
+    /**
+     * Depth: read, aligned, steadied, refined.
+     */
+    case depth
+    /**
+     * From the frame to the midpoint hologram.
+     */
+    case method
+    /**
+     * From the midpoint to the modulator.
+     */
+    case propagate
+    /**
+     * From the field to levels.
+     */
+    case encode
+    /**
+     * Steps at the midpoint, within `Encode`.
+     */
+    case midpoint
+    /**
+     * A frame that a GPU computes, with the ways there and back.
+     */
+    case gpu
+    /**
+     * Plans and memory of a rung are made.
+     */
+    case plan
+    /**
+     * A small view.
+     */
+    case preview
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension Stage: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeStage: FfiConverterRustBuffer {
+    typealias SwiftType = Stage
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Stage {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .frame
+        
+        case 2: return .colour
+        
+        case 3: return .depth
+        
+        case 4: return .method
+        
+        case 5: return .propagate
+        
+        case 6: return .encode
+        
+        case 7: return .midpoint
+        
+        case 8: return .gpu
+        
+        case 9: return .plan
+        
+        case 10: return .preview
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: Stage, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .frame:
+            writeInt(&buf, Int32(1))
+        
+        
+        case .colour:
+            writeInt(&buf, Int32(2))
+        
+        
+        case .depth:
+            writeInt(&buf, Int32(3))
+        
+        
+        case .method:
+            writeInt(&buf, Int32(4))
+        
+        
+        case .propagate:
+            writeInt(&buf, Int32(5))
+        
+        
+        case .encode:
+            writeInt(&buf, Int32(6))
+        
+        
+        case .midpoint:
+            writeInt(&buf, Int32(7))
+        
+        
+        case .gpu:
+            writeInt(&buf, Int32(8))
+        
+        
+        case .plan:
+            writeInt(&buf, Int32(9))
+        
+        
+        case .preview:
+            writeInt(&buf, Int32(10))
+        
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStage_lift(_ buf: RustBuffer) throws -> Stage {
+    return try FfiConverterTypeStage.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStage_lower(_ value: Stage) -> RustBuffer {
+    return FfiConverterTypeStage.lower(value)
+}
+
+
+
+/**
  * How hot the device is, as its system says.
  */
 
@@ -6795,6 +7205,30 @@ fileprivate struct FfiConverterOptionTypeSessionListener: FfiConverterRustBuffer
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeStageListener: FfiConverterRustBuffer {
+    typealias SwiftType = StageListener?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeStageListener.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeStageListener.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeCameras: FfiConverterRustBuffer {
     typealias SwiftType = Cameras?
 
@@ -7054,6 +7488,20 @@ public func sessionOptions(target: Target, method: Method? = nil)throws  -> Sess
     )
 })
 }
+/**
+ * Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
+ * stage that is under way it may hear the end alone.
+ *
+ * # Errors
+ * A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+ */
+public func setStageListener(listener: StageListener?)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_set_stage_listener(
+        FfiConverterOptionTypeStageListener.lower(listener),uniffiCallStatus
+    )
+}
+}
 
 private enum InitializationResult {
     case ok
@@ -7083,6 +7531,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_session_options() != 35800) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 45085) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 38987) {
@@ -7199,6 +7650,12 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 60919) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 57660) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 35155) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -7226,6 +7683,7 @@ private let initializationResult: InitializationResult = {
 
     uniffiCallbackInitLogListener()
     uniffiCallbackInitSessionListener()
+    uniffiCallbackInitStageListener()
     return InitializationResult.ok
 }()
 
