@@ -17,7 +17,7 @@ let package = Package(
             checksum: checksum),
         .target(
             name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], path: "ios/Sources/PhasefrontCore",
-            resources: [.copy("PrivacyInfo.xcprivacy")]),
+            resources: [.copy("PrivacyInfo.xcprivacy"), .copy("THIRD-PARTY.md")]),
         .target(name: "Phasefront", dependencies: ["PhasefrontCore"], path: "ios/Sources/Phasefront"),
     ]
 )

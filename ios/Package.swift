@@ -9,12 +9,16 @@ import PackageDescription
     let library = ProcessInfo.processInfo.environment["PHASEFRONT_LIBRARY"] ?? "../target/release"
     let ffi = Target.systemLibrary(name: "PhasefrontFFI", path: "Generated")
     let link: [LinkerSetting] = [.unsafeFlags(["-L", library]), .linkedLibrary("phasefront_ffi")]
-    let apple: [Target] = []
+    // Of the example app, what needs no framework of Apple's.
+    let more: [Target] = [
+        .target(name: "Benchmark", dependencies: ["PhasefrontCore"], path: "Example.swiftpm/Sources/Benchmark"),
+        .testTarget(name: "BenchmarkTests", dependencies: ["Benchmark", "PhasefrontCore"]),
+    ]
     let product = Product.library(name: "Phasefront", targets: ["PhasefrontCore"])
 #else
     let ffi = Target.binaryTarget(name: "PhasefrontFFI", path: "PhasefrontFFI.xcframework")
     let link: [LinkerSetting] = []
-    let apple = [Target.target(name: "Phasefront", dependencies: ["PhasefrontCore"])]
+    let more = [Target.target(name: "Phasefront", dependencies: ["PhasefrontCore"])]
     let product = Product.library(name: "Phasefront", targets: ["Phasefront"])
 #endif
 
@@ -25,8 +29,8 @@ let package = Package(
     targets: [
         ffi,
         .target(
-            name: "PhasefrontCore", dependencies: ["PhasefrontFFI"], resources: [.copy("PrivacyInfo.xcprivacy")],
-            linkerSettings: link),
+            name: "PhasefrontCore", dependencies: ["PhasefrontFFI"],
+            resources: [.copy("PrivacyInfo.xcprivacy"), .copy("THIRD-PARTY.md")], linkerSettings: link),
         .testTarget(name: "PhasefrontCoreTests", dependencies: ["PhasefrontCore"]),
-    ] + apple
+    ] + more
 )

@@ -25,6 +25,8 @@ xcodebuild -create-xcframework \
     -library "$(library aarch64-apple-ios)" -headers "$build/Headers" \
     -library "$build/simulator/libphasefront_ffi.a" -headers "$build/Headers" \
     -output ios/PhasefrontFFI.xcframework
+# For who takes the framework without the Swift package, which has the notices as a resource.
+cp LICENSE-MIT LICENSE-APACHE THIRD-PARTY.md ios/PhasefrontFFI.xcframework/
 
 if [ "${1:-}" = --release ]; then
     (cd ios && zip --quiet --recurse-paths --symlinks - PhasefrontFFI.xcframework) >"$build/PhasefrontFFI.xcframework.zip"

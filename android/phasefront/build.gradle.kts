@@ -65,6 +65,8 @@ android {
     sourceSets["main"].apply {
         // `core` has no class of Android's: it is tested on a JVM, by pom.xml and tests/kotlin.
         kotlin.srcDirs("src/core/kotlin", generated)
+        // The notices of what the library carries of others.
+        resources.srcDir("src/core/resources")
         jniLibs.srcDir(libraries)
     }
 

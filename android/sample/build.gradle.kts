@@ -30,8 +30,12 @@ android {
         }
     }
 
-    // The sample scene is the project's.
-    sourceSets["main"].assets.srcDir("../../samples")
+    sourceSets["main"].apply {
+        // `core` has no class of Android's but org.json: it is tested on a JVM, by pom.xml and tests/kotlin.
+        kotlin.srcDir("src/core/kotlin")
+        // The sample scene is the project's.
+        assets.srcDir("../../samples")
+    }
 }
 
 kotlin { compilerOptions { jvmTarget.set(org.jetbrains.kotlin.gradle.dsl.JvmTarget.JVM_17) } }

@@ -3,6 +3,7 @@
 use crate::error::{PhasefrontError, guard};
 use crate::options::Placement;
 use crate::statistics::FrameTimes;
+use num_complex::Complex32;
 use phasefront::output::Output;
 use phasefront::session;
 use std::sync::Arc;
@@ -110,6 +111,23 @@ impl RawHologram {
         })
     }
 
+    /// What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+    ///
+    /// # Errors
+    /// A z too far away.
+    pub fn refocus(&self, z_mm: f64) -> Result<Arc<RawPlanes>, PhasefrontError> {
+        guard(|| Ok(self.planes(Numbers::Amplitudes(self.core.refocus(z_mm / 1e3)?))))
+    }
+
+    /// The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+    /// and imaginary part of each pixel.
+    ///
+    /// # Errors
+    /// A z too far away.
+    pub fn field(&self, z_mm: f64) -> Result<Arc<RawPlanes>, PhasefrontError> {
+        guard(|| Ok(self.planes(Numbers::Field(self.core.field(z_mm / 1e3)?))))
+    }
+
     /// Image `image` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in
     /// the upper bits of a byte, the hologram where `placement` says.
     ///
@@ -129,6 +147,89 @@ impl RawHologram {
                 pixel_bytes: placement.layout.pixel_bytes() as u32,
             }))
         })
+    }
+}
+
+impl RawHologram {
+    /// `numbers` of its shape.
+    fn planes(&self, numbers: Numbers) -> Arc<RawPlanes> {
+        let (height, width) = self.core.shape();
+        Arc::new(RawPlanes {
+            numbers,
+            width: width as u32,
+            height: height as u32,
+            colours: self.core.colours() as u32,
+        })
+    }
+}
+
+/// Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+/// by hand.
+#[derive(Debug, uniffi::Object)]
+pub struct RawPlanes {
+    numbers: Numbers,
+    width: u32,
+    height: u32,
+    colours: u32,
+}
+
+#[derive(Debug)]
+enum Numbers {
+    Amplitudes(Vec<f32>),
+    Field(Vec<Complex32>),
+}
+
+#[uniffi::export]
+impl RawPlanes {
+    /// Another handle to the same planes: whoever reads their memory holds one.
+    pub fn share(self: Arc<Self>) -> Result<Arc<Self>, PhasefrontError> {
+        Ok(self)
+    }
+
+    /// Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+    ///
+    /// # Errors
+    /// Another colour.
+    pub fn plane_address(&self, colour: u32) -> Result<u64, PhasefrontError> {
+        guard(|| {
+            if colour >= self.colours {
+                return Err(PhasefrontError::Setting(format!(
+                    "there is no plane {colour}; there are {}, and 0 is the first",
+                    self.colours
+                )));
+            }
+            let size = u64::from(self.pixel_bytes()?) * u64::from(self.width) * u64::from(self.height);
+            let first = match &self.numbers {
+                Numbers::Amplitudes(values) => values.as_ptr() as u64,
+                Numbers::Field(values) => values.as_ptr() as u64,
+            };
+            Ok(first + u64::from(colour) * size)
+        })
+    }
+
+    /// Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+    pub fn pixel_bytes(&self) -> Result<u32, PhasefrontError> {
+        guard(|| {
+            Ok(match &self.numbers {
+                Numbers::Amplitudes(_) => size_of::<f32>() as u32,
+                Numbers::Field(_) => size_of::<Complex32>() as u32,
+            })
+        })
+    }
+
+    /// Pixels along x.
+    pub fn width(&self) -> Result<u32, PhasefrontError> {
+        Ok(self.width)
+    }
+
+    /// Pixels along y.
+    pub fn height(&self) -> Result<u32, PhasefrontError> {
+        Ok(self.height)
+    }
+
+    /// Planes: 3, or 1 of a display of one laser.
+    pub fn colours(&self) -> Result<u32, PhasefrontError> {
+        Ok(self.colours)
     }
 }
 

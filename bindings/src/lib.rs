@@ -19,6 +19,7 @@ mod options;
 mod session;
 mod statistics;
 mod target;
+mod trace;
 
 pub use display::{Display, display_from_toml};
 #[doc(hidden)]
@@ -28,7 +29,7 @@ pub use frame::{
     Cameras, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, FrameInfo, Intrinsics,
     Orientation, PlaneInfo, Pose, Rotation, YuvMatrix,
 };
-pub use hologram::{HologramInfo, RawHologram, RawImage};
+pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
@@ -38,6 +39,7 @@ pub use options::{
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};
 pub use target::Target;
+pub use trace::{Stage, StageListener, set_stage_listener};
 
 uniffi::setup_scaffolding!();
 

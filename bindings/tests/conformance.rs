@@ -2,13 +2,13 @@
 //! and Python run the same from `tests/conformance/`; the bits of all four must be equal.
 //!
 //! `PHASEFRONT_BLESS=1` writes the suite anew. Where `PHASEFRONT_CONFORMANCE` names a folder, the levels are left in
-//! its `levels.bin`, for the other languages to compare with.
+//! its `levels.bin`, and views of the holograms in its `seen.bin`, for the other languages to compare with.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
     Brightness, ColourFormat, ColourInfo, ConfidenceFormat, ConfidenceInfo, DepthFormat, DepthInfo, DepthRange,
-    Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawSession, Rotation, RunningMode,
-    SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
+    Encoding, FrameInfo, Method, Network, Orientation, PlaneInfo, RawHologram, RawPlanes, RawSession, Rotation,
+    RunningMode, SessionOptions, Target, YuvMatrix, display_from_toml, session_options,
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -29,6 +29,17 @@ fn levels(hologram: &RawHologram) -> Vec<u8> {
             unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
         })
         .collect()
+}
+
+/// The bytes of all numbers of `planes`, read as the other languages read them.
+fn numbers(planes: &RawPlanes) -> Vec<u8> {
+    let sides = [planes.pixel_bytes(), planes.width(), planes.height(), planes.colours()];
+    let len = sides.map(|side| side.unwrap() as usize).iter().product();
+    let address = planes.plane_address(0).unwrap() as usize;
+    assert!(planes.plane_address(planes.colours().unwrap()).is_err());
+    // SAFETY: the planes are alive, and lie there one after another.
+    #[allow(unsafe_code)]
+    unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
 }
 
 /// A network of `models/`.
@@ -166,15 +177,22 @@ fn info(frame: &Value) -> FrameInfo {
     }
 }
 
-/// The levels of a case's frames, one after another.
-fn run(case: &Value, frames: &[u8]) -> Vec<u8> {
+/// What a case's frames become, one after another.
+#[derive(Default)]
+struct Made {
+    levels: Vec<u8>,
+    /// Of each the amplitudes at 1.5 mm and the field at -1 mm.
+    seen: Vec<u8>,
+}
+
+fn run(case: &Value, frames: &[u8]) -> Made {
     let mode = match case["mode"].as_str().unwrap() {
         "image" => RunningMode::Image,
         "video" => RunningMode::Video,
         other => panic!("{other}"),
     };
     let session = RawSession::new(options(case), mode, None).unwrap();
-    let mut all = Vec::new();
+    let mut all = Made::default();
     for frame in case["frames"].as_array().unwrap() {
         let colour = |index: usize| bytes(frames, &frame["colour"]["planes"][index]);
         let hologram: Arc<RawHologram> = session
@@ -187,7 +205,9 @@ fn run(case: &Value, frames: &[u8]) -> Vec<u8> {
                 info(frame),
             )
             .unwrap();
-        all.extend(levels(&hologram));
+        all.levels.extend(levels(&hologram));
+        all.seen.extend(numbers(&hologram.refocus(1.5).unwrap()));
+        all.seen.extend(numbers(&hologram.field(-1.0).unwrap()));
     }
     all
 }
@@ -211,10 +231,10 @@ fn frames_become_the_levels_that_are_expected() {
     let suite: Value = serde_json::from_str(&suite).unwrap();
     let frames = std::fs::read(folder().join("frames.bin")).unwrap();
     let expected = std::fs::read(folder().join("levels.bin")).unwrap();
-    let mut all = Vec::new();
+    let mut all = Made::default();
     for case in suite["cases"].as_array().unwrap() {
-        let got = run(case, &frames);
-        let want = &expected[all.len()..][..got.len()];
+        let Made { levels: got, seen } = run(case, &frames);
+        let want = &expected[all.levels.len()..][..got.len()];
         // Another processor rounds otherwise in the last bit, which turns a level here and there. A calibrated
         // modulator's levels are in no order, so a turned one may be any other.
         let (count, most) = difference(&got, want, int(&case["levels"]) as i32);
@@ -228,12 +248,14 @@ fn frames_become_the_levels_that_are_expected() {
             most <= 1 || !case["lut"].is_null() || !case["calibration"].is_null(),
             "{name}: a level differs by {most}"
         );
-        all.extend(got);
+        all.levels.extend(got);
+        all.seen.extend(seen);
     }
-    assert_eq!(all.len(), expected.len());
+    assert_eq!(all.levels.len(), expected.len());
     if let Some(folder) = std::env::var_os("PHASEFRONT_CONFORMANCE") {
         std::fs::create_dir_all(&folder).unwrap();
-        std::fs::write(PathBuf::from(folder).join("levels.bin"), all).unwrap();
+        std::fs::write(PathBuf::from(&folder).join("levels.bin"), all.levels).unwrap();
+        std::fs::write(PathBuf::from(folder).join("seen.bin"), all.seen).unwrap();
     }
 }
 
@@ -581,7 +603,7 @@ mod write {
         one["display"] = json!(format!("{display}wavelengths_nm = [532]\n"));
         cases.push(one);
 
-        let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0)).collect();
+        let levels: Vec<u8> = cases.iter().flat_map(|case| run(case, &frames.0).levels).collect();
         let folder = folder();
         std::fs::write(folder.join("frames.bin"), &frames.0).unwrap();
         std::fs::write(folder.join("levels.bin"), levels).unwrap();

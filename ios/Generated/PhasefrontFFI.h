@@ -278,6 +278,20 @@ typedef void (*UniffiCallbackInterfaceSessionListenerMethod3)(uint64_t, uint64_t
     );
 
 #endif
+#ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
+#define UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
+typedef void (*UniffiCallbackInterfaceStageListenerMethod0)(uint64_t, RustBuffer, void* _Nonnull, 
+        RustCallStatus *_Nonnull uniffiCallStatus
+    );
+
+#endif
+#ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD1
+#define UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD1
+typedef void (*UniffiCallbackInterfaceStageListenerMethod1)(uint64_t, RustBuffer, void* _Nonnull, 
+        RustCallStatus *_Nonnull uniffiCallStatus
+    );
+
+#endif
 #ifndef UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_LOG_LISTENER
 #define UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_LOG_LISTENER
 typedef struct UniffiVTableCallbackInterfaceLogListener {
@@ -299,6 +313,16 @@ typedef struct UniffiVTableCallbackInterfaceSessionListener {
 } UniffiVTableCallbackInterfaceSessionListener;
 
 #endif
+#ifndef UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_STAGE_LISTENER
+#define UNIFFI_FFIDEF_V_TABLE_CALLBACK_INTERFACE_STAGE_LISTENER
+typedef struct UniffiVTableCallbackInterfaceStageListener {
+    UniffiCallbackInterfaceFree _Nonnull uniffiFree;
+    UniffiCallbackInterfaceClone _Nonnull uniffiClone;
+    UniffiCallbackInterfaceStageListenerMethod0 _Nonnull onBegin;
+    UniffiCallbackInterfaceStageListenerMethod1 _Nonnull onEnd;
+} UniffiVTableCallbackInterfaceStageListener;
+
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWHOLOGRAM
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWHOLOGRAM
 uint64_t uniffi_phasefront_ffi_fn_clone_rawhologram(uint64_t handle, RustCallStatus *_Nonnull out_status
@@ -307,6 +331,11 @@ uint64_t uniffi_phasefront_ffi_fn_clone_rawhologram(uint64_t handle, RustCallSta
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWHOLOGRAM
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWHOLOGRAM
 void uniffi_phasefront_ffi_fn_free_rawhologram(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_FIELD
+uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_field(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_INFO
@@ -332,6 +361,11 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_plane_len(uint64_t ptr, Rus
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_PREVIEW
 uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_preview(uint64_t ptr, double z_mm, uint32_t width, uint32_t height, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_REFOCUS
+uint64_t uniffi_phasefront_ffi_fn_method_rawhologram_refocus(uint64_t ptr, double z_mm, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWHOLOGRAM_SHARE
@@ -382,6 +416,46 @@ uint64_t uniffi_phasefront_ffi_fn_method_rawimage_share(uint64_t ptr, RustCallSt
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWIMAGE_WIDTH
 uint32_t uniffi_phasefront_ffi_fn_method_rawimage_width(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWPLANES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_RAWPLANES
+uint64_t uniffi_phasefront_ffi_fn_clone_rawplanes(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWPLANES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_RAWPLANES
+void uniffi_phasefront_ffi_fn_free_rawplanes(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_COLOURS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_COLOURS
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_colours(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_HEIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_HEIGHT
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_height(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PIXEL_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PIXEL_BYTES
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_pixel_bytes(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PLANE_ADDRESS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_PLANE_ADDRESS
+uint64_t uniffi_phasefront_ffi_fn_method_rawplanes_plane_address(uint64_t ptr, uint32_t colour, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_SHARE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_SHARE
+uint64_t uniffi_phasefront_ffi_fn_method_rawplanes_share(uint64_t ptr, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_WIDTH
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_RAWPLANES_WIDTH
+uint32_t uniffi_phasefront_ffi_fn_method_rawplanes_width(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_LOGLISTENER
@@ -569,6 +643,31 @@ uint64_t uniffi_phasefront_ffi_fn_constructor_target_with_look_up_table(RustBuff
 RustBuffer uniffi_phasefront_ffi_fn_method_target_display(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_STAGELISTENER
+uint64_t uniffi_phasefront_ffi_fn_clone_stagelistener(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FREE_STAGELISTENER
+void uniffi_phasefront_ffi_fn_free_stagelistener(uint64_t handle, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_INIT_CALLBACK_VTABLE_STAGELISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_INIT_CALLBACK_VTABLE_STAGELISTENER
+void uniffi_phasefront_ffi_fn_init_callback_vtable_stagelistener(const UniffiVTableCallbackInterfaceStageListener* _Nonnull vtable
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_BEGIN
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_BEGIN
+void uniffi_phasefront_ffi_fn_method_stagelistener_on_begin(uint64_t ptr, RustBuffer stage, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_END
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_STAGELISTENER_ON_END
+void uniffi_phasefront_ffi_fn_method_stagelistener_on_end(uint64_t ptr, RustBuffer stage, RustCallStatus *_Nonnull out_status
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_VERSION
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_VERSION
 RustBuffer uniffi_phasefront_ffi_fn_func_version(RustCallStatus *_Nonnull out_status
@@ -593,6 +692,11 @@ RustBuffer uniffi_phasefront_ffi_fn_func_built_in_pair(double offset_mm, RustCal
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SESSION_OPTIONS
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SESSION_OPTIONS
 RustBuffer uniffi_phasefront_ffi_fn_func_session_options(uint64_t target, RustBuffer method, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SET_STAGE_LISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_FUNC_SET_STAGE_LISTENER
+void uniffi_phasefront_ffi_fn_func_set_stage_listener(RustBuffer listener, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_FFI_PHASEFRONT_FFI_RUSTBUFFER_ALLOC
@@ -885,6 +989,18 @@ uint16_t uniffi_phasefront_ffi_checksum_func_session_options(void
     
 );
 #endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_STAGE_LISTENER
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_FUNC_SET_STAGE_LISTENER
+uint16_t uniffi_phasefront_ffi_checksum_func_set_stage_listener(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_FIELD
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_field(void
+    
+);
+#endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_INFO
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_INFO
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_info(void
@@ -912,6 +1028,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_plane_len(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_PREVIEW
 uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_preview(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWHOLOGRAM_REFOCUS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawhologram_refocus(void
     
 );
 #endif
@@ -960,6 +1082,42 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_share(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWIMAGE_WIDTH
 uint16_t uniffi_phasefront_ffi_checksum_method_rawimage_width(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_COLOURS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_COLOURS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_colours(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_HEIGHT
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_HEIGHT
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_height(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PIXEL_BYTES
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PIXEL_BYTES
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PLANE_ADDRESS
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_PLANE_ADDRESS
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_SHARE
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_SHARE
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_share(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_WIDTH
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_RAWPLANES_WIDTH
+uint16_t uniffi_phasefront_ffi_checksum_method_rawplanes_width(void
     
 );
 #endif
@@ -1062,6 +1220,18 @@ uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_change
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_TARGET_DISPLAY
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_TARGET_DISPLAY
 uint16_t uniffi_phasefront_ffi_checksum_method_target_display(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_BEGIN
+uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_STAGELISTENER_ON_END
+uint16_t uniffi_phasefront_ffi_checksum_method_stagelistener_on_end(void
     
 );
 #endif

@@ -27,9 +27,10 @@ mod video;
 mod view;
 
 use clap::{Parser, Subcommand};
-use phasefront_lab::Result;
+use phasefront_lab::{Result, trace};
 use std::io::Write;
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]
@@ -43,6 +44,9 @@ pub(crate) struct Phasefront {
     /// Print the result as JSON on stdout.
     #[arg(long, global = true)]
     json: bool,
+    /// Write when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing.
+    #[arg(long, global = true, value_name = "FILE.json")]
+    trace: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -83,8 +87,16 @@ impl Phasefront {
         let pool = pool
             .build()
             .map_err(|e| phasefront_lab::Error::Input(format!("--threads: {e}")))?;
-        let json = self.json;
-        pool.install(|| match self.command {
+        match &self.trace {
+            None => pool.install(|| self.command.run(self.threads, self.json)),
+            Some(path) => trace::traced(path, || pool.install(|| self.command.run(self.threads, self.json))),
+        }
+    }
+}
+
+impl Command {
+    fn run(self, threads: Option<u16>, json: bool) -> Result<()> {
+        match self {
             Command::Hologram(command) => command.run(json),
             Command::Refocus(command) => command.run(json),
             Command::View(command) => command.run(json),
@@ -94,12 +106,12 @@ impl Phasefront {
             Command::Dataset(command) => command.run(json),
             Command::Seeds(command) => command.run(json),
             Command::Networks(command) => command.run(json),
-            Command::Bench(command) => command.run(self.threads.map(usize::from), json),
+            Command::Bench(command) => command.run(threads.map(usize::from), json),
             Command::Occlusion(command) => command.run(json),
             Command::Evaluate(command) => command.run(json),
             Command::Study(command) => command.run(json),
             Command::Video(command) => {
-                let threads = self.threads.and_then(|n| NonZeroUsize::new(n.into()));
+                let threads = threads.and_then(|n| NonZeroUsize::new(n.into()));
                 command.run(threads, json)
             }
             Command::Multiplex(command) => command.run(json),
@@ -111,7 +123,7 @@ impl Phasefront {
             Command::Screens(command) => command.run(json),
             Command::Link(command) => command.run(json),
             Command::Calibrate(command) => command.run(json),
-        })
+        }
     }
 }
 

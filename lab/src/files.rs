@@ -133,20 +133,8 @@ pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
 ) -> Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
     let refuse = |e: std::io::Error| Error::file(path, format!("cannot be written: {e}"));
-    if path.is_dir() {
-        return Err(Error::file(path, "is a folder; a file's name is needed"));
-    }
-    if !folder.is_dir() {
-        return Err(Error::file(
-            path,
-            format!("cannot be written: there is no folder {}", folder.display()),
-        ));
-    }
+    let folder = check_place(path)?;
     remove_left_over(folder);
     let mut builder = tempfile::Builder::new();
     builder.prefix(TEMPORARY);
@@ -165,6 +153,24 @@ pub fn write_atomically(
     temporary.as_file().sync_all().map_err(refuse)?;
     temporary.persist(path).map_err(|e| refuse(e.error))?;
     Ok(())
+}
+
+/// The folder in which a file at `path` would lie.
+pub(crate) fn check_place(path: &Path) -> Result<&Path> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(Error::file(path, "is a folder; a file's name is needed"));
+    }
+    if !folder.is_dir() {
+        return Err(Error::file(
+            path,
+            format!("cannot be written: there is no folder {}", folder.display()),
+        ));
+    }
+    Ok(folder)
 }
 
 /// How names of temporary files and folders begin.

@@ -38,6 +38,7 @@ pub mod simulated_display;
 pub mod sm_lbm;
 pub mod study;
 pub mod sweep_study;
+pub mod trace;
 pub mod video;
 pub mod viewer;
 

@@ -6,12 +6,11 @@ use crate::files::{DisplayFile, Hologram, HologramInfo};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::output::Levels;
 use phasefront::target::Aberration;
-use phasefront::unstable::panel::PanelPlan;
-use phasefront::unstable::refocus::{Refocus, phase_only_field};
+use phasefront::unstable::refocus::{Refocus, shown_field};
 use phasefront::unstable::wave::aperture::Opening;
 use phasefront::unstable::wave::asm::Propagator;
-use std::f32::consts::TAU;
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
 pub struct AberratedOptics(Vec<Propagator>);
@@ -114,35 +113,23 @@ impl Hologram {
             .collect())
     }
 
-    /// The light that its levels make behind the modulator of `file`. What the panel adds is left out: it undoes the
-    /// panel's own bend, or turns all light alike.
+    /// The light that its levels make behind the modulator of `file`.
     fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
-        let shape = self.shape();
-        let (height, width) = shape;
-        let scale = self.info().scale.unwrap_or(1.0);
-        let display = &file.target.display;
-        let mut field = Array3::from_elem((self.info().display.colours(), height, width), Complex32::ZERO);
-        let values = field.as_slice_mut().expect("standard layout");
-        match self {
-            Hologram::PhaseOnly(levels, _) => {
-                let response = file.target.response.clone().centred(height, width)?;
-                let levels = levels.as_slice().expect("standard layout");
-                phase_only_field(levels, &response, scale, values);
+        let (height, width) = self.shape();
+        let info = self.info();
+        let (ours, theirs) = (info.display.bits(), file.target.display.bits());
+        let levels = match self {
+            Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
+            Hologram::Words(..) if ours != theirs => {
+                return Err(Error::Input(format!(
+                    "a hologram of {ours} bits on a display of {theirs}; both must have as many"
+                )));
             }
-            Hologram::Words(levels, info) => {
-                let turn = TAU / (1u32 << info.display.bits()) as f32;
-                for (value, level) in values.iter_mut().zip(levels) {
-                    *value = Complex32::from_polar(scale, f32::from(*level) * turn);
-                }
-            }
+            Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
             Hologram::Complex(..) => unreachable!("a complex hologram has no levels"),
-        }
-        if let Some(panel) = PanelPlan::new(&file.target.panel, display, shape)? {
-            panel.remove(values);
-        }
-        if let Some(light) = &file.target.illumination {
-            light.shine(values, shape, (display.height(), display.width()));
-        }
-        Ok(field)
+        };
+        let field = shown_field(levels, info.scale.unwrap_or(1.0), &file.target, (height, width))?;
+        let shape = (info.display.colours(), height, width);
+        Ok(Array3::from_shape_vec(shape, field).expect("a value for each level"))
     }
 }

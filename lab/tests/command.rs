@@ -79,6 +79,33 @@ fn psnr(a: &Array3<f32>, b: &Array3<f32>, y: std::ops::Range<usize>, x: std::ops
 }
 
 #[test]
+fn a_trace_has_the_stages_of_the_work() {
+    let folder = Folder::new().with_frame();
+    let hologram = [
+        "hologram",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "-o",
+        "out.png",
+        "--trace",
+    ];
+    folder.succeeds(&[&hologram[..], &["trace.json"]].concat());
+    let events: serde_json::Value = serde_json::from_slice(&fs::read(folder.path("trace.json")).unwrap()).unwrap();
+    let names = |phase: &str| -> Vec<_> {
+        let of_phase = events.as_array().unwrap().iter().filter(|event| event["ph"] == phase);
+        of_phase
+            .map(|event| event["name"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    assert_eq!(names("B"), ["method", "propagate", "encode"]);
+    assert_eq!(names("E"), ["method", "propagate", "encode"]);
+    let nowhere = [&hologram[..], &["nowhere/trace.json"]].concat();
+    folder.refuses(&nowhere, 1, &["there is no folder nowhere"]);
+}
+
+#[test]
 fn a_hologram_travels_with_all_that_refocus_needs() {
     let folder = Folder::new().with_frame();
     fs::write(

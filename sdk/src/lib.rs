@@ -94,6 +94,7 @@ mod registration;
 mod seeded;
 pub mod session;
 mod slm;
+mod stage;
 mod sweep;
 pub mod target;
 mod wave;

@@ -4,13 +4,13 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::brightness::{Brightness, Past, Percentile};
-use crate::clock::Instant;
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::error::Result;
 use crate::panel::PanelPlan;
 use crate::registration::RegistrationPlan;
 use crate::slm;
+use crate::stage::stage;
 use crate::target::Target;
 use crate::wave::asm::Propagator;
 use crate::wave::fft::ConvolveScratch;
@@ -165,24 +165,24 @@ impl Modulator {
         levels: &mut [u8],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
-        let start = Instant::now();
+        let stage = stage!("encode");
         if scratch.phases.is_empty() {
             let scale = self.brightness.scale(field, past, &mut scratch.percentile);
             let scale = (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder);
             return Modulation {
                 scale,
-                encode: start.elapsed(),
+                encode: stage.end(),
             };
         }
         let mut phases = std::mem::take(&mut scratch.phases);
-        let scale = self.phases_after(past, field, &mut phases, scratch).scale;
+        let scale = self.phases(past, field, &mut phases, scratch);
         if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {
             self.encoder.levels(&phases, levels);
         }
         scratch.phases = phases;
         Modulation {
             scale,
-            encode: start.elapsed(),
+            encode: stage.end(),
         }
     }
 
@@ -198,20 +198,35 @@ impl Modulator {
         words: &mut [u16],
         scratch: &mut ModulatorScratch,
     ) -> Modulation {
-        let modulation = self.phases_after(None, field, phases, scratch);
-        slm::linear_words(phases, self.bits, words);
-        modulation
+        self.modulate_words_after(None, field, phases, words, scratch)
     }
 
-    /// [`Self::modulate_after`] to phases in \[0, 2π), for modulators whose levels do not fit bytes.
-    pub(crate) fn phases_after(
+    /// [`Self::modulate_words`] of a frame that follows another, as [`Self::modulate_after`].
+    pub(crate) fn modulate_words_after(
+        &self,
+        past: Option<Past>,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        words: &mut [u16],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let stage = stage!("encode");
+        let scale = self.phases(past, field, phases, scratch);
+        slm::linear_words(phases, self.bits, words);
+        Modulation {
+            scale,
+            encode: stage.end(),
+        }
+    }
+
+    /// Phases in \[0, 2π), and the amplitude that full light stands for.
+    fn phases(
         &self,
         past: Option<Past>,
         field: &mut [Complex32],
         phases: &mut [f32],
         scratch: &mut ModulatorScratch,
-    ) -> Modulation {
-        let start = Instant::now();
+    ) -> f32 {
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
         let mut midpoint = self.midpoint.as_ref().zip(scratch.midpoint.as_mut());
         if let Some((plan, of)) = &mut midpoint {
@@ -219,15 +234,13 @@ impl Modulator {
         }
         let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
         if let Some((plan, of)) = midpoint {
+            let _stage = stage!("midpoint");
             plan.correct(scale, phases, of);
         }
         if let Some(panel) = &self.panel {
             panel.add(phases);
         }
-        Modulation {
-            scale,
-            encode: start.elapsed(),
-        }
+        scale
     }
 }
 

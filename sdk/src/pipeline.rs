@@ -2,12 +2,12 @@
 //! of each. Many frames are a session's work.
 
 use crate::brightness::Past;
-use crate::clock::Instant;
 use crate::encode::EncoderOptions;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
 use crate::method::{Method, MethodPlan, MethodScratch};
 use crate::modulator::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
+use crate::stage::stage;
 use crate::target::Target;
 use num_complex::Complex32;
 use std::time::Duration;
@@ -111,15 +111,16 @@ impl Pipeline {
         field: &mut [Complex32],
         scratch: &mut PipelineScratch,
     ) -> Result<(Duration, Duration)> {
-        let start = Instant::now();
+        let stage = stage!("method");
         let of_method = &mut scratch.method;
         self.method.field_after(follows, frame, field, of_method)?;
         if !self.modulator.keeps_phase() {
             remove_mean_phase(field, self.modulator.colours());
         }
-        let predicted = Instant::now();
+        let method = stage.end();
+        let stage = stage!("propagate");
         self.modulator.propagate(field, &mut scratch.modulator);
-        Ok((predicted - start, predicted.elapsed()))
+        Ok((method, stage.end()))
     }
 
     /// Encodes a field at the modulator, (C, H, W), into `levels`, as [`Modulator::modulate`].
@@ -142,15 +143,16 @@ impl Pipeline {
             .modulate_after(past, field, levels, &mut scratch.modulator)
     }
 
-    /// [`Modulator::phases_after`].
-    pub(crate) fn phases_after(
+    /// [`Modulator::modulate_words_after`].
+    pub(crate) fn modulate_words_after(
         &self,
         past: Option<Past>,
         field: &mut [Complex32],
         phases: &mut [f32],
+        words: &mut [u16],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        self.modulator.phases_after(past, field, phases, &mut scratch.modulator)
+        (self.modulator).modulate_words_after(past, field, phases, words, &mut scratch.modulator)
     }
 
     /// [`Modulator::modulate_words`].

@@ -5,12 +5,17 @@
 
 use crate::display::Display;
 use crate::error::{Error, Result};
+use crate::output::Levels;
+use crate::panel::PanelPlan;
 use crate::slm::Response;
+use crate::target::Target;
 use crate::wave::aperture::{Aperture, Opening};
 use crate::wave::asm::{self, Padding, Transfer};
 use crate::wave::fft::{Fft2, Scratch};
+use crate::wave::zernike::Aberration;
 use num_complex::Complex32;
 use rayon::prelude::*;
+use std::f32::consts::TAU;
 
 /// A plan for one shape, display and range of z. Immutable; shared between threads.
 pub struct Refocus {
@@ -167,4 +172,70 @@ pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &
     for (value, level) in field.iter_mut().zip(levels) {
         *value = shown[*level as usize];
     }
+}
+
+/// The light behind the modulator of `target` that shows the `levels` of a hologram of (H, W) = `shape`, full light
+/// standing for amplitude `scale`: (C, H, W). What the panel adds is left out: it undoes the panel's own bend, or turns
+/// all light alike.
+///
+/// # Errors
+/// A table or a panel for fewer pixels.
+///
+/// # Panics
+/// If `levels` has not C·H·W values.
+pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usize, usize)) -> Result<Vec<Complex32>> {
+    let mut field = vec![Complex32::ZERO; target.display.colours() * shape.0 * shape.1];
+    match levels {
+        Levels::Bytes(levels) => {
+            let response = target.response.clone().centred(shape.0, shape.1)?;
+            phase_only_field(levels, &response, scale, &mut field);
+        }
+        Levels::Words(levels) => {
+            assert_eq!(levels.len(), field.len());
+            let turn = TAU / (1u32 << target.display.bits()) as f32;
+            for (value, level) in field.iter_mut().zip(levels) {
+                *value = Complex32::from_polar(scale, f32::from(*level) * turn);
+            }
+        }
+    }
+    if let Some(panel) = PanelPlan::new(&target.panel, &target.display, shape)? {
+        panel.remove(&mut field);
+    }
+    if let Some(light) = &target.illumination {
+        light.shine(&mut field, shape, target.modulator());
+    }
+    Ok(field)
+}
+
+/// The field that [`shown_field`] becomes through the optics of `target` and its aperture at `z_m`, without the
+/// carrier: (C, H, W).
+///
+/// # Errors
+/// As [`shown_field`] and [`Refocus::new`]; a correction that moves light farther than can be padded.
+///
+/// # Panics
+/// As [`shown_field`].
+pub fn seen_field(
+    levels: Levels<'_>,
+    scale: f32,
+    target: &Target,
+    shape: (usize, usize),
+    z_m: f64,
+) -> Result<Vec<Complex32>> {
+    // Before there is a field, for a z too far away is refused here.
+    let opening = Opening::centred(target.display.aperture_radius());
+    let plan = Refocus::new(shape.0, shape.1, &target.display, &[z_m], Some(opening))?;
+    let aberration = target.correction.as_ref().map(Aberration::reversed);
+    let optics = target.propagators(shape, 1, 0.0, aberration.as_ref())?;
+    let mut field = shown_field(levels, scale, target, shape)?;
+    let mut through = optics.as_ref().map(|optics| optics[0].scratch());
+    let mut scratch = plan.scratch();
+    for (colour, plane) in field.chunks_exact_mut(shape.0 * shape.1).enumerate() {
+        if let (Some(optics), Some(through)) = (&optics, &mut through) {
+            optics[colour].propagate(plane, through);
+        }
+        let spectrum = plan.spectrum(plane, colour, &mut scratch);
+        plan.field(&spectrum, z_m, plane, &mut scratch)?;
+    }
+    Ok(field)
 }

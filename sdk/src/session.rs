@@ -22,6 +22,7 @@ mod quality;
 mod queue;
 mod stages;
 mod statistics;
+mod sync;
 mod threads;
 
 use crate::depth::stream::DepthOptions;

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 const ROOMS: &[&str] = &[
     "error",
     "clock",
+    "stage",
     "wave",
     "display",
     "slm",

@@ -4,12 +4,15 @@
 mod camera;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
+use num_complex::Complex32;
 use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{DropReason, Event, Quality, Rung, RunningMode, Submission, Thermal};
-use phasefront::target::Response;
+use phasefront::target::{Aberration, Response};
+use phasefront::unstable::refocus::Refocus;
+use phasefront::unstable::wave::aperture::Opening;
 use phasefront::{Brightness, Display, EncoderOptions, Error, Method, Session, SessionOptions, Sweep, Target};
 use std::sync::mpsc;
 
@@ -465,6 +468,63 @@ fn a_preview_beyond_any_screen_is_refused_before_it_is_planned() {
     let mut rgba = vec![0; 4 << 15];
     let refused = hologram.preview(0.0, 1, 1 << 15, &mut rgba).unwrap_err().to_string();
     assert!(refused.contains("16384 pixels a side"), "{refused}");
+}
+
+#[test]
+fn a_whole_view_is_what_the_levels_become_behind_the_aperture() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    for (offset_mm, bits) in [(0, 8), (3, 5), (1, 10)] {
+        let text = format!("width = {W}\nheight = {H}\noffset_mm = {offset_mm}\nbits = {bits}");
+        let display = Display::from_toml(&text).unwrap();
+        let session = Session::new(
+            SessionOptions::new(display.clone(), Method::Sweep(Sweep::for_display(&display))),
+            RunningMode::Image,
+        )
+        .unwrap();
+        let hologram = session.process(&frame(1, &scene, &metres)).unwrap();
+        let turn = std::f32::consts::TAU / (1 << bits) as f32;
+        let light = |level: f32| Complex32::from_polar(hologram.scale(), turn * level);
+        let shown: Vec<Complex32> = match hologram.words() {
+            Some(words) => words.iter().map(|level| light(f32::from(*level))).collect(),
+            None => hologram.levels().iter().map(|level| light(f32::from(*level))).collect(),
+        };
+        let opening = Opening::centred(display.aperture_radius());
+        for z_m in [0.0, 1.5e-3, -2e-3] {
+            let plan = Refocus::new(H, W, &display, &[z_m], Some(opening)).unwrap();
+            let wanted = plan.focal_stack(&shown, &[z_m]).unwrap().remove(0);
+            let (seen, field) = (hologram.refocus(z_m).unwrap(), hologram.field(z_m).unwrap());
+            assert_eq!((seen.len(), field.len()), (3 * H * W, 3 * H * W));
+            let error: f32 = seen.iter().zip(&wanted).map(|(a, b)| (a - b).powi(2)).sum();
+            let power: f32 = wanted.iter().map(|a| a * a).sum();
+            assert!((error / power).sqrt() < 1e-6, "{text} {z_m}: {error} of {power}");
+            assert!(seen.iter().zip(&field).all(|(a, b)| *a == b.norm()));
+        }
+        let refused = |z_m: f64| hologram.refocus(z_m).unwrap_err().to_string();
+        assert!(refused(f64::NAN).contains("must be finite"), "{}", refused(f64::NAN));
+        assert!(refused(100.0).contains("a shorter distance"), "{}", refused(100.0));
+    }
+}
+
+#[test]
+fn a_whole_view_passes_the_optics_that_are_corrected() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let correction = Aberration::new([[0.6, 0.2, -0.1, 0.1, 0.05]; 3]).unwrap();
+    let [plain, corrected] = [None, Some(correction)].map(|correction| {
+        let target = Target {
+            correction,
+            ..Display::default().with_size(H, W).unwrap().into()
+        };
+        let method = Method::Sweep(Sweep::for_display(&target.display));
+        let session = Session::new(SessionOptions::new(target, method), RunningMode::Image).unwrap();
+        session.process(&frame(1, &scene, &metres)).unwrap()
+    });
+    let [a, b] = [&plain, &corrected].map(|hologram| hologram.refocus(0.0).unwrap());
+    let apart = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
+    let power = apart(&a, &vec![0.0; a.len()]);
+    assert_ne!(plain.levels(), corrected.levels());
+    assert!(apart(&a, &b) < 0.02 * power, "{} of {power}", apart(&a, &b));
 }
 
 #[test]

@@ -17,6 +17,13 @@ public struct Logger: Sendable {
     public func info(_: OSLogMessage) {}
     public func debug(_: OSLogMessage) {}
 }
+public final class OSLog: Sendable { public init(subsystem: String, category: String) {} }
+public struct OSSignpostType: Sendable {
+    public static let begin = OSSignpostType()
+    public static let end = OSSignpostType()
+}
+public struct OSSignpostID: Sendable { public init(log: OSLog, object: AnyObject) {} }
+public func os_signpost(_: OSSignpostType, log: OSLog, name: StaticString, signpostID: OSSignpostID) {}
 extension ProcessInfo {
     public enum ThermalState: Int, Sendable { case nominal, fair, serious, critical }
 }

@@ -209,6 +209,9 @@ typedef struct PfNetwork PfNetwork;
 // What a session makes, and how.
 typedef struct PfOptions PfOptions;
 
+// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
+typedef struct PfPlanes PfPlanes;
+
 // A session. Every call may come from any thread, at any moment, but for pf_session_free, which is the last.
 typedef struct PfSession PfSession;
 
@@ -255,6 +258,23 @@ typedef struct PfHologramInfo {
   // How long each stage took.
   struct PfFrameTimes times;
 } PfHologramInfo;
+
+// What planes are.
+typedef struct PfPlanesInfo {
+  // The first plane's first number, row by row without gaps; the planes of the other colours follow it. Valid until
+  // pf_planes_free.
+  const float *data;
+  // How many numbers lie there.
+  size_t length;
+  // Pixels along x.
+  uint32_t width;
+  // Pixels along y.
+  uint32_t height;
+  // How many planes there are: 3, or 1 of a display of one laser.
+  uint32_t colours;
+  // Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+  uint32_t numbers;
+} PfPlanesInfo;
 
 // How a hologram is put on its modulator.
 typedef struct PfPlacement {
@@ -475,6 +495,20 @@ enum PfStatus pf_hologram_preview(const struct PfHologram *hologram,
                                   uint32_t width,
                                   uint32_t height,
                                   struct PfImage **image);
+
+// What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. It transforms all of it: not
+// for every frame. A z too far away is refused.
+enum PfStatus pf_hologram_refocus(const struct PfHologram *hologram, double z_mm, struct PfPlanes **planes);
+
+// The complex field that the levels make behind the aperture at z, 0 the midpoint, without the carrier: real and
+// imaginary part of each pixel. It transforms all of the hologram: not for every frame. A z too far away is refused.
+enum PfStatus pf_hologram_field(const struct PfHologram *hologram, double z_mm, struct PfPlanes **planes);
+
+// What planes are, and where they lie.
+enum PfStatus pf_planes_info(const struct PfPlanes *planes, struct PfPlanesInfo *info);
+
+// Ends planes.
+void pf_planes_free(struct PfPlanes *planes);
 
 // Image `number` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in the
 // upper bits of a byte, the hologram where `placement` says.

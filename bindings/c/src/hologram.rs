@@ -2,7 +2,7 @@
 
 use crate::pointer::{free, give, object, pick, read};
 use crate::status::{PfStatus, call};
-use phasefront_ffi::{FrameTimes, Layout, Placement, RawHologram, RawImage};
+use phasefront_ffi::{FrameTimes, Layout, Placement, RawHologram, RawImage, RawPlanes};
 use std::sync::Arc;
 
 /// The hologram of one frame: modulator levels of its colours.
@@ -116,6 +116,28 @@ pub struct PfImageInfo {
     pub pixel_bytes: u32,
 }
 
+/// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
+pub struct PfPlanes(Arc<RawPlanes>);
+
+/// What planes are.
+#[repr(C)]
+#[derive(Debug, Clone, Copy)]
+pub struct PfPlanesInfo {
+    /// The first plane's first number, row by row without gaps; the planes of the other colours follow it. Valid until
+    /// pf_planes_free.
+    pub data: *const f32,
+    /// How many numbers lie there.
+    pub length: usize,
+    /// Pixels along x.
+    pub width: u32,
+    /// Pixels along y.
+    pub height: u32,
+    /// How many planes there are: 3, or 1 of a display of one laser.
+    pub colours: u32,
+    /// Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+    pub numbers: u32,
+}
+
 /// What is known of a hologram.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mut PfHologramInfo) -> PfStatus {
@@ -183,6 +205,66 @@ pub unsafe extern "C" fn pf_hologram_preview(
             Ok(object(PfImage(hologram.preview(z_mm, width, height)?)))
         })
     })
+}
+
+/// What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. It transforms all of it: not
+/// for every frame. A z too far away is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_hologram_refocus(
+    hologram: *const PfHologram,
+    z_mm: f64,
+    planes: *mut *mut PfPlanes,
+) -> PfStatus {
+    // SAFETY: the rules of this border.
+    call(|| unsafe {
+        give(planes, "planes", || {
+            Ok(object(PfPlanes(read(hologram, "hologram")?.0.refocus(z_mm)?)))
+        })
+    })
+}
+
+/// The complex field that the levels make behind the aperture at z, 0 the midpoint, without the carrier: real and
+/// imaginary part of each pixel. It transforms all of the hologram: not for every frame. A z too far away is refused.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_hologram_field(
+    hologram: *const PfHologram,
+    z_mm: f64,
+    planes: *mut *mut PfPlanes,
+) -> PfStatus {
+    // SAFETY: the rules of this border.
+    call(|| unsafe {
+        give(planes, "planes", || {
+            Ok(object(PfPlanes(read(hologram, "hologram")?.0.field(z_mm)?)))
+        })
+    })
+}
+
+/// What planes are, and where they lie.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_planes_info(planes: *const PfPlanes, info: *mut PfPlanesInfo) -> PfStatus {
+    // SAFETY: the rules of this border.
+    call(|| unsafe {
+        give(info, "info", || {
+            let planes = &read(planes, "planes")?.0;
+            let (width, height, colours) = (planes.width()?, planes.height()?, planes.colours()?);
+            let numbers = planes.pixel_bytes()? / size_of::<f32>() as u32;
+            Ok(PfPlanesInfo {
+                data: planes.plane_address(0)? as usize as *const f32,
+                length: [width, height, colours, numbers].iter().map(|n| *n as usize).product(),
+                width,
+                height,
+                colours,
+                numbers,
+            })
+        })
+    })
+}
+
+/// Ends planes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn pf_planes_free(planes: *mut PfPlanes) {
+    // SAFETY: the rules of this border.
+    unsafe { free(planes) };
 }
 
 /// Image `number` of those that the modulator's driver takes, of the modulator's resolution: levels as they are, in the

@@ -22,9 +22,9 @@ pub use frame::{
     PfIntrinsics, PfPlane, PfRotation, PfYuvMatrix,
 };
 pub use hologram::{
-    PfFrameTimes, PfHologram, PfHologramInfo, PfImage, PfImageInfo, PfLayout, PfPlacement, pf_hologram_free,
-    pf_hologram_info, pf_hologram_levels, pf_hologram_output, pf_hologram_preview, pf_hologram_z_at, pf_image_free,
-    pf_image_info,
+    PfFrameTimes, PfHologram, PfHologramInfo, PfImage, PfImageInfo, PfLayout, PfPlacement, PfPlanes, PfPlanesInfo,
+    pf_hologram_field, pf_hologram_free, pf_hologram_info, pf_hologram_levels, pf_hologram_output, pf_hologram_preview,
+    pf_hologram_refocus, pf_hologram_z_at, pf_image_free, pf_image_info, pf_planes_free, pf_planes_info,
 };
 pub use log::{PfLogLevel, PfOnLog, pf_set_log_listener};
 pub use network::{PfNetwork, pf_network_built_in, pf_network_free, pf_network_from_bytes, pf_network_from_file};

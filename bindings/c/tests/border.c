@@ -133,6 +133,16 @@ static void stills(const PfOptions *options) {
     for (int x = 0; x < WIDTH; x++) assert(info.data[x] == blue[WIDTH - 1 - x]);
     refused(pf_hologram_output(hologram, &placement, 3, &driven), PF_STATUS_SETTING, "no image 3");
     refused(pf_hologram_levels(hologram, 3, &blue, &length), PF_STATUS_SETTING, "no plane 3");
+    PfPlanes *planes = NULL;
+    PfPlanesInfo numbers;
+    refused(pf_hologram_refocus(hologram, 1e5, &planes), PF_STATUS_SETTING, "a shorter distance");
+    refused(pf_hologram_field(NULL, 0, &planes), PF_STATUS_SETTING, "hologram");
+    ok(pf_hologram_field(hologram, 0, &planes));
+    ok(pf_planes_info(planes, &numbers));
+    assert(numbers.width == WIDTH && numbers.height == HEIGHT && numbers.colours == 3 && numbers.numbers == 2);
+    assert(numbers.length == 3 * 2 * WIDTH * HEIGHT && numbers.data[0] == numbers.data[0]);
+    pf_planes_free(planes);
+    pf_planes_free(NULL);
     pf_image_free(seen);
     pf_image_free(driven);
     pf_hologram_free(hologram);

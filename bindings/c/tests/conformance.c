@@ -154,35 +154,57 @@ static PfOptions *options_of(const cJSON *json, const char *suite, const char *m
     return options;
 }
 
-// The levels that a case leaves, compared with `expected`; how many there were.
-static size_t run(const cJSON *json, const char *suite, const char *models, const uint8_t *memory,
-                  const uint8_t *expected, size_t left) {
+// A part of what Rust left, read from its beginning to its end.
+typedef struct {
+    const uint8_t *next;
+    size_t left;
+} Expected;
+
+static void compare(const char *name, const void *got, size_t length, Expected *expected) {
+    if (expected->left < length || memcmp(got, expected->next, length) != 0) {
+        fprintf(stderr, "%s: not the bits that Rust has\n", name);
+        exit(1);
+    }
+    expected->next += length;
+    expected->left -= length;
+}
+
+static void compare_planes(const char *name, PfPlanes *planes, Expected *expected) {
+    PfPlanesInfo info;
+    ok(pf_planes_info(planes, &info), name);
+    compare(name, info.data, sizeof(float) * info.length, expected);
+    pf_planes_free(planes);
+}
+
+// Runs a case and compares its levels, and what is seen of them, with what is expected.
+static void run(const cJSON *json, const char *suite, const char *models, const uint8_t *memory, Expected *expected,
+                Expected *seen) {
+    const char *name = text(json, "name");
     PfOptions *options = options_of(json, suite, models);
     PfSession *session = NULL;
-    ok(pf_session_new(options, pick(text(json, "mode"), MODES, 2), NULL, &session), text(json, "name"));
+    ok(pf_session_new(options, pick(text(json, "mode"), MODES, 2), NULL, &session), name);
     pf_options_free(options);
-    size_t done = 0;
     const cJSON *one = NULL;
     cJSON_ArrayForEach(one, of(json, "frames")) {
         PfFrame frame = frame_of(one, memory);
         PfHologram *hologram = NULL;
-        ok(pf_session_process(session, &frame, &hologram), text(json, "name"));
+        ok(pf_session_process(session, &frame, &hologram), name);
         PfHologramInfo info;
         ok(pf_hologram_info(hologram, &info), "info");
         for (uint32_t colour = 0; colour < info.colours; colour++) {
             const uint8_t *levels = NULL;
             size_t length = 0;
             ok(pf_hologram_levels(hologram, colour, &levels, &length), "levels");
-            if (left - done < length || memcmp(levels, expected + done, length) != 0) {
-                fprintf(stderr, "%s: not the bits that Rust has\n", text(json, "name"));
-                exit(1);
-            }
-            done += length;
+            compare(name, levels, length, expected);
         }
+        PfPlanes *planes = NULL;
+        ok(pf_hologram_refocus(hologram, 1.5, &planes), name);
+        compare_planes(name, planes, seen);
+        ok(pf_hologram_field(hologram, -1.0, &planes), name);
+        compare_planes(name, planes, seen);
         pf_hologram_free(hologram);
     }
     pf_session_free(session);
-    return done;
 }
 
 int main(int count, char **arguments) {
@@ -191,26 +213,31 @@ int main(int count, char **arguments) {
         return 2;
     }
     const char *suite = arguments[1];
-    size_t length = 0, memory_length = 0, expected_length = 0;
+    size_t length = 0, memory_length = 0;
+    Expected expected = {0}, seen = {0};
     uint8_t *cases = read_file(suite, "cases.json", &length);
     uint8_t *memory = read_file(suite, "frames.bin", &memory_length);
-    uint8_t *expected = read_file(arguments[3], "levels.bin", &expected_length);
+    uint8_t *levels = read_file(arguments[3], "levels.bin", &expected.left);
+    uint8_t *views = read_file(arguments[3], "seen.bin", &seen.left);
+    expected.next = levels;
+    seen.next = views;
+    size_t all = expected.left;
     cJSON *json = cJSON_Parse((const char *)cases);
-    size_t at = 0;
     int ran = 0;
     const cJSON *one = NULL;
     cJSON_ArrayForEach(one, of(json, "cases")) {
-        at += run(one, suite, arguments[2], memory, expected + at, expected_length - at);
+        run(one, suite, arguments[2], memory, &expected, &seen);
         ran++;
     }
-    if (ran == 0 || at != expected_length) {
-        fprintf(stderr, "%d cases have %zu levels; the suite has %zu\n", ran, at, expected_length);
+    if (ran == 0 || expected.left > 0 || seen.left > 0) {
+        fprintf(stderr, "%d cases leave %zu levels and %zu bytes of views\n", ran, expected.left, seen.left);
         return 1;
     }
-    printf("%d cases, %zu levels: the bits that Rust has\n", ran, at);
+    printf("%d cases, %zu levels: the bits that Rust has\n", ran, all);
     cJSON_Delete(json);
     free(cases);
     free(memory);
-    free(expected);
+    free(levels);
+    free(views);
     return 0;
 }

@@ -44,6 +44,7 @@ from ._ffi import (
     Rung,
     RunningMode,
     SessionOptions,
+    Stage,
     Statistics,
     Thermal,
     YuvMatrix,
@@ -53,7 +54,7 @@ from ._ffi import (
 )
 from ._frame import Frame
 from ._hologram import Hologram
-from ._session import Dropped, Event, Failed, Made, QualityChanged, Session, send_log, session_options
+from ._session import Dropped, Event, Failed, Made, QualityChanged, Session, send_log, send_stages, session_options
 from ._target import Target
 
 __all__ = [
@@ -61,8 +62,8 @@ __all__ = [
     "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo",
     "Intrinsics", "Layout", "LogLevel", "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError",
     "Placement", "Pose", "Quality", "QualityChange", "QualityChanged", "QualityReason", "Rotation", "Rung", "RunningMode",
-    "Session", "SessionOptions", "Statistics", "Target", "Thermal", "YuvMatrix", "__version__", "built_in_pair",
-    "display_from_toml", "send_log", "session_options", "version",
+    "Session", "SessionOptions", "Stage", "Statistics", "Target", "Thermal", "YuvMatrix", "__version__", "built_in_pair",
+    "display_from_toml", "send_log", "send_stages", "session_options", "version",
 ]  # fmt: skip
 
 #: The version of the library.

@@ -354,6 +354,32 @@ class RunningMode(enum.Enum):
     VIDEO = 1
     LIVE_STREAM = 2
 
+class Stage(enum.Enum):
+    """A part of the work on a frame.
+
+    Values:
+        FRAME: All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
+        COLOUR: Colour: turned, converted, resized.
+        DEPTH: Depth: read, aligned, steadied, refined.
+        METHOD: From the frame to the midpoint hologram.
+        PROPAGATE: From the midpoint to the modulator.
+        ENCODE: From the field to levels.
+        MIDPOINT: Steps at the midpoint, within `Encode`.
+        GPU: A frame that a GPU computes, with the ways there and back.
+        PLAN: Plans and memory of a rung are made.
+        PREVIEW: A small view.
+    """
+    FRAME = 0
+    COLOUR = 1
+    DEPTH = 2
+    METHOD = 3
+    PROPAGATE = 4
+    ENCODE = 5
+    MIDPOINT = 6
+    GPU = 7
+    PLAN = 8
+    PREVIEW = 9
+
 class Thermal(enum.Enum):
     """How hot the device is, as its system says.
 
@@ -760,6 +786,13 @@ def set_log_listener(level: LogLevel, listener: LogListener | None) -> None:
     Errors: A process that already logs elsewhere.
     """
 
+def set_stage_listener(listener: StageListener | None) -> None:
+    """Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
+    stage that is under way it may hear the end alone.
+
+    Errors: A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+    """
+
 def version() -> str:
     """The version of the library."""
 
@@ -825,6 +858,27 @@ class LogListener:
     def on_log(self, level: LogLevel, message: str) -> None:
         """One message."""
 
+class RawPlanes:
+    """Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+    by hand.
+    """
+    def __init__(self, *args: object, **kwargs: object) -> None: ...
+    def colours(self) -> int:
+        """Planes: 3, or 1 of a display of one laser."""
+    def height(self) -> int:
+        """Pixels along y."""
+    def pixel_bytes(self) -> int:
+        """Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part."""
+    def plane_address(self, colour: int) -> int:
+        """Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+
+        Errors: Another colour.
+        """
+    def share(self) -> RawPlanes:
+        """Another handle to the same planes: whoever reads their memory holds one."""
+    def width(self) -> int:
+        """Pixels along x."""
+
 class RawImage:
     """An image, row by row without gaps. For the layers by hand."""
     def __init__(self, *args: object, **kwargs: object) -> None: ...
@@ -846,6 +900,12 @@ class RawHologram:
     planes are read.
     """
     def __init__(self, *args: object, **kwargs: object) -> None: ...
+    def field(self, z_mm: float) -> RawPlanes:
+        """The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+        and imaginary part of each pixel.
+
+        Errors: A z too far away.
+        """
     def info(self) -> HologramInfo:
         """What is known of it."""
     def output(self, placement: Placement, image: int) -> RawImage:
@@ -866,6 +926,11 @@ class RawHologram:
         """What an eye focused at `z_mm` sees, `width` × `height` pixels.
 
         Errors: An empty image, or a z too far away.
+        """
+    def refocus(self, z_mm: float) -> RawPlanes:
+        """What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+
+        Errors: A z too far away.
         """
     def share(self) -> RawHologram:
         """Another handle to the same hologram: whoever reads its memory holds one."""
@@ -931,3 +996,12 @@ class SessionListener:
         """A frame could not be processed. The session goes on."""
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
         """The frames after this one are made on another rung of the ladder."""
+
+class StageListener:
+    """Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
+    not call the library. What it throws is ignored.
+    """
+    def on_begin(self, stage: Stage) -> None:
+        """A stage begins on this thread."""
+    def on_end(self, stage: Stage) -> None:
+        """The stage that began last on this thread ends."""

@@ -6,6 +6,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ from . import _ffi, _png
 from ._ffi import Display, Encoding, HologramInfo, Layout, PhasefrontError, Placement
 from ._memory import array_at
 from ._target import Target
+
+Number = TypeVar("Number", numpy.float32, numpy.complex64)
 
 
 @dataclass(frozen=True)
@@ -58,11 +61,12 @@ class Hologram:
     def __init__(self, raw: _ffi.RawHologram, purpose: Purpose):
         self._raw, self._purpose = raw, purpose
         self.info = raw.info()
+        self._shape = (self.info.colours, self.info.height, self.info.width)
 
     @property
     def levels(self) -> NDArray[numpy.uint8]:
         """The modulator levels in place, uint8, (3, H, W): red, green, blue; (1, H, W) of one laser. Read only."""
-        return array_at(self._raw, self._raw.plane_address(0), (self.info.colours, self.info.height, self.info.width))
+        return array_at(self._raw, self._raw.plane_address(0), self._shape, numpy.uint8)
 
     def z_at(self, x: float, y: float) -> float:
         """z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm."""
@@ -76,7 +80,27 @@ class Hologram:
         if width < 1 or height < 1:
             raise PhasefrontError.Setting(f"a preview of {width}×{height} is empty; each side must be at least 1")
         image = self._raw.preview(z_mm, width, height)
-        return array_at(image, image.address(), (height, width, 4))
+        return array_at(image, image.address(), (height, width, 4), numpy.uint8)
+
+    def refocus(self, z_mm: float) -> NDArray[numpy.float32]:
+        """What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white, float32,
+        (C, H, W). Read only.
+
+        Raises `PhasefrontError.Setting` for a z too far away.
+        """
+        return self._numbers(self._raw.refocus(z_mm), numpy.float32)
+
+    def field(self, z_mm: float = 0.0) -> NDArray[numpy.complex64]:
+        """The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, complex64, (C, H, W),
+        without the carrier exp(i2πz/λ). Read only.
+
+        Raises `PhasefrontError.Setting` for a z too far away.
+        """
+        return self._numbers(self._raw.field(z_mm), numpy.complex64)
+
+    def _numbers(self, planes: _ffi.RawPlanes, kind: type[Number]) -> NDArray[Number]:
+        """Planes as an array of their kind of numbers."""
+        return array_at(planes, planes.plane_address(0), self._shape, kind)
 
     def output(self, placement: Placement | None = None, image: int = 0) -> NDArray[numpy.uint8]:
         """Image `image` of those that the modulator's driver takes, of the modulator's resolution, levels as they are;
@@ -85,7 +109,7 @@ class Hologram:
         Raises `PhasefrontError.Setting` for an image that the layout has not.
         """
         output = self._raw.output(placement or Placement(layout=Layout.RGB), image)
-        return array_at(output, output.address(), (output.height(), output.width(), output.pixel_bytes()))
+        return array_at(output, output.address(), (output.height(), output.width(), output.pixel_bytes()), numpy.uint8)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the levels as a PNG that carries what they are for, as the command `phasefront hologram` does:

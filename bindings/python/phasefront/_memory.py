@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy
 
 from ._ffi import PhasefrontError
 from .ffi import phasefront_ffi as _generated
+
+Kind = TypeVar("Kind", bound=numpy.generic)
 
 #: What is generated counts bytes in 32 bits.
 MOST_BYTES = 2**31 - 1
@@ -50,10 +52,10 @@ class _ByRefBytes:
 _generated._UniffiFfiConverterByRefBytes = _ByRefBytes
 
 
-def array_at(owner: object, address: int, shape: tuple[int, ...]) -> numpy.typing.NDArray[numpy.uint8]:
+def array_at(owner: object, address: int, shape: tuple[int, ...], kind: type[Kind]) -> numpy.typing.NDArray[Kind]:
     """The library's memory as an array that keeps its owner alive, read only."""
-    memory: Any = (ctypes.c_uint8 * int(numpy.prod(shape))).from_address(address)
+    memory: Any = (ctypes.c_uint8 * (numpy.dtype(kind).itemsize * int(numpy.prod(shape)))).from_address(address)
     memory.owner = owner
-    array = numpy.frombuffer(memory, numpy.uint8).reshape(shape)
+    array = numpy.frombuffer(memory, kind).reshape(shape)
     array.flags.writeable = False
     return array

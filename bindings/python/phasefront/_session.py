@@ -23,6 +23,7 @@ from ._ffi import (
     Rung,
     RunningMode,
     SessionOptions,
+    Stage,
     Statistics,
     Thermal,
 )
@@ -232,3 +233,20 @@ class _LogHandler(_ffi.LogListener):
 def send_log(level: LogLevel, handler: Callable[[LogLevel, str], object] | None) -> None:
     """Sends the library's messages of `level` and above to `handler`, which is called on any thread; None for silence."""
     _ffi.set_log_listener(level, None if handler is None else _LogHandler(handler))
+
+
+class _StageHandler(_ffi.StageListener):
+    def __init__(self, handle: Callable[[Stage, bool], object]):
+        self._handle = handle
+
+    def on_begin(self, stage: Stage) -> None:
+        self._handle(stage, True)
+
+    def on_end(self, stage: Stage) -> None:
+        self._handle(stage, False)
+
+
+def send_stages(handler: Callable[[Stage, bool], object] | None) -> None:
+    """Calls `handler` with each stage of a frame that begins (True) or ends (False), on the thread that computes it, where
+    stages lie within one another; None for silence. It must not call the library."""
+    _ffi.set_stage_listener(None if handler is None else _StageHandler(handler))

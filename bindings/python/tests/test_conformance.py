@@ -94,7 +94,8 @@ def target_of(case):
     return display if case["lut"] is None else Target.with_look_up_table(display, bytes(case["lut"]))
 
 
-def levels_of(case, memory, network):
+def made_of(case, memory, network):
+    """The levels of a case's frames, and what is seen of them."""
     encoding = case["encoding"]
     changes = {"encoding": ENCODING[encoding] if encoding in ENCODING else Encoding.DEEP(prefilter=model(encoding))}
     if case["brightness"] is not None:
@@ -106,15 +107,18 @@ def levels_of(case, memory, network):
     options = session_options(method, target_of(case), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]
     with Session(options, mode) as session:
-        return b"".join(session.process(frame_of(frame, memory)).levels.tobytes() for frame in case["frames"])
+        made = [session.process(frame_of(frame, memory)) for frame in case["frames"]]
+    seen = b"".join(h.refocus(1.5).tobytes() + h.field(-1.0).tobytes() for h in made)
+    return b"".join(h.levels.tobytes() for h in made), seen
 
 
 def test_frames_become_the_levels_that_are_expected(suite, network):
     cases, memory = suite
-    got = [levels_of(case, memory, network) for case in cases]
+    got, seen = zip(*(made_of(case, memory, network) for case in cases), strict=True)
     folder = os.environ.get("PHASEFRONT_CONFORMANCE")
     if folder:
         assert b"".join(got) == (pathlib.Path(folder) / "levels.bin").read_bytes(), "not the bits that Rust has"
+        assert b"".join(seen) == (pathlib.Path(folder) / "seen.bin").read_bytes(), "not what Rust sees"
     expected = (SUITE / "levels.bin").read_bytes()
     for case, levels in zip(cases, got, strict=True):
         expected, here = expected[len(levels) :], numpy.frombuffer(expected[: len(levels)], numpy.uint8)

@@ -81,7 +81,7 @@ def test_what_cannot_be_written_is_named(display, tmp_path):
 
 
 @pytest.mark.skipif(not COMMAND.exists(), reason=f"the command is not built: {COMMAND}")
-def test_the_command_sees_what_a_preview_shows(tmp_path):
+def test_the_command_sees_what_a_view_shows(tmp_path):
     target = Target.with_look_up_table(phasefront.Display(width=64, height=48, offset_mm=2), bytes(range(256)))
     hologram = saved(tmp_path / "hologram.png", target=target)
     view = [COMMAND, "refocus", "hologram.png", "--z-mm", "1", "--json", "-o", "view.png"]
@@ -91,3 +91,5 @@ def test_the_command_sees_what_a_preview_shows(tmp_path):
     seen = matplotlib.imread(tmp_path / "view.png")[..., :3]
     shown = hologram.preview(1, 64, 48)[..., :3] / 255
     assert numpy.corrcoef(seen.ravel(), shown.ravel())[0, 1] > 0.9
+    whole = hologram.refocus(1).clip(0, 1).transpose(1, 2, 0)
+    numpy.testing.assert_allclose(seen, whole, atol=0.6 / 255)

@@ -90,6 +90,46 @@ def test_a_preview_shows_the_picture_and_a_tap_gives_z(options):
         hologram.preview(0.0, 67108864, 1)
 
 
+def seen_by_equation(hologram, display, z_mm):
+    """Eq. 2 and Eq. 8 in NumPy: the levels' light, cut by a round aperture, taken to z, without the carrier."""
+    height, width = hologram.levels.shape[1:]
+    light = hologram.info.scale * numpy.exp(2j * numpy.pi * hologram.levels / 2**display.bits)
+    fy, fx = numpy.meshgrid(numpy.fft.fftfreq(4 * height), numpy.fft.fftfreq(4 * width), indexing="ij")
+    spectrum = numpy.fft.fft2(light, (4 * height, 4 * width)) * (numpy.hypot(fx, fy) <= 0.5)
+    for plane, nm in zip(spectrum, (display.red_nm, display.green_nm, display.blue_nm), strict=True):
+        wave = 1e9 / nm
+        mu2 = (fx**2 + fy**2) / (display.pitch_um * 1e-6) ** 2
+        plane *= numpy.exp(2j * numpy.pi * (z_mm - display.offset_mm) * 1e-3 * (numpy.sqrt(wave**2 - mu2) - wave))
+    return numpy.fft.ifft2(spectrum)[:, :height, :width]
+
+
+@pytest.mark.parametrize("offset_mm", [0, 2.5])
+def test_a_whole_view_is_what_the_equations_say(offset_mm):
+    display = phasefront.Display(width=120, height=90, offset_mm=offset_mm)
+    with Session(session_options(target=display)) as session:
+        hologram = session.process(still())
+    for z_mm in (0.0, 1.5):
+        field, wanted = hologram.field(z_mm), seen_by_equation(hologram, display, z_mm)
+        assert field.dtype == numpy.complex64 and field.shape == (3, 90, 120) and not field.flags.writeable
+        # They differ in how far they pad, which the light at the border sees.
+        inner = (slice(None), slice(12, -12), slice(12, -12))
+        error = numpy.linalg.norm((field - wanted)[inner]) / numpy.linalg.norm(wanted[inner])
+        assert error < 0.02
+        numpy.testing.assert_allclose(hologram.refocus(z_mm), abs(field), rtol=1e-5)
+    del hologram
+    gc.collect()
+    assert numpy.isfinite(field).all()
+
+
+def test_a_view_from_too_far_away_is_refused(options):
+    with Session(options) as session:
+        hologram = session.process(still())
+    with pytest.raises(PhasefrontError.Setting, match="a shorter distance or a smaller frame"):
+        hologram.refocus(1e5)
+    with pytest.raises(PhasefrontError.Setting, match="must be finite"):
+        hologram.field(float("nan"))
+
+
 def test_output_is_what_the_modulator_takes(options):
     with Session(options) as session:
         hologram = session.process(still())
@@ -439,6 +479,18 @@ def test_messages_reach_the_log(options):
     phasefront.send_log(LogLevel.INFO, None)
     Session(options).close()
     assert [level for level, _ in messages] == [LogLevel.INFO] and "IMAGE" in messages[0][1].upper()
+
+
+def test_stages_begin_and_end(options):
+    stages = []
+    with Session(options) as session:
+        phasefront.send_stages(lambda stage, begins: stages.append((stage.name.lower(), begins)))
+        session.process(still())
+        phasefront.send_stages(None)
+        session.process(still())
+    inside = ["colour", "depth", "method", "propagate", "encode"]
+    within = [(stage, begins) for stage in inside for begins in (True, False)]
+    assert stages == [("frame", True), *within, ("frame", False)]
 
 
 def test_a_log_handler_that_raises_is_told_of_the_next_message(options):

@@ -90,6 +90,38 @@ namespace Phasefront
         }
     }
 
+    /// <summary>Numbers at each pixel of each colour of a hologram: amplitudes, or a field.</summary>
+    public sealed class Planes
+    {
+        /// <summary>Planes row by row without gaps, one colour after another.</summary>
+        public float[] Values { get; }
+        /// <summary>Pixels along x.</summary>
+        public int Width { get; }
+        /// <summary>Pixels along y.</summary>
+        public int Height { get; }
+        /// <summary>How many planes there are: 3, or 1 of a display of one laser.</summary>
+        public int Colours { get; }
+        /// <summary>Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.</summary>
+        public int Numbers { get; }
+
+        // Takes what C gave, and ends it.
+        internal Planes(IntPtr planes)
+        {
+            try
+            {
+                Check(Native.pf_planes_info(planes, out var info));
+                Values = new float[checked((int)info.Length)];
+                Marshal.Copy(info.Data, Values, 0, Values.Length);
+                (Width, Height) = ((int)info.Width, (int)info.Height);
+                (Colours, Numbers) = ((int)info.Colours, (int)info.Numbers);
+            }
+            finally
+            {
+                Native.pf_planes_free(planes);
+            }
+        }
+    }
+
     /// <summary>The hologram of one frame: modulator levels of its colours. Dispose gives its memory back to its session.</summary>
     public sealed class Hologram : NativeObject
     {
@@ -127,6 +159,22 @@ namespace Phasefront
         {
             Check(Native.pf_hologram_preview(this, zMm, checked((uint)width), checked((uint)height), out var image));
             return new Image(image);
+        }
+
+        /// <summary>What an eye focused at z sees of the whole hologram: amplitudes, of which 1 is white. Not for every
+        /// frame.</summary>
+        public Planes Refocus(double zMm)
+        {
+            Check(Native.pf_hologram_refocus(this, zMm, out var planes));
+            return new Planes(planes);
+        }
+
+        /// <summary>The complex field that the levels make behind the aperture at z, 0 the midpoint, without the
+        /// carrier. Not for every frame.</summary>
+        public Planes Field(double zMm = 0)
+        {
+            Check(Native.pf_hologram_field(this, zMm, out var planes));
+            return new Planes(planes);
         }
 
         /// <summary>Image <paramref name="number"/> of those that the modulator's driver takes.</summary>

@@ -59,6 +59,17 @@ namespace Phasefront
     }
 
     [StructLayout(LayoutKind.Sequential)]
+    internal struct NativePlanes
+    {
+        public IntPtr Data;
+        public UIntPtr Length;
+        public uint Width;
+        public uint Height;
+        public uint Colours;
+        public uint Numbers;
+    }
+
+    [StructLayout(LayoutKind.Sequential)]
     internal struct NativeImage
     {
         public IntPtr Data;
@@ -161,6 +172,10 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_levels(Hologram hologram, uint colour, out IntPtr levels, out UIntPtr length);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_z_at(Hologram hologram, double x, double y, out double zMm);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_preview(Hologram hologram, double zMm, uint width, uint height, out IntPtr image);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_refocus(Hologram hologram, double zMm, out IntPtr planes);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_field(Hologram hologram, double zMm, out IntPtr planes);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_planes_info(IntPtr planes, out NativePlanes info);
+        [DllImport(Library, CallingConvention = C)] public static extern void pf_planes_free(IntPtr planes);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_hologram_output(Hologram hologram, ref NativePlacement placement, uint number, out IntPtr image);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_hologram_free(IntPtr hologram);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_image_info(IntPtr image, out NativeImage info);

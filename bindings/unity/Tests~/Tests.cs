@@ -1,5 +1,5 @@
-// The package's tests, which need no Unity: `Tests SUITE MODELS LEVELS VERSION` runs the conformance suite, whose levels must be
-// the bits that Rust left, and what a listener hears.
+// The package's tests, which need no Unity: `Tests SUITE MODELS LEVELS VERSION` runs the conformance suite, whose
+// levels and views must be the bits that Rust left, and what a listener hears.
 using System;
 using System.Collections;
 using System.Collections.Generic;
@@ -29,7 +29,8 @@ internal static class Tests
             return 2;
         }
         Require(Library.Version == arguments[3], "version " + Library.Version);
-        Conformance(arguments[0], arguments[1], File.ReadAllBytes(Path.Combine(arguments[2], "levels.bin")));
+        Func<string, byte[]> left = name => File.ReadAllBytes(Path.Combine(arguments[2], name));
+        Conformance(arguments[0], arguments[1], left("levels.bin"), left("seen.bin"));
         Mistakes();
         Live();
         return 0;
@@ -43,21 +44,22 @@ internal static class Tests
     private static IDictionary<string, object> Object(object json) => (IDictionary<string, object>)json;
     private static int Int(object json) => Convert.ToInt32(json);
 
-    private static void Conformance(string suite, string models, byte[] expected)
+    private static void Conformance(string suite, string models, byte[] expected, byte[] views)
     {
         var json = new JavaScriptSerializer { MaxJsonLength = int.MaxValue };
         var all = Object(json.DeserializeObject(File.ReadAllText(Path.Combine(suite, "cases.json"))));
         var memory = File.ReadAllBytes(Path.Combine(suite, "frames.bin"));
-        var got = new List<byte>();
+        var (got, seen) = (new List<byte>(), new List<byte>());
         var cases = (IEnumerable)all["cases"];
         var ran = 0;
         foreach (var one in cases)
         {
-            Run(Object(one), suite, models, memory, got);
+            Run(Object(one), suite, models, memory, got, seen);
             Require(got.SequenceEqual(expected.Take(got.Count)), Object(one)["name"] + ": the bits that Rust has");
             ran++;
         }
         Require(ran > 0 && got.Count == expected.Length, "all levels of the suite");
+        Require(seen.SequenceEqual(views), "what Rust sees of them");
         Console.WriteLine("{0} cases, {1} levels: the bits that Rust has", ran, got.Count);
     }
 
@@ -155,7 +157,16 @@ internal static class Tests
         }
     }
 
-    private static void Run(IDictionary<string, object> one, string suite, string models, byte[] memory, List<byte> got)
+    private static byte[] BytesOf(Planes planes)
+    {
+        Require(planes.Values.Length == planes.Numbers * planes.Width * planes.Height * planes.Colours, "all numbers");
+        var bytes = new byte[sizeof(float) * planes.Values.Length];
+        Buffer.BlockCopy(planes.Values, 0, bytes, 0, bytes.Length);
+        return bytes;
+    }
+
+    private static void Run(
+        IDictionary<string, object> one, string suite, string models, byte[] memory, List<byte> got, List<byte> seen)
     {
         using (var target = TargetOf(one, suite))
         using (var options = OptionsOf(one, target, models))
@@ -163,7 +174,11 @@ internal static class Tests
         {
             foreach (var frame in (IEnumerable)one["frames"])
                 using (var hologram = session.Process(FrameOf(frame, memory)))
+                {
                     for (var colour = 0; colour < hologram.Info.Colours; colour++) got.AddRange(hologram.Levels(colour));
+                    seen.AddRange(BytesOf(hologram.Refocus(1.5)));
+                    seen.AddRange(BytesOf(hologram.Field(-1)));
+                }
         }
     }
 
@@ -218,6 +233,7 @@ internal static class Tests
                     var image = hologram.Output(Layout.Rgba);
                     Require(image.Bytes.Length == 48 * 36 * 4 && image.Bytes[0] == hologram.Levels(0)[0], "its image");
                     Require(hologram.Preview(hologram.ZAt(0.5, 0.5), 24, 18).Width == 24, "its preview");
+                    Refused(Status.Setting, "a shorter distance", () => hologram.Refocus(1e5));
                 }
                 Refused(Status.Timestamp, "2", () => session.Process(frame));
                 frame.TimestampNs = 3;

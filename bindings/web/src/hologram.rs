@@ -1,7 +1,7 @@
 //! Results, which leave the module as copies.
 
 use crate::error::{Answer, object, of_core, setting};
-use js_sys::{Array, Object, Uint8Array, Uint8ClampedArray};
+use js_sys::{Array, Float32Array, Object, Uint8Array, Uint8ClampedArray};
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{FrameTimes, Hologram};
 use std::time::Duration;
@@ -68,6 +68,25 @@ impl RawHologram {
         let mut rgba = vec![0; Hologram::preview_bytes(h, w).map_err(of_core)?];
         self.core.preview(z_mm / 1e3, h, w, &mut rgba).map_err(of_core)?;
         Ok(Uint8ClampedArray::from(&rgba[..]))
+    }
+
+    /// What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white, (C, H, W).
+    ///
+    /// # Errors
+    /// `setting`: a z too far away.
+    pub fn refocus(&self, z_mm: f64) -> Answer<Float32Array> {
+        let amplitudes = self.core.refocus(z_mm / 1e3).map_err(of_core)?;
+        Ok(Float32Array::from(&amplitudes[..]))
+    }
+
+    /// The complex field behind the aperture at `z_mm`: real and imaginary part of each pixel, (C, H, W, 2).
+    ///
+    /// # Errors
+    /// `setting`: a z too far away.
+    pub fn field(&self, z_mm: f64) -> Answer<Float32Array> {
+        let field = self.core.field(z_mm / 1e3).map_err(of_core)?;
+        let parts: Vec<f32> = field.iter().flat_map(|value| [value.re, value.im]).collect();
+        Ok(Float32Array::from(&parts[..]))
     }
 
     /// One of the images that the modulator's driver takes: an object of the form `OutputImage`. `flips` are those of

@@ -68,6 +68,14 @@ export async function run() {
   const same = grey.data.every((level, index) => level === levels[16 * 12 + index]);
   if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0)
     throw new Error(JSON.stringify(info));
+  // What is seen is the field's amplitude, whose 1 is white.
+  const [seen, field] = [hologram.refocus(1), hologram.field(1)];
+  const worst = Math.max(
+    ...seen.map((amplitude, i) => Math.abs(amplitude - Math.hypot(field[2 * i], field[2 * i + 1]))),
+  );
+  if (seen.length !== levels.length || field.length !== 2 * levels.length || !(worst < 1e-5))
+    throw new Error(`${worst} apart`);
+  refused("setting", "", () => hologram.field(1e9));
   hologram.close();
   hologram.close();
   refused("session", "hologram is closed", () => hologram.levels);

@@ -8,13 +8,13 @@ struct ExampleApp: App {
     var body: some Scene {
         WindowGroup {
             ContentView(show: show)
-                .task { await show.run() }
         }
     }
 }
 
 struct ContentView: View {
     @ObservedObject var show: Show
+    @State private var isMeasuring = false
 
     var body: some View {
         VStack {
@@ -32,10 +32,18 @@ struct ContentView: View {
                     .rotationEffect(.degrees(180))
                 Text("far")
             }
-            Text(show.statistics)
-                .font(.caption.monospacedDigit())
+            HStack {
+                Text(show.statistics)
+                    .font(.caption.monospacedDigit())
+                Button("Benchmark") { isMeasuring = true }
+            }
         }
         .padding()
+        // The session is closed while the benchmark is shown, so that nothing else computes.
+        .task(id: isMeasuring) {
+            if !isMeasuring { await show.run() }
+        }
+        .sheet(isPresented: $isMeasuring) { BenchmarkView() }
         .alert("Phasefront", isPresented: $show.hasError) {
             Button("OK") {}
         } message: {

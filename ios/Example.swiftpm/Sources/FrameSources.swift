@@ -44,23 +44,11 @@ final class SampleSource: FrameSource {
 
     func start(_ session: Phasefront.Session) {
         task = Task.detached {
-            guard let colour = pixels("scene_rgb", "jpg", channels: 4), let depth = pixels("scene_depth", "png", channels: 1)
-            else { return }
-            // Seven eighths of the scene, to and fro.
-            let most = colour.width / 8
+            guard let scene = SampleScene() else { return }
             var step = 0
             while !Task.isCancelled {
-                let x = step / most % 2 == 0 ? step % most : most - 1 - step % most
-                let frame = Frame(
-                    timestampNs: DispatchTime.now().uptimeNanoseconds,
-                    colour: window(colour, x: x, channels: 4) { width, height, plane in
-                        ColourImage(format: .rgba, width: width, height: height, planes: [plane])
-                    },
-                    depth: window(depth, x: x * depth.width / colour.width, channels: 1) { width, height, plane in
-                        DepthImage(format: .normalizedU8, width: width, height: height, plane: plane)
-                    })
                 do {
-                    try session.submit(frame)
+                    try session.submit(scene.frame(step))
                     try await Task.sleep(nanoseconds: 33_000_000)
                 } catch {
                     return
@@ -71,6 +59,33 @@ final class SampleSource: FrameSource {
     }
 
     func stop() { task?.cancel() }
+}
+
+/// The project's sample scene, seven eighths of it.
+struct SampleScene: Sendable {
+    private let colour, depth: Pixels
+
+    /// Nil where the app's images cannot be read.
+    init?() {
+        guard let colour = pixels("scene_rgb", "jpg", channels: 4),
+            let depth = pixels("scene_depth", "png", channels: 1)
+        else { return nil }
+        (self.colour, self.depth) = (colour, depth)
+    }
+
+    /// The frame of now, through a window that is `step` pixels on its way to and fro.
+    func frame(_ step: Int) -> Frame {
+        let most = colour.width / 8
+        let x = step / most % 2 == 0 ? step % most : most - 1 - step % most
+        return Frame(
+            timestampNs: DispatchTime.now().uptimeNanoseconds,
+            colour: window(colour, x: x, channels: 4) { width, height, plane in
+                ColourImage(format: .rgba, width: width, height: height, planes: [plane])
+            },
+            depth: window(depth, x: x * depth.width / colour.width, channels: 1) { width, height, plane in
+                DepthImage(format: .normalizedU8, width: width, height: height, plane: plane)
+            })
+    }
 }
 
 private struct Pixels: Sendable {

@@ -25,6 +25,7 @@ final class Show: ObservableObject {
             source.start(session)
             defer { source.stop() }
             for await event in session.events {
+                if Task.isCancelled { break }
                 try session.setThermal(Thermal(ProcessInfo.processInfo.thermalState))
                 switch event {
                 case .hologram(let hologram): try await show(hologram, of: session)

@@ -19,6 +19,36 @@
         }
     }
 
+    extension Trace {
+        /// Sends stages to Instruments, which shows them under os_signpost, in the category "phasefront".
+        public static func sendToInstruments() throws {
+            let log = OSLog(subsystem: Bundle.main.bundleIdentifier ?? "phasefront", category: "phasefront")
+            try send { stage, begins in
+                // Stages of one thread have one identity.
+                let id = OSSignpostID(log: log, object: Thread.current)
+                os_signpost(begins ? .begin : .end, log: log, name: stage.signpost, signpostID: id)
+            }
+        }
+    }
+
+    extension Stage {
+        /// Signposts want names that are known when they are compiled.
+        fileprivate var signpost: StaticString {
+            switch self {
+            case .frame: "frame"
+            case .colour: "colour"
+            case .depth: "depth"
+            case .method: "method"
+            case .propagate: "propagate"
+            case .encode: "encode"
+            case .midpoint: "midpoint"
+            case .gpu: "gpu"
+            case .plan: "plan"
+            case .preview: "preview"
+            }
+        }
+    }
+
     extension Thermal {
         /// What `ProcessInfo.processInfo.thermalState` says.
         public init(_ state: ProcessInfo.ThermalState) {

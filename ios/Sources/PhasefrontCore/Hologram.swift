@@ -46,10 +46,59 @@ public final class Hologram: Sendable {
             raw.preview(zMm: zMm, width: UInt32(clamping: width), height: UInt32(clamping: height)))
     }
 
+    /// What an eye focused at `zMm` sees of the whole hologram: amplitudes, of which 1 is white. Transforms all
+    /// of it; not for the main thread.
+    ///
+    /// - Throws: ``PhasefrontError/Setting(message:)`` for a z too far away.
+    public func refocus(zMm: Double) throws -> Planes {
+        try Planes(raw.refocus(zMm: zMm))
+    }
+
+    /// The complex field that the levels make behind the aperture at `zMm`, 0 the midpoint, without the carrier: real
+    /// and imaginary part of each pixel. Transforms all of the hologram; not for the main thread.
+    ///
+    /// - Throws: ``PhasefrontError/Setting(message:)`` for a z too far away.
+    public func field(zMm: Double = 0) throws -> Planes {
+        try Planes(raw.field(zMm: zMm))
+    }
+
     /// Image `index` of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
     /// layouts but grey have one.
     public func output(_ placement: Placement = Placement(layout: .rgba), image index: Int = 0) throws -> PixelImage {
         try PixelImage(raw.output(placement: placement, image: UInt32(clamping: index)))
+    }
+}
+
+/// Numbers at each pixel of each colour of a hologram: amplitudes, or a field.
+public final class Planes: Sendable {
+    /// Pixels along x.
+    public let width: Int
+    /// Pixels along y.
+    public let height: Int
+    /// How many planes there are: 3, or 1 of a display of one laser.
+    public let colours: Int
+    /// Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part.
+    public let numbers: Int
+    let raw: RawPlanes
+
+    init(_ raw: RawPlanes) throws {
+        self.raw = raw
+        width = try Int(raw.width())
+        height = try Int(raw.height())
+        colours = try Int(raw.colours())
+        numbers = try Int(raw.pixelBytes()) / MemoryLayout<Float>.size
+    }
+
+    /// Reads the plane of `colour` in place: `height` rows of `width` pixels without gaps. The pointer is valid in
+    /// `body` only.
+    ///
+    /// - Throws: ``PhasefrontError/Setting(message:)`` for a colour that it has not.
+    public func withPlane<R>(_ colour: Colour, _ body: (UnsafeBufferPointer<Float>) throws -> R) throws -> R {
+        let address = try raw.planeAddress(colour: colour.rawValue)
+        return try withExtendedLifetime(self) {
+            let first = UnsafePointer<Float>(bitPattern: UInt(address))
+            return try body(UnsafeBufferPointer(start: first, count: numbers * width * height))
+        }
     }
 }
 

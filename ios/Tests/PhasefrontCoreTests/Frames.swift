@@ -43,3 +43,12 @@ extension Hologram {
         }
     }
 }
+
+extension Planes {
+    /// The numbers of all planes, in the order in which they lie.
+    func bytes() throws -> Data {
+        try Colour.allCases.prefix(colours).reduce(into: Data()) { all, colour in
+            try withPlane(colour) { all.append(Data(buffer: $0)) }
+        }
+    }
+}

@@ -81,6 +81,28 @@ final class SessionTests: XCTestCase {
         assertRefused("0×24") { try hologram.preview(zMm: 0, width: 0, height: 24) }
     }
 
+    func testNoticesComeAlong() throws {
+        let notices = try thirdPartyNotices()
+        XCTAssert(notices.hasPrefix("# Third-party notices") && notices.contains("uniffi"))
+    }
+
+    func testAWholeViewIsTheFieldWithoutItsPhases() throws {
+        let hologram = try Session(options(), mode: .image).process(still())
+        let (seen, field) = try (hologram.refocus(zMm: 0), hologram.field())
+        XCTAssertEqual([seen.width, seen.height, seen.colours, seen.numbers, field.numbers], [64, 48, 3, 1, 2])
+        try seen.withPlane(.blue) { amplitudes in
+            try field.withPlane(.blue) { parts in
+                XCTAssertEqual([amplitudes.count, parts.count], [64 * 48, 2 * 64 * 48])
+                for i in 0..<64 * 48 {
+                    let (re, im) = (parts[2 * i], parts[2 * i + 1])
+                    XCTAssertEqual(amplitudes[i], (re * re + im * im).squareRoot(), accuracy: 1e-6)
+                }
+            }
+        }
+        assertRefused("a shorter distance") { try hologram.refocus(zMm: 1e5) }
+        assertRefused("must be finite") { try hologram.field(zMm: .nan) }
+    }
+
     func testOutputIsWhatTheModulatorTakes() throws {
         let hologram = try Session(options(), mode: .image).process(still())
         let levels = [UInt8](try hologram.levels())
@@ -328,6 +350,19 @@ final class SessionTests: XCTestCase {
         let heard = messages.withLock { $0 }
         XCTAssertEqual(heard.map(\.0), [.info])
         XCTAssert(heard[0].1.contains("Image"))
+    }
+
+    func testStagesBeginAndEnd() throws {
+        let stages = Locked<[(Stage, Bool)]>([])
+        let session = try Session(options(), mode: .image)
+        try Trace.send { stage, begins in stages.withLock { $0.append((stage, begins)) } }
+        _ = try session.process(still())
+        try Trace.send(to: nil)
+        _ = try session.process(still())
+        let heard = stages.withLock { $0 }
+        XCTAssertEqual(heard.first?.0, .frame)
+        XCTAssertEqual(heard.filter(\.1).map(\.0), [.frame, .colour, .depth, .method, .propagate, .encode])
+        XCTAssertEqual(heard.filter { !$0.1 }.map(\.0), [.colour, .depth, .method, .propagate, .encode, .frame])
     }
 
     func testMemoryOfTenThousandFramesIsFlat() throws {

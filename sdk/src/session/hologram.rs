@@ -7,7 +7,10 @@ use super::threads::Threads;
 use crate::error::{Error, Result};
 use crate::output::Levels;
 use crate::preview::{Preview, PreviewScratch, check_screen};
+use crate::refocus::seen_field;
+use crate::stage::stage;
 use crate::target::Target;
+use num_complex::Complex32;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -241,9 +244,34 @@ impl Hologram {
             })?);
         }
         if let Some(ViewPlan { preview, scratch, .. }) = &mut *plan {
-            let look = || preview.look(self.levels(), self.scale, rgba, scratch);
+            let look = || {
+                let _stage = stage!("preview");
+                preview.look(self.levels(), self.scale, rgba, scratch);
+            };
             self.viewer.pool.install(look);
         }
         Ok(())
+    }
+
+    /// The field that the levels make behind the aperture, through the optics, at `z_m`, (C, H, W): 0 is the midpoint.
+    /// Without the carrier exp(i2πz/λ). Six transforms of padded planes: a view for study, not for every frame.
+    ///
+    /// # Errors
+    /// A z too far away, whose padded plane would have over 2²⁷ values, or a process that was forked from the
+    /// session's.
+    pub fn field(&self, z_m: f64) -> Result<Vec<Complex32>> {
+        self.viewer.home.check()?;
+        let seen = || seen_field(self.output_levels(), self.scale, self.target(), self.shape, z_m);
+        self.viewer.pool.install(seen)
+    }
+
+    /// What an eye focused at `z_m` sees, at full resolution, as amplitudes (C, H, W) of which 1 is white:
+    /// [`Self::field`] without its phases.
+    ///
+    /// # Errors
+    /// As [`Self::field`].
+    pub fn refocus(&self, z_m: f64) -> Result<Vec<f32>> {
+        let amplitudes = |field: Vec<Complex32>| field.iter().map(|value| value.norm()).collect();
+        self.field(z_m).map(amplitudes)
     }
 }

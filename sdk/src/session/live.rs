@@ -4,11 +4,11 @@
 use super::event::DropReason;
 use super::home::Home;
 use super::queue::{Queue, Ticket};
+use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
 use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::PoisonError;
 
 /// What a live session does with its frames.
 pub(super) trait Work: Send + 'static {
@@ -98,7 +98,7 @@ impl<W: Work> Live<W> {
             wake: Condvar::new(),
             spare: Mutex::new(Vec::new()),
         });
-        let thread = std::thread::Builder::new()
+        let thread = Builder::new()
             .name("phasefront session".into())
             .spawn({
                 let shared = shared.clone();
@@ -169,7 +169,7 @@ impl<W: Work> Live<W> {
             return;
         }
         self.change(Queue::close);
-        if LISTENS.get() {
+        if LISTENS.with(Cell::get) {
             return;
         }
         // Held while joining, so that whoever closes too waits as well.
@@ -198,7 +198,7 @@ enum Next<F> {
 }
 
 fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut(Report<W::Output>)) {
-    LISTENS.set(true);
+    LISTENS.with(|listens| listens.set(true));
     let mut tell = |report| {
         let told = catch_unwind(AssertUnwindSafe(|| listener(report)));
         if told.is_err() {

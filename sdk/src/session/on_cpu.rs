@@ -5,11 +5,9 @@ use super::engine::{Encoded, LevelsOut};
 use super::quality::Rung;
 use super::statistics::BackendReport;
 use crate::brightness::Past;
-use crate::clock::Instant;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
 use crate::pipeline::{Pipeline, PipelineScratch};
-use crate::slm;
 use num_complex::Complex32;
 
 /// Plan and memory.
@@ -72,12 +70,10 @@ impl OnCpu {
         } = self;
         let follows = past.is_some();
         let (method, propagate) = pipeline.field_after(follows, frame, field, scratch)?;
-        let start = Instant::now();
         let modulation = match out.words {
             None => pipeline.modulate_after(past, field, out.levels, scratch),
             Some(words) => {
-                let modulation = pipeline.phases_after(past, field, phases, scratch);
-                slm::linear_words(phases, *bits, words);
+                let modulation = pipeline.modulate_words_after(past, field, phases, words, scratch);
                 for (level, word) in out.levels.iter_mut().zip(words) {
                     *level = (*word >> (*bits - 8)) as u8;
                 }
@@ -88,7 +84,7 @@ impl OnCpu {
             scale: modulation.scale,
             method,
             propagate,
-            encode: start.elapsed(),
+            encode: modulation.encode,
         })
     }
 }

@@ -9,8 +9,8 @@ use crate::error::Error;
 use crate::gpu::{
     self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError, InFlight, Job, Renderer,
 };
+use crate::stage::{Stage, stage};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Which GPU a session computes on, and how.
 #[derive(Debug, Clone, Default)]
@@ -98,9 +98,9 @@ impl OnGpu {
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<Encoded, Failure> {
-        let start = Instant::now();
+        let stage = stage!("gpu");
         let frame = self.submit(input, brightness)?;
-        self.collect(frame, start, brightness, levels)
+        self.collect(frame, stage, brightness, levels)
     }
 
     fn submit(&mut self, input: &FrameInput<'_>, brightness: &BrightnessTracker) -> Result<InFlight, Failure> {
@@ -130,7 +130,7 @@ impl OnGpu {
     fn collect(
         &mut self,
         frame: InFlight,
-        start: Instant,
+        stage: Stage,
         brightness: &mut BrightnessTracker,
         levels: &mut [u8],
     ) -> Result<Encoded, Failure> {
@@ -143,7 +143,7 @@ impl OnGpu {
         Ok(Encoded {
             scale: report.scale,
             // With the ways to the GPU and back, and all of it where there are no time stamps.
-            method: start.elapsed().saturating_sub(times.propagate + times.encode),
+            method: stage.end().saturating_sub(times.propagate + times.encode),
             propagate: times.propagate,
             encode: times.encode,
         })
@@ -186,7 +186,7 @@ mod tests {
         let before = gpu.openings();
         gpu.device().unwrap().wgpu().0.destroy();
         let mut levels = vec![0; first.len()];
-        let lost = gpu.collect(flying, Instant::now(), &mut brightness, &mut levels);
+        let lost = gpu.collect(flying, stage!("gpu"), &mut brightness, &mut levels);
         assert!(
             matches!(&lost, Err(Failure::Frame(Error::Lost(why))) if !why.contains('\n')),
             "{:?}",

@@ -14,6 +14,7 @@ use crate::depth::camera::CameraFrame;
 use crate::depth::stream::{DepthReport, DepthStream};
 use crate::error::Result;
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
+use crate::stage::stage;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -38,7 +39,7 @@ impl RungPlan {
         elapsed: Option<Duration>,
         times: &mut FrameTimes,
     ) -> Result<DepthReport> {
-        let start = Instant::now();
+        let stage = stage!("colour");
         let (height, width) = self.frame.shape();
         let fits = |(colour, _): &&mut (ColourPlan, _)| colour.fits(&frame.colour, frame.orientation);
         if self.colour.as_mut().filter(fits).is_none() {
@@ -61,10 +62,10 @@ impl RungPlan {
             true => &*amplitude,
             false => &self.picture,
         };
-        times.colour = start.elapsed();
-        let start = Instant::now();
+        times.colour = stage.end();
+        let stage = stage!("depth");
         let report = self.depth.next(frame, elapsed, rgb, depth)?;
-        times.depth = start.elapsed();
+        times.depth = stage.end();
         Ok(report)
     }
 }
@@ -122,6 +123,7 @@ impl Stages {
     }
 
     fn plan_rung(&mut self) -> Result<RungPlan> {
+        let _stage = stage!("plan");
         let Stages {
             options,
             pool,
@@ -290,6 +292,7 @@ impl Stages {
         let mut depths = depths.take(shape.0 * shape.1);
         let mut times = FrameTimes::default();
         let (report, scale) = pool.install(|| -> Result<_> {
+            let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
             let report = plan.take_in(frame, elapsed, &mut times)?;
             let depth = plan.frame.depth();
             for (to, d) in depths.values.iter_mut().zip(depth) {

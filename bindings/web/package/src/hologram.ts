@@ -90,6 +90,25 @@ export class Hologram {
   }
 
   /**
+   * What an eye focused at `zMm` sees of the whole hologram: amplitudes, of which 1 is white, (C, H, W).
+   *
+   * @throws PhasefrontError `setting`: a z too far away.
+   */
+  refocus(zMm: number): Float32Array {
+    return this.#call((raw) => raw.refocus(zMm));
+  }
+
+  /**
+   * The complex field that the levels make behind the aperture at `zMm`, 0 the midpoint, without the carrier: real and
+   * imaginary part of each pixel, (C, H, W, 2).
+   *
+   * @throws PhasefrontError `setting`: a z too far away.
+   */
+  field(zMm = 0): Float32Array {
+    return this.#call((raw) => raw.field(zMm));
+  }
+
+  /**
    * Image `image` of those that the modulator's driver takes. All layouts but `grey` have one.
    *
    * @throws PhasefrontError `setting`: a layout that is not known, or an image that it has not.

@@ -1037,6 +1037,15 @@ public func FfiConverterTypeNetwork_lower(_ value: Network) -> UInt64 {
 public protocol RawHologramProtocol: AnyObject, Sendable {
     
     /**
+     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+     * and imaginary part of each pixel.
+     *
+     * # Errors
+     * A z too far away.
+     */
+    func field(zMm: Double) throws  -> RawPlanes
+    
+    /**
      * What is known of it.
      */
     func info() throws  -> HologramInfo
@@ -1071,6 +1080,14 @@ public protocol RawHologramProtocol: AnyObject, Sendable {
      * An empty image, or a z too far away.
      */
     func preview(zMm: Double, width: UInt32, height: UInt32) throws  -> RawImage
+    
+    /**
+     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     *
+     * # Errors
+     * A z too far away.
+     */
+    func refocus(zMm: Double) throws  -> RawPlanes
     
     /**
      * Another handle to the same hologram: whoever reads its memory holds one.
@@ -1140,6 +1157,23 @@ open class RawHologram: RawHologramProtocol, @unchecked Sendable {
 
     
 
+    
+    /**
+     * The complex field that the levels make behind the aperture at `z_mm`, 0 the midpoint, without the carrier: real
+     * and imaginary part of each pixel.
+     *
+     * # Errors
+     * A z too far away.
+     */
+open func field(zMm: Double)throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_field(
+            self.uniffiCloneHandle(),
+        FfiConverterDouble.lower(zMm),uniffiCallStatus
+    )
+})
+}
     
     /**
      * What is known of it.
@@ -1214,6 +1248,22 @@ open func preview(zMm: Double, width: UInt32, height: UInt32)throws  -> RawImage
         FfiConverterDouble.lower(zMm),
         FfiConverterUInt32.lower(width),
         FfiConverterUInt32.lower(height),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white.
+     *
+     * # Errors
+     * A z too far away.
+     */
+open func refocus(zMm: Double)throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawhologram_refocus(
+            self.uniffiCloneHandle(),
+        FfiConverterDouble.lower(zMm),uniffiCallStatus
     )
 })
 }
@@ -1502,6 +1552,229 @@ public func FfiConverterTypeRawImage_lift(_ handle: UInt64) throws -> RawImage {
 #endif
 public func FfiConverterTypeRawImage_lower(_ value: RawImage) -> UInt64 {
     return FfiConverterTypeRawImage.lower(value)
+}
+
+
+
+
+
+
+/**
+ * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+ * by hand.
+ */
+public protocol RawPlanesProtocol: AnyObject, Sendable {
+    
+    /**
+     * Planes: 3, or 1 of a display of one laser.
+     */
+    func colours() throws  -> UInt32
+    
+    /**
+     * Pixels along y.
+     */
+    func height() throws  -> UInt32
+    
+    /**
+     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     */
+    func pixelBytes() throws  -> UInt32
+    
+    /**
+     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     *
+     * # Errors
+     * Another colour.
+     */
+    func planeAddress(colour: UInt32) throws  -> UInt64
+    
+    /**
+     * Another handle to the same planes: whoever reads their memory holds one.
+     */
+    func share() throws  -> RawPlanes
+    
+    /**
+     * Pixels along x.
+     */
+    func width() throws  -> UInt32
+    
+}
+/**
+ * Numbers of 32 bits at each pixel of each colour: planes row by row without gaps, one after another. For the layers
+ * by hand.
+ */
+open class RawPlanes: RawPlanesProtocol, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_rawplanes(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_rawplanes(handle, $0) }
+    }
+
+    
+
+    
+    /**
+     * Planes: 3, or 1 of a display of one laser.
+     */
+open func colours()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_colours(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Pixels along y.
+     */
+open func height()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_height(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Bytes of a pixel: 4 of an amplitude, 8 of a real and an imaginary part.
+     */
+open func pixelBytes()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_pixel_bytes(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Where the plane of one colour lies: 0 red, 1 green, 2 blue, or 0 of one laser. Valid as long as this object.
+     *
+     * # Errors
+     * Another colour.
+     */
+open func planeAddress(colour: UInt32)throws  -> UInt64  {
+    return try  FfiConverterUInt64.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_plane_address(
+            self.uniffiCloneHandle(),
+        FfiConverterUInt32.lower(colour),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Another handle to the same planes: whoever reads their memory holds one.
+     */
+open func share()throws  -> RawPlanes  {
+    return try  FfiConverterTypeRawPlanes_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_share(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+    /**
+     * Pixels along x.
+     */
+open func width()throws  -> UInt32  {
+    return try  FfiConverterUInt32.lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_rawplanes_width(
+            self.uniffiCloneHandle(),uniffiCallStatus
+    )
+})
+}
+    
+
+    
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeRawPlanes: FfiConverter {
+    typealias FfiType = UInt64
+    typealias SwiftType = RawPlanes
+
+    public static func lift(_ handle: UInt64) throws -> RawPlanes {
+        return RawPlanes(unsafeFromHandle: handle)
+    }
+
+    public static func lower(_ value: RawPlanes) -> UInt64 {
+        return value.uniffiCloneHandle()
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> RawPlanes {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: RawPlanes, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawPlanes_lift(_ handle: UInt64) throws -> RawPlanes {
+    return try FfiConverterTypeRawPlanes.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeRawPlanes_lower(_ value: RawPlanes) -> UInt64 {
+    return FfiConverterTypeRawPlanes.lower(value)
 }
 
 
@@ -2207,6 +2480,261 @@ public func FfiConverterTypeSessionListener_lift(_ handle: UInt64) throws -> Ses
 #endif
 public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> UInt64 {
     return FfiConverterTypeSessionListener.lower(value)
+}
+
+
+
+
+
+
+/**
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
+ * not call the library. What it throws is ignored.
+ */
+public protocol StageListener: AnyObject, Sendable {
+    
+    /**
+     * A stage begins on this thread.
+     */
+    func onBegin(stage: Stage) throws 
+    
+    /**
+     * The stage that began last on this thread ends.
+     */
+    func onEnd(stage: Stage) throws 
+    
+}
+/**
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
+ * not call the library. What it throws is ignored.
+ */
+open class StageListenerImpl: StageListener, @unchecked Sendable {
+    fileprivate let handle: UInt64
+
+    /// Used to instantiate a [FFIObject] without an actual handle, for fakes in tests, mostly.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public struct NoHandle {
+        public init() {}
+    }
+
+    // TODO: We'd like this to be `private` but for Swifty reasons,
+    // we can't implement `FfiConverter` without making this `required` and we can't
+    // make it `required` without making it `public`.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    required public init(unsafeFromHandle handle: UInt64) {
+        self.handle = handle
+    }
+
+    // This constructor can be used to instantiate a fake object.
+    // - Parameter noHandle: Placeholder value so we can have a constructor separate from the default empty one that may be implemented for classes extending [FFIObject].
+    //
+    // - Warning:
+    //     Any object instantiated with this constructor cannot be passed to an actual Rust-backed object. Since there isn't a backing handle the FFI lower functions will crash.
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public init(noHandle: NoHandle) {
+        self.handle = 0
+    }
+
+#if swift(>=5.8)
+    @_documentation(visibility: private)
+#endif
+    public func uniffiCloneHandle() -> UInt64 {
+        return try! rustCall { uniffi_phasefront_ffi_fn_clone_stagelistener(self.handle, $0) }
+    }
+    // No primary constructor declared for this class.
+
+    deinit {
+        if handle == 0 {
+            // Mock objects have handle=0 don't try to free them
+            return
+        }
+
+        try! rustCall { uniffi_phasefront_ffi_fn_free_stagelistener(handle, $0) }
+    }
+
+    
+
+    
+    /**
+     * A stage begins on this thread.
+     */
+open func onBegin(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_stagelistener_on_begin(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeStage_lower(stage),uniffiCallStatus
+    )
+}
+}
+    
+    /**
+     * The stage that began last on this thread ends.
+     */
+open func onEnd(stage: Stage)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_stagelistener_on_end(
+            self.uniffiCloneHandle(),
+        FfiConverterTypeStage_lower(stage),uniffiCallStatus
+    )
+}
+}
+    
+
+    
+}
+
+
+
+// Put the implementation in a struct so we don't pollute the top-level namespace
+fileprivate struct UniffiCallbackInterfaceStageListener {
+
+    // Create the VTable using a series of closures.
+    // Swift automatically converts these into C callback functions.
+    //
+    // Store the vtable directly.
+    static let vtable: UniffiVTableCallbackInterfaceStageListener = UniffiVTableCallbackInterfaceStageListener(
+        uniffiFree: { (uniffiHandle: UInt64) -> () in
+            do {
+                try FfiConverterTypeStageListener.handleMap.remove(handle: uniffiHandle)
+            } catch {
+                print("Uniffi callback interface StageListener: handle missing in uniffiFree")
+            }
+        },
+        uniffiClone: { (uniffiHandle: UInt64) -> UInt64 in
+            do {
+                return try FfiConverterTypeStageListener.handleMap.clone(handle: uniffiHandle)
+            } catch {
+                fatalError("Uniffi callback interface StageListener: handle missing in uniffiClone")
+            }
+        },
+        onBegin: { (
+            uniffiHandle: UInt64,
+            stage: RustBuffer,
+            uniffiOutReturn: UnsafeMutableRawPointer,
+            uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
+        ) in
+            let makeCall = {
+                () throws -> () in
+                guard let uniffiObj = try? FfiConverterTypeStageListener.handleMap.get(handle: uniffiHandle) else {
+                    throw UniffiInternalError.unexpectedStaleHandle
+                }
+                return try uniffiObj.onBegin(
+                     stage: try FfiConverterTypeStage_lift(stage)
+                )
+            }
+
+            
+            let writeReturn = { () }
+            uniffiTraitInterfaceCallWithError(
+                callStatus: uniffiCallStatus,
+                makeCall: makeCall,
+                writeReturn: writeReturn,
+                lowerError: FfiConverterTypeListenerError_lower
+            )
+        },
+        onEnd: { (
+            uniffiHandle: UInt64,
+            stage: RustBuffer,
+            uniffiOutReturn: UnsafeMutableRawPointer,
+            uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
+        ) in
+            let makeCall = {
+                () throws -> () in
+                guard let uniffiObj = try? FfiConverterTypeStageListener.handleMap.get(handle: uniffiHandle) else {
+                    throw UniffiInternalError.unexpectedStaleHandle
+                }
+                return try uniffiObj.onEnd(
+                     stage: try FfiConverterTypeStage_lift(stage)
+                )
+            }
+
+            
+            let writeReturn = { () }
+            uniffiTraitInterfaceCallWithError(
+                callStatus: uniffiCallStatus,
+                makeCall: makeCall,
+                writeReturn: writeReturn,
+                lowerError: FfiConverterTypeListenerError_lower
+            )
+        }
+    )
+
+    // Rust stores this pointer for future callback invocations, so it must live
+    // for the process lifetime (not just for the init function call).
+    //
+    // `nonisolated(unsafe)` is needed under Swift 6 strict concurrency.
+    // This is safe because the pointee is initialized once during static init
+    // and never mutated by either side of the FFI.  Its fields are C function pointers.
+    nonisolated(unsafe) static let vtablePtr: UnsafePointer<UniffiVTableCallbackInterfaceStageListener> = {
+        let ptr = UnsafeMutablePointer<UniffiVTableCallbackInterfaceStageListener>.allocate(capacity: 1)
+        ptr.initialize(to: vtable)
+        return UnsafePointer(ptr)
+    }()
+}
+
+private func uniffiCallbackInitStageListener() {
+    uniffi_phasefront_ffi_fn_init_callback_vtable_stagelistener(UniffiCallbackInterfaceStageListener.vtablePtr)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeStageListener: FfiConverter {
+    fileprivate static let handleMap = UniffiHandleMap<StageListener>()
+
+    typealias FfiType = UInt64
+    typealias SwiftType = StageListener
+
+    public static func lift(_ handle: UInt64) throws -> StageListener {
+        if ((handle & 1) == 0) {
+            // Rust-generated handle, construct a new class that uses the handle to implement the
+            // interface
+            return StageListenerImpl(unsafeFromHandle: handle)
+        } else {
+            // Swift-generated handle, get the object from the handle map
+            return try handleMap.remove(handle: handle)
+        }
+    }
+
+    public static func lower(_ value: StageListener) -> UInt64 {
+         if let rustImpl = value as? StageListenerImpl {
+             // Rust-implemented object.  Clone the handle and return it
+            return rustImpl.uniffiCloneHandle()
+         } else {
+            // Swift object, generate a new vtable handle and return that.
+            return handleMap.insert(obj: value)
+         }
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> StageListener {
+        let handle: UInt64 = try readInt(&buf)
+        return try lift(handle)
+    }
+
+    public static func write(_ value: StageListener, into buf: inout [UInt8]) {
+        writeInt(&buf, lower(value))
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStageListener_lift(_ handle: UInt64) throws -> StageListener {
+    return try FfiConverterTypeStageListener.lift(handle)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStageListener_lower(_ value: StageListener) -> UInt64 {
+    return FfiConverterTypeStageListener.lower(value)
 }
 
 
@@ -6231,6 +6759,161 @@ public func FfiConverterTypeRunningMode_lower(_ value: RunningMode) -> RustBuffe
 
 
 /**
+ * A part of the work on a frame.
+ */
+
+public enum Stage: Equatable, Hashable {
+    
+    /**
+     * All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
+     */
+    case frame
+    /**
+     * Colour: turned, converted, resized.
+     */
+    case colour
+    /**
+     * Depth: read, aligned, steadied, refined.
+     */
+    case depth
+    /**
+     * From the frame to the midpoint hologram.
+     */
+    case method
+    /**
+     * From the midpoint to the modulator.
+     */
+    case propagate
+    /**
+     * From the field to levels.
+     */
+    case encode
+    /**
+     * Steps at the midpoint, within `Encode`.
+     */
+    case midpoint
+    /**
+     * A frame that a GPU computes, with the ways there and back.
+     */
+    case gpu
+    /**
+     * Plans and memory of a rung are made.
+     */
+    case plan
+    /**
+     * A small view.
+     */
+    case preview
+
+
+
+
+
+}
+
+#if compiler(>=6)
+extension Stage: Sendable {}
+#endif
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public struct FfiConverterTypeStage: FfiConverterRustBuffer {
+    typealias SwiftType = Stage
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Stage {
+        let variant: Int32 = try readInt(&buf)
+        switch variant {
+        
+        case 1: return .frame
+        
+        case 2: return .colour
+        
+        case 3: return .depth
+        
+        case 4: return .method
+        
+        case 5: return .propagate
+        
+        case 6: return .encode
+        
+        case 7: return .midpoint
+        
+        case 8: return .gpu
+        
+        case 9: return .plan
+        
+        case 10: return .preview
+        
+        default: throw UniffiInternalError.unexpectedEnumCase
+        }
+    }
+
+    public static func write(_ value: Stage, into buf: inout [UInt8]) {
+        switch value {
+        
+        
+        case .frame:
+            writeInt(&buf, Int32(1))
+        
+        
+        case .colour:
+            writeInt(&buf, Int32(2))
+        
+        
+        case .depth:
+            writeInt(&buf, Int32(3))
+        
+        
+        case .method:
+            writeInt(&buf, Int32(4))
+        
+        
+        case .propagate:
+            writeInt(&buf, Int32(5))
+        
+        
+        case .encode:
+            writeInt(&buf, Int32(6))
+        
+        
+        case .midpoint:
+            writeInt(&buf, Int32(7))
+        
+        
+        case .gpu:
+            writeInt(&buf, Int32(8))
+        
+        
+        case .plan:
+            writeInt(&buf, Int32(9))
+        
+        
+        case .preview:
+            writeInt(&buf, Int32(10))
+        
+        }
+    }
+}
+
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStage_lift(_ buf: RustBuffer) throws -> Stage {
+    return try FfiConverterTypeStage.lift(buf)
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
+public func FfiConverterTypeStage_lower(_ value: Stage) -> RustBuffer {
+    return FfiConverterTypeStage.lower(value)
+}
+
+
+
+/**
  * How hot the device is, as its system says.
  */
 
@@ -6522,6 +7205,30 @@ fileprivate struct FfiConverterOptionTypeSessionListener: FfiConverterRustBuffer
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
+fileprivate struct FfiConverterOptionTypeStageListener: FfiConverterRustBuffer {
+    typealias SwiftType = StageListener?
+
+    public static func write(_ value: SwiftType, into buf: inout [UInt8]) {
+        guard let value = value else {
+            writeInt(&buf, Int8(0))
+            return
+        }
+        writeInt(&buf, Int8(1))
+        FfiConverterTypeStageListener.write(value, into: &buf)
+    }
+
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> SwiftType {
+        switch try readInt(&buf) as Int8 {
+        case 0: return nil
+        case 1: return try FfiConverterTypeStageListener.read(from: &buf)
+        default: throw UniffiInternalError.unexpectedOptionalTag
+        }
+    }
+}
+
+#if swift(>=5.8)
+@_documentation(visibility: private)
+#endif
 fileprivate struct FfiConverterOptionTypeCameras: FfiConverterRustBuffer {
     typealias SwiftType = Cameras?
 
@@ -6781,6 +7488,20 @@ public func sessionOptions(target: Target, method: Method? = nil)throws  -> Sess
     )
 })
 }
+/**
+ * Tells `listener` of every stage of every session; None for silence, which costs nothing. Set it between frames: of a
+ * stage that is under way it may hear the end alone.
+ *
+ * # Errors
+ * A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
+ */
+public func setStageListener(listener: StageListener?)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_func_set_stage_listener(
+        FfiConverterOptionTypeStageListener.lower(listener),uniffiCallStatus
+    )
+}
+}
 
 private enum InitializationResult {
     case ok
@@ -6812,6 +7533,12 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_session_options() != 35800) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 45085) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_field() != 38987) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_info() != 56866) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -6825,6 +7552,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_preview() != 24206) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawhologram_refocus() != 40122) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawhologram_share() != 7272) {
@@ -6849,6 +7579,24 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawimage_width() != 63189) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_colours() != 30921) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_height() != 11107) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_pixel_bytes() != 24405) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_plane_address() != 44421) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_share() != 4678) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_rawplanes_width() != 48334) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_loglistener_on_log() != 28371) {
@@ -6902,6 +7650,12 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {
         return InitializationResult.apiChecksumMismatch
     }
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_begin() != 60919) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 57660) {
+        return InitializationResult.apiChecksumMismatch
+    }
     if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 35155) {
         return InitializationResult.apiChecksumMismatch
     }
@@ -6929,6 +7683,7 @@ private let initializationResult: InitializationResult = {
 
     uniffiCallbackInitLogListener()
     uniffiCallbackInitSessionListener()
+    uniffiCallbackInitStageListener()
     return InitializationResult.ok
 }()
 

@@ -20,3 +20,8 @@ public fun Network.Companion.fromBytes(onnx: ByteBuffer): Network = fromMemory(
 public fun Target.Companion.fromBytes(file: ByteBuffer): Target = fromMemory(
     file.direct { PhasefrontException.Setting("calibration file: it is $it; a direct one is needed, from ByteBuffer.allocateDirect") },
 )
+
+/** The notices of what the library carries of others, Markdown: an app shows them where it shows its own. */
+public fun thirdPartyNotices(): String = checkNotNull(Session::class.java.getResourceAsStream("THIRD-PARTY.md")) {
+    "the notices are not in this package; take it as it is published"
+}.use { it.readBytes().decodeToString() }

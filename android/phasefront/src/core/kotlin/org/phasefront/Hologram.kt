@@ -2,6 +2,8 @@ package org.phasefront
 
 import com.sun.jna.Pointer
 import java.nio.ByteBuffer
+import java.nio.ByteOrder
+import java.nio.FloatBuffer
 
 /** A colour of a hologram. */
 public enum class Colour {
@@ -54,6 +56,22 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
     }
 
     /**
+     * What an eye focused at [zMm] sees of the whole hologram: amplitudes, of which 1 is white. Transforms all of it;
+     * not for the main thread.
+     *
+     * @throws PhasefrontException.Setting for a z too far away.
+     */
+    public fun refocus(zMm: Double): Planes = Planes(open { it.refocus(zMm) })
+
+    /**
+     * The complex field that the levels make behind the aperture at [zMm], 0 the midpoint, without the carrier: real
+     * and imaginary part of each pixel. Transforms all of the hologram; not for the main thread.
+     *
+     * @throws PhasefrontException.Setting for a z too far away.
+     */
+    public fun field(zMm: Double = 0.0): Planes = Planes(open { it.field(zMm) })
+
+    /**
      * Image [index] of those that the modulator's driver takes, of the modulator's resolution, levels as they are; all
      * layouts but grey have one.
      */
@@ -69,6 +87,41 @@ public class Hologram internal constructor(private val raw: RawHologram) : AutoC
         if (raw.uniffiIsDestroyed) throw PhasefrontException.Session("hologram: it is closed; read it before closing it")
         return call(raw)
     }
+}
+
+/** Numbers at each pixel of each colour of a hologram: amplitudes, or a field. Close it, as a hologram. */
+public class Planes internal constructor(private val raw: RawPlanes) : AutoCloseable {
+    /** Pixels along x. */
+    public val width: Int = raw.width().toInt()
+
+    /** Pixels along y. */
+    public val height: Int = raw.height().toInt()
+
+    /** How many planes there are: 3, or 1 of a display of one laser. */
+    public val colours: Int = raw.colours().toInt()
+
+    /** Numbers of a pixel: 1, an amplitude, or 2, a real and an imaginary part. */
+    public val numbers: Int = raw.pixelBytes().toInt() / Float.SIZE_BYTES
+
+    /**
+     * Reads the plane of [colour] in place: [height] rows of [width] pixels without gaps. The buffer is valid in [body]
+     * only, also while another thread closes the planes.
+     *
+     * @throws PhasefrontException.Setting for a colour that it has not.
+     */
+    public fun <R> usePlane(colour: Colour, body: (FloatBuffer) -> R): R {
+        if (raw.uniffiIsDestroyed) {
+            throw PhasefrontException.Session("planes: they are closed; read them before closing them")
+        }
+        return raw.share().use {
+            val len = Float.SIZE_BYTES.toULong() * (numbers.toLong() * width * height).toULong()
+            val bytes = memory(it.planeAddress(colour.ordinal.toUInt()), len)
+            body(bytes.order(ByteOrder.nativeOrder()).asFloatBuffer())
+        }
+    }
+
+    /** Gives the memory back. Closing twice does nothing. */
+    override fun close(): Unit = raw.destroy()
 }
 
 /** An image, row by row without gaps. */

@@ -15,6 +15,16 @@ public fun Log.sendToLogcat(level: LogLevel = LogLevel.INFO) {
     }
 }
 
+/** Sends stages to Perfetto and Android Studio's profiler, as sections of this app's trace. */
+public fun Trace.sendToSystem() {
+    send { stage, begins ->
+        when {
+            begins -> android.os.Trace.beginSection("phasefront ${stage.name.lowercase()}")
+            else -> android.os.Trace.endSection()
+        }
+    }
+}
+
 /** What `PowerManager.currentThermalStatus` (API 29) says. */
 public fun thermalOf(status: Int): Thermal = when (status) {
     PowerManager.THERMAL_STATUS_NONE -> Thermal.NOMINAL

@@ -104,11 +104,16 @@ class ConformanceTest {
             ?: DepthRange.Percentiles,
     )
 
-    private fun levels(case: JSONObject): ByteArray =
+    /** The levels of a case's frames; what is seen of them is written behind [seen]. */
+    private fun levels(case: JSONObject, seen: ByteArrayOutputStream): ByteArray =
         Session(options(case), RunningMode.valueOf(case.getString("mode").uppercase())).use { session ->
             val all = ByteArrayOutputStream()
             for (frame in case.getJSONArray("frames").objects()) {
-                session.process(frame(frame)).use { all.write(it.levels()) }
+                session.process(frame(frame)).use { hologram ->
+                    all.write(hologram.levels())
+                    hologram.refocus(1.5).use { seen.write(it.bytes()) }
+                    hologram.field(-1.0).use { seen.write(it.bytes()) }
+                }
             }
             all.toByteArray()
         }
@@ -116,10 +121,12 @@ class ConformanceTest {
     @Test
     fun framesBecomeTheLevelsThatAreExpected() {
         val cases = JSONObject(folder.resolve("cases.json").readText()).getJSONArray("cases").objects()
-        val got = cases.map(::levels)
+        val seen = ByteArrayOutputStream()
+        val got = cases.map { levels(it, seen) }
         System.getenv("PHASEFRONT_CONFORMANCE")?.let {
             val rust = File(it).resolve("levels.bin").readBytes()
             assertContentEquals(rust, got.reduce(ByteArray::plus), "not the bits that Rust has")
+            assertContentEquals(File(it).resolve("seen.bin").readBytes(), seen.toByteArray(), "not what Rust sees")
         }
         val expected = folder.resolve("levels.bin").readBytes()
         var from = 0

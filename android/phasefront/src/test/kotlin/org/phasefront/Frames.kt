@@ -2,6 +2,7 @@ package org.phasefront
 
 import java.nio.ByteBuffer
 import java.nio.ByteOrder
+import kotlin.test.assertEquals
 
 /** A direct buffer of [size] bytes in little-endian order. */
 internal fun direct(size: Int): ByteBuffer = ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN)
@@ -48,4 +49,16 @@ internal fun Hologram.levels(): ByteArray {
     val all = ByteArray(colours.size * size)
     for (colour in colours) usePlane(colour) { it.get(all, colour.ordinal * size, size) }
     return all
+}
+
+/** The numbers of all planes, in the order in which they lie. */
+internal fun Planes.bytes(): ByteArray {
+    val all = direct(Float.SIZE_BYTES * numbers * width * height * colours)
+    for (colour in Colour.entries.take(colours)) {
+        usePlane(colour) { plane ->
+            assertEquals(numbers * width * height, plane.remaining())
+            repeat(plane.remaining()) { all.putFloat(plane.get()) }
+        }
+    }
+    return ByteArray(all.capacity()).also { all.flip().get(it) }
 }

@@ -8,6 +8,7 @@ import java.util.concurrent.CountDownLatch
 import java.util.concurrent.LinkedBlockingQueue
 import java.util.concurrent.TimeUnit
 import kotlin.concurrent.thread
+import kotlin.math.hypot
 import kotlin.test.Test
 import kotlin.test.assertContains
 import kotlin.test.assertContentEquals
@@ -98,6 +99,35 @@ class SessionTest {
             }
             assertTrue(hologram.zAt(0.5, 0.5) > hologram.zAt(0.02, 0.02))
             assertRefused<PhasefrontException.Setting>("0×24") { hologram.preview(0.0, 0, 24) }
+        }
+    }
+
+    @Test
+    fun noticesComeAlong() {
+        assertContains(thirdPartyNotices(), "# Third-party notices")
+        assertContains(thirdPartyNotices(), "uniffi")
+    }
+
+    @Test
+    fun aWholeViewIsTheFieldWithoutItsPhases() {
+        image { it.process(still()) }.use { hologram ->
+            hologram.field().use { field ->
+                hologram.refocus(0.0).use { seen ->
+                    assertEquals(listOf(64, 48, 3, 1), listOf(seen.width, seen.height, seen.colours, seen.numbers))
+                    assertEquals(2, field.numbers)
+                    seen.usePlane(Colour.BLUE) { amplitudes ->
+                        field.usePlane(Colour.BLUE) { parts ->
+                            for (i in 0 until 64 * 48) {
+                                assertEquals(hypot(parts.get(2 * i), parts.get(2 * i + 1)), amplitudes.get(i), 1e-6f)
+                            }
+                        }
+                    }
+                }
+                field.close()
+                assertRefused<PhasefrontException.Session>("closed") { field.usePlane(Colour.RED) {} }
+            }
+            assertRefused<PhasefrontException.Setting>("a shorter distance") { hologram.refocus(1e5) }
+            assertRefused<PhasefrontException.Setting>("must be finite") { hologram.field(Double.NaN) }
         }
     }
 
@@ -367,6 +397,19 @@ class SessionTest {
         assertEquals(1, messages.size)
         assertEquals(LogLevel.INFO, messages[0].first)
         assertContains(messages[0].second, "Image")
+    }
+
+    @Test
+    fun stagesBeginAndEnd() {
+        val stages = Collections.synchronizedList(mutableListOf<Pair<Stage, Boolean>>())
+        Trace.send { stage, begins -> stages.add(stage to begins) }
+        image { it.process(still()).close() }
+        Trace.send(null)
+        image { it.process(still()).close() }
+        val inside = listOf(Stage.COLOUR, Stage.DEPTH, Stage.METHOD, Stage.PROPAGATE, Stage.ENCODE)
+        val ended = stages.filterNot { it.second }.map { it.first }
+        assertEquals(listOf(Stage.PLAN, Stage.FRAME) + inside, stages.filter { it.second }.map { it.first })
+        assertEquals(listOf(Stage.PLAN) + inside + Stage.FRAME, ended)
     }
 
     @Test

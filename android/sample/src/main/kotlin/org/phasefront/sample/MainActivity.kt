@@ -2,6 +2,7 @@ package org.phasefront.sample
 
 import android.Manifest
 import android.app.Activity
+import android.content.Intent
 import android.content.pm.PackageManager
 import android.graphics.Bitmap
 import android.hardware.display.DisplayManager
@@ -12,6 +13,7 @@ import android.view.Gravity
 import android.view.MotionEvent
 import android.view.Surface
 import android.view.View
+import android.widget.Button
 import android.widget.ImageView
 import android.widget.LinearLayout
 import android.widget.SeekBar
@@ -69,11 +71,16 @@ class MainActivity : Activity() {
             })
         }
         statistics = TextView(this).apply { setPadding(24, 24, 24, 24) }
+        val benchmark = Button(this).apply {
+            text = "Benchmark"
+            // The session is closed meanwhile, so that nothing else computes.
+            setOnClickListener { startActivity(Intent(context, BenchmarkActivity::class.java)) }
+        }
         setContentView(
             LinearLayout(this).apply {
                 orientation = LinearLayout.VERTICAL
                 gravity = Gravity.CENTER_VERTICAL
-                for (view in listOf(preview, focus, statistics)) addView(view)
+                for (view in listOf(preview, focus, statistics, benchmark)) addView(view)
             },
         )
     }

@@ -19,26 +19,35 @@ class SampleSource(private val assets: AssetManager) : FrameSource {
     override fun start(onFrame: (Frame) -> Unit, onError: (String) -> Unit) {
         running = true
         thread(name = "sample scene") {
-            val colour = open("scene_rgb.jpg")
-            val depth = open("scene_depth.png")
-            val colours = ByteBuffer.allocateDirect(colour.byteCount).also { colour.copyPixelsToBuffer(it) }
-            val depths = ByteBuffer.allocateDirect(depth.width * depth.height)
-            for (y in 0 until depth.height) {
-                for (x in 0 until depth.width) depths.put((depth.getPixel(x, y) and 0xff).toByte())
-            }
-            // Seven eighths of the scene, to and fro.
-            val most = colour.width / 8
+            val scene = SampleScene(assets)
             var step = 0
             while (running) {
-                val x = if (step / most % 2 == 0) step % most else most - 1 - step % most
-                onFrame(frame(colour, colours, depth, depths, x, most))
-                step++
+                onFrame(scene.frame(step++))
                 Thread.sleep(33)
             }
         }
     }
 
-    private fun frame(colour: Bitmap, colours: ByteBuffer, depth: Bitmap, depths: ByteBuffer, x: Int, margin: Int): Frame {
+    override fun close() {
+        running = false
+    }
+}
+
+/** The project's sample scene, seven eighths of it. */
+class SampleScene(assets: AssetManager) {
+    private val colour = assets.bitmap("scene_rgb.jpg")
+    private val depth = assets.bitmap("scene_depth.png")
+    private val colours = ByteBuffer.allocateDirect(colour.byteCount).also { colour.copyPixelsToBuffer(it) }
+    private val depths = ByteBuffer.allocateDirect(depth.width * depth.height).also {
+        for (y in 0 until depth.height) {
+            for (x in 0 until depth.width) it.put((depth.getPixel(x, y) and 0xff).toByte())
+        }
+    }
+
+    /** The frame of now, through a window that is [step] pixels on its way to and fro. */
+    fun frame(step: Int): Frame {
+        val margin = colour.width / 8
+        val x = if (step / margin % 2 == 0) step % margin else margin - 1 - step % margin
         val depthX = x * depth.width / colour.width
         val depthMargin = margin * depth.width / colour.width
         return Frame(
@@ -63,12 +72,8 @@ class SampleSource(private val assets: AssetManager) : FrameSource {
         position(from)
     }
 
-    private fun open(name: String): Bitmap = assets.open(name).use {
+    private fun AssetManager.bitmap(name: String): Bitmap = open(name).use {
         val options = BitmapFactory.Options().apply { inPreferredConfig = Bitmap.Config.ARGB_8888 }
         BitmapFactory.decodeStream(it, null, options) ?: error("the asset $name is no image")
-    }
-
-    override fun close() {
-        running = false
     }
 }

@@ -1,0 +1,141 @@
+package org.phasefront.sample
+
+import org.json.JSONArray
+import org.json.JSONObject
+import org.phasefront.Display
+import org.phasefront.Frame
+import org.phasefront.FrameTimes
+import org.phasefront.Method
+import org.phasefront.Network
+import org.phasefront.PhasefrontException
+import org.phasefront.RunningMode
+import org.phasefront.Session
+import org.phasefront.SessionOptions
+import org.phasefront.sessionOptions
+import org.phasefront.version
+
+/** The stages of a frame, as a session times them. */
+enum class Stage(val ms: (FrameTimes) -> Double) {
+    COLOUR(FrameTimes::colourMs),
+    DEPTH(FrameTimes::depthMs),
+    METHOD(FrameTimes::methodMs),
+    PROPAGATE(FrameTimes::propagateMs),
+    ENCODE(FrameTimes::encodeMs),
+    TOTAL(FrameTimes::totalMs),
+    ;
+
+    /** Its name in a record. */
+    val key: String = name.lowercase()
+}
+
+/** Times of one stage, milliseconds. */
+data class Spread(val least: Double, val lower: Double, val median: Double, val upper: Double, val most: Double) {
+    /** As a record has it. */
+    fun json(): JSONObject = JSONObject()
+        .put("least", least).put("lower", lower).put("median", median).put("upper", upper).put("most", most)
+
+    companion object {
+        /** Of [times], at least one: median, quartiles and ends, each one of the times. */
+        fun of(times: List<Double>): Spread {
+            val sorted = times.sorted()
+            val at = { quarters: Int -> sorted[(sorted.size - 1) * quarters / 4] }
+            return Spread(at(0), at(1), at(2), at(3), at(4))
+        }
+    }
+}
+
+/**
+ * What is timed: frames by [method], corrected by [localSteps] and nothing else, and the [stage] that the run is about;
+ * where one is null, as is usual.
+ */
+class Run(val name: String, val stage: Stage, val method: Method? = null, val localSteps: UInt? = 0u) {
+    /** Its options on [display]. */
+    fun options(display: Display): SessionOptions {
+        val usual = sessionOptions(display, method)
+        return if (localSteps == null) usual else usual.copy(dark = 0f, localSteps = localSteps)
+    }
+
+    companion object {
+        /** Networks of 8, 15 and [deep]'s layers, the plane sweep, one step of correction, and what is usual. */
+        fun all(deep: Network): List<Run> {
+            val shallow = Method.Trained(Network.builtIn("rgbd-8"))
+            return listOf(
+                Run("8 layers", Stage.METHOD, shallow),
+                Run("15 layers", Stage.METHOD, Method.Trained(Network.builtIn("rgbd-15"))),
+                Run("${deep.info().layers} layers", Stage.METHOD, Method.Trained(deep)),
+                Run("plane sweep", Stage.METHOD, Method.Sweep),
+                Run("encoder with one step", Stage.ENCODE, shallow, localSteps = 1u),
+                Run("whole frame", Stage.TOTAL, localSteps = null),
+            )
+        }
+    }
+}
+
+/** What was timed in one run, in words and for the record. */
+class Outcome(val line: String, val json: JSONObject)
+
+/**
+ * Times [runs] at every size of [displays]: two frames to warm up, then [frames] of them. [scene] gives the frame to
+ * time, and [conditions] what the system tells of heat and energy, which each run asks for before and behind it.
+ */
+class Benchmark(
+    private val runs: List<Run>,
+    private val displays: List<Display>,
+    private val frames: Int,
+    private val scene: () -> Frame,
+    private val conditions: () -> JSONObject,
+) {
+    /**
+     * The record of all runs on [device], which is what the app knows of the phone; [told] hears the line of each. A
+     * run that is refused says why, and the others go on. Ends early, with what there is, where [isWanted] no longer
+     * holds.
+     */
+    fun record(device: JSONObject, isWanted: () -> Boolean, told: (String) -> Unit): JSONObject {
+        val outcomes = JSONArray()
+        for (display in displays) {
+            for (run in runs) {
+                if (!isWanted()) break
+                val outcome = time(run, display)
+                told("${display.width}×${display.height} ${outcome.line}")
+                outcomes.put(outcome.json)
+            }
+        }
+        return JSONObject().put("phasefront", version()).put("device", device).put("runs", outcomes)
+    }
+
+    private fun time(run: Run, display: Display): Outcome {
+        val json = JSONObject().put("name", run.name).put("stage", run.stage.key)
+            .put("width", display.width.toInt()).put("height", display.height.toInt()).put("before", conditions())
+        return try {
+            val spreads = spreads(run, display, json)
+            val of = spreads.getValue(run.stage)
+            json.put("stages_ms", JSONObject(spreads.mapKeys { it.key.key }.mapValues { it.value.json() }))
+            Outcome("%s: %.1f ms (%.1f to %.1f)".format(run.name, of.median, of.lower, of.upper), json)
+        } catch (refused: PhasefrontException) {
+            Outcome("${run.name}: ${refused.message}", json.put("refused", refused.message))
+        }
+    }
+
+    /** Of each stage; what the frames took and ran on is put into [json]. */
+    private fun spreads(run: Run, display: Display, json: JSONObject): Map<Stage, Spread> {
+        return Session(run.options(display), RunningMode.IMAGE).use { session ->
+            repeat(WARM) { session.process(scene()).close() }
+            val begun = System.nanoTime()
+            val times = List(frames) { session.process(scene()).use { it.info.times } }
+            val statistics = session.statistics()
+            json.put("frames", frames).put("seconds", (System.nanoTime() - begun) / 1e9).put("behind", conditions())
+                .put("backend", statistics.backend).put("why", statistics.backendWhy)
+            Stage.entries.associateWith { stage -> Spread.of(times.map(stage.ms)) }
+        }
+    }
+
+    companion object {
+        private const val WARM = 2
+
+        /** The modulator of the documents, and the size of the sample app's holograms. */
+        val DISPLAYS = listOf(Display(), Display(width = 960u, height = 540u))
+
+        /** So many that the quartiles are times of frames. */
+        const val FRAMES = 9
+    }
+}

@@ -1,0 +1,19 @@
+//! A live session's thread, queue and locks under shuttle, which runs one thread at a time and chooses, again and again
+//! anew, which one goes on at each lock. A schedule in which all wait for each other fails, and is printed to be run again.
+#![allow(dead_code)]
+
+mod error {
+    pub use phasefront::{Error, Result};
+}
+
+mod clock {
+    pub use std::time::Instant;
+}
+
+mod session;
+
+fn main() {
+    let schedules = std::env::var("PHASEFRONT_SCHEDULES").map_or(40_000, |count| count.parse().expect("a number"));
+    session::check(schedules);
+    println!("{schedules} schedules of each situation: every frame is told of once, and nobody waits for ever");
+}

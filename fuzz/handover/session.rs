@@ -1,0 +1,148 @@
+//! The core's own files, with shuttle's threads and locks, and what is done with them.
+
+mod sync {
+    pub(super) use shuttle::sync::{Arc, Condvar, Mutex, MutexGuard};
+    pub(super) use shuttle::thread::{Builder, JoinHandle};
+    pub(super) use shuttle::thread_local;
+}
+mod event {
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub enum DropReason {
+        Superseded,
+        AboveTargetRate,
+        Paused,
+        Reset,
+        Closed,
+    }
+}
+#[path = "../../sdk/src/session/home.rs"]
+mod home;
+#[path = "../../sdk/src/session/live.rs"]
+mod live;
+#[path = "../../sdk/src/session/queue.rs"]
+mod queue;
+#[path = "../../sdk/src/session/statistics.rs"]
+mod statistics;
+
+use crate::error::{Error, Result};
+use live::{Live, Report, Work};
+use queue::Queue;
+use shuttle::rand::{Rng, thread_rng};
+use shuttle::sync::atomic::{AtomicU64, Ordering};
+use shuttle::sync::{Arc, Mutex};
+use shuttle::thread;
+use std::panic::resume_unwind;
+
+/// Work during which others may go on, which fails or panics at times.
+struct Fake {
+    broken: bool,
+}
+
+impl Work for Fake {
+    type Frame = u64;
+    type Output = u64;
+
+    fn process(&mut self, frame: &u64, _fresh: bool) -> Result<u64> {
+        assert!(!self.broken, "not recovered");
+        thread::yield_now();
+        match thread_rng().gen_range(0..8) {
+            0 => Err(Error::Frame("bad".into())),
+            1 => {
+                self.broken = true;
+                resume_unwind(Box::new("worse"))
+            }
+            _ => Ok(*frame),
+        }
+    }
+
+    fn recover(&mut self) {
+        self.broken = false;
+    }
+}
+
+/// Two cameras, one that resets, pauses and closes, a listener that panics at times.
+fn cameras_and_a_hand() {
+    let told = Arc::new(AtomicU64::new(0));
+    let heard = told.clone();
+    let listener = move |report| {
+        if let Report::ListenerPanicked = report {
+            return;
+        }
+        heard.fetch_add(1, Ordering::SeqCst);
+        if thread_rng().gen_range(0..10) == 0 {
+            resume_unwind(Box::new("listener"));
+        }
+    };
+    let live = Arc::new(Live::start(Fake { broken: false }, None, listener).expect("a thread"));
+    let clock = Arc::new(AtomicU64::new(0));
+    let camera = || {
+        let (live, clock) = (live.clone(), clock.clone());
+        thread::spawn(move || {
+            for _ in 0..4 {
+                let now = clock.fetch_add(1, Ordering::SeqCst);
+                // Closed or late: refused.
+                let _ = live.submit(now, |_| now);
+            }
+        })
+    };
+    let cameras = [camera(), camera()];
+    for _ in 0..thread_rng().gen_range(0..4) {
+        match thread_rng().gen_range(0..3) {
+            0 => live.change(Queue::reset),
+            1 => live.change(Queue::pause),
+            _ => live.change(|queue| {
+                queue.resume();
+                None
+            }),
+        }
+    }
+    if thread_rng().gen_range(0..2) == 0 {
+        live.close();
+    }
+    for camera in cameras {
+        camera.join().expect("a camera that ends");
+    }
+    live.close();
+    let counts = live.look(|queue| queue.gate.counts);
+    assert_eq!((counts.pending(), counts.submitted), (0, 8));
+    let known = counts.processed + counts.failed + counts.dropped.total();
+    assert_eq!(told.load(Ordering::SeqCst), known);
+}
+
+/// Two sessions whose listeners close each other.
+fn each_closes_the_other() {
+    type Sessions = [Mutex<Option<Arc<Live<Fake>>>>; 2];
+    let sessions: Arc<Sessions> = Arc::new([Mutex::new(None), Mutex::new(None)]);
+    for i in 0..2 {
+        let others = sessions.clone();
+        let listener = move |_| {
+            let other = others[1 - i].lock().expect("a lock").clone();
+            if let Some(other) = other {
+                other.close();
+            }
+        };
+        let live = Live::start(Fake { broken: false }, None, listener).expect("a thread");
+        *sessions[i].lock().expect("a lock") = Some(Arc::new(live));
+    }
+    let [first, second] = [0, 1].map(|i| sessions[i].lock().expect("a lock").clone().expect("a session"));
+    let other = thread::spawn(move || {
+        let _ = second.submit(1, |_| 1);
+        second.close();
+    });
+    let _ = first.submit(1, |_| 1);
+    first.close();
+    other.join().expect("a camera that ends");
+    // They hold each other.
+    sessions
+        .iter()
+        .for_each(|session| drop(session.lock().expect("a lock").take()));
+}
+
+/// `schedules` of each situation, half of them wholly by chance.
+pub(crate) fn check(schedules: usize) {
+    for situation in [cameras_and_a_hand, each_closes_the_other] {
+        shuttle::check_random(situation, schedules / 2);
+        // Those that seldom change from one thread to the next.
+        shuttle::check_pct(situation, schedules / 2, 3);
+    }
+}

@@ -1,0 +1,33 @@
+// Unity's package outside Unity: `Try COLOUR.ppm DEPTH.pgm WIDTH HEIGHT LEVELS` writes the levels of red of an RGB-D image.
+using System;
+using System.IO;
+using System.Linq;
+using Phasefront;
+
+internal static class Try
+{
+    private static int Main(string[] arguments)
+    {
+        var width = int.Parse(arguments[2]);
+        var height = int.Parse(arguments[3]);
+        var rgb = Last(arguments[0], width * height * 3);
+        var depth = Last(arguments[1], width * height);
+        using (var target = Target.FromToml("width = " + width + "\nheight = " + height))
+        using (var options = SessionOptions.For(target))
+        using (var session = Session.Open(options, RunningMode.Image))
+        using (var hologram = session.Process(new Frame
+        {
+            Colour = new Colour { Format = ColourFormat.Rgb, Width = width, Height = height, Planes = new[] { new Plane(rgb, width * 3, 3) } },
+            Depth = new Depth { Format = DepthFormat.NormalizedU8, Width = width, Height = height, Plane = new Plane(depth, width, 1) },
+        }))
+            File.WriteAllBytes(arguments[4], hologram.Levels(0));
+        return 0;
+    }
+
+    /// The pixels of a Netpbm file are its end.
+    private static byte[] Last(string path, int count)
+    {
+        var all = File.ReadAllBytes(path);
+        return all.Skip(all.Length - count).ToArray();
+    }
+}

@@ -1,0 +1,72 @@
+import java.awt.image.BufferedImage
+import java.io.File
+import java.nio.ByteBuffer
+import java.nio.ByteOrder
+import javax.imageio.ImageIO
+import kotlin.math.sqrt
+import kotlin.test.Test
+import kotlin.test.assertContains
+import kotlin.test.assertTrue
+import org.phasefront.ColourFormat
+import org.phasefront.ColourImage
+import org.phasefront.DepthFormat
+import org.phasefront.DepthImage
+import org.phasefront.Display
+import org.phasefront.Frame
+import org.phasefront.Plane
+import org.phasefront.RunningMode
+import org.phasefront.Session
+import org.phasefront.sessionOptions
+import org.phasefront.thirdPartyNotices
+
+/** The sample scene to its hologram, with what the repository has. */
+class SampleTest {
+    private fun image(name: String): BufferedImage = ImageIO.read(File(System.getProperty("samples"), name))
+
+    /** Calls [put] with each number of [image], row by row, and gives the buffer of [size] bytes that it fills. */
+    private fun direct(image: BufferedImage, size: Int, put: ByteBuffer.(Int) -> Unit): ByteBuffer {
+        val bytes = ByteBuffer.allocateDirect(size).order(ByteOrder.nativeOrder())
+        for (y in 0 until image.height) {
+            for (x in 0 until image.width) {
+                repeat(image.raster.numBands) { band -> bytes.put(image.raster.getSample(x, y, band)) }
+            }
+        }
+        return bytes.flip()
+    }
+
+    @Test
+    fun theSampleBecomesAHologramThatShowsIt() {
+        val (colour, depth) = image("scene_rgb.jpg") to image("scene_depth.png")
+        val rgb = direct(colour, 3 * colour.width * colour.height) { put(it.toByte()) }
+        val d = direct(depth, 2 * depth.width * depth.height) { putShort(it.toShort()) }
+        val frame = Frame(
+            0,
+            ColourImage(ColourFormat.RGB, colour.width, colour.height, rgb),
+            DepthImage(DepthFormat.NORMALIZED_U16, depth.width, depth.height, Plane(d, 2 * depth.width, 2)),
+        )
+        // The picture's sides are twelve times the view's.
+        val (width, height) = 160 to 90
+        val options = sessionOptions(Display(width = 480u, height = 270u))
+        Session(options, RunningMode.IMAGE).use { session ->
+            session.process(frame).use { hologram ->
+                hologram.preview(hologram.zAt(0.5, 0.5), width, height).use { view ->
+                    val shown = view.useBytes { seen ->
+                        List(width * height) { seen.get(4 * it + 1).toUByte().toDouble() }
+                    }
+                    val wanted = List(width * height) {
+                        val (x, y) = it % width * 12 to it / width * 12
+                        colour.raster.getSamples(x, y, 12, 12, 1, null as IntArray?).average()
+                    }
+                    assertTrue(correlation(shown, wanted) > 0.9, "${correlation(shown, wanted)}")
+                }
+            }
+        }
+        assertContains(thirdPartyNotices(), "uniffi")
+    }
+
+    private fun correlation(a: List<Double>, b: List<Double>): Double {
+        val (meanA, meanB) = a.average() to b.average()
+        val together = a.zip(b).sumOf { (p, q) -> (p - meanA) * (q - meanB) }
+        return together / sqrt(a.sumOf { (it - meanA) * (it - meanA) } * b.sumOf { (it - meanB) * (it - meanB) })
+    }
+}
