@@ -54,8 +54,8 @@ impl Stage {
     }
 }
 
-/// Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
-/// not call the library. What it throws is ignored.
+/// Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
+/// must not call the library. What it throws is ignored.
 #[uniffi::export(foreign)]
 pub trait StageListener: Send + Sync {
     /// A stage begins on this thread.

@@ -1,5 +1,6 @@
 //! A live session's thread, queue and locks under shuttle, which runs one thread at a time and chooses, again and again
-//! anew, which one goes on at each lock. A schedule in which all wait for each other fails, and is printed to be run again.
+//! anew, which one goes on at each lock. A schedule in which all wait for each other fails, and is printed to be run
+//! again.
 #![allow(dead_code)]
 
 mod error {

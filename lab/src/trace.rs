@@ -24,9 +24,9 @@ impl Write for Kept {
     }
 }
 
-/// Does `work`, and writes to `path` the trace of its stages in Chrome's format: about 3 kB a frame, which stay in memory
-/// till the end. Spans are those of the core; each has its name, its thread and microseconds since the start. The trace
-/// of work that fails is written too.
+/// Does `work`, and writes to `path` the trace of its stages in Chrome's format: about 3 kB a frame, which stay in
+/// memory till the end. Spans are those of the core; each has its name, its thread and microseconds since the start.
+/// The trace of work that fails is written too.
 ///
 /// # Errors
 /// Those of `work`, or a place that cannot be written.
