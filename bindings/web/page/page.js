@@ -16,10 +16,12 @@ worker.addEventListener("message", ({ data: { id, answer, error } }) => {
   else fail(new Error(error));
 });
 
-function ask(kind, said = {}, memory = []) {
+worker.addEventListener("error", () => say(new Error("the worker cannot start; is a file of the page missing?")));
+
+function ask(kind, said = {}) {
   return new Promise((done, fail) => {
     waiting.set(++last, { done, fail });
-    worker.postMessage({ id: last, kind, ...said }, memory);
+    worker.postMessage({ id: last, kind, ...said });
   });
 }
 
