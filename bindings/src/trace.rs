@@ -65,6 +65,8 @@ pub trait StageListener: Send + Sync {
 }
 
 static LISTENER: RwLock<Option<Arc<dyn StageListener>>> = RwLock::new(None);
+/// Whether the spans of this process come here; known once a listener was set.
+static COLLECTING: OnceLock<bool> = OnceLock::new();
 
 fn listener() -> Option<Arc<dyn StageListener>> {
     LISTENER.read().unwrap_or_else(PoisonError::into_inner).clone()
@@ -77,7 +79,6 @@ fn listener() -> Option<Arc<dyn StageListener>> {
 /// A process that already collects Rust's `tracing` elsewhere: the spans of stages go there.
 #[uniffi::export]
 pub fn set_stage_listener(listener: Option<Arc<dyn StageListener>>) -> Result<(), PhasefrontError> {
-    static COLLECTING: OnceLock<bool> = OnceLock::new();
     guard(|| {
         let before = std::mem::replace(&mut *LISTENER.write().unwrap_or_else(PoisonError::into_inner), listener);
         // Not under the lock: what ends with the listener may call the library.
