@@ -122,7 +122,7 @@ DOCUMENTS = {
     'SessionListener.on_dropped': 'A frame was dropped.',
     'SessionListener.on_failed': 'A frame could not be processed. The session goes on.',
     'SessionListener.on_quality_changed': 'The frames after this one are made on another rung of the ladder.',
-    'StageListener': 'Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must\nnot call the library. What it throws is ignored.',
+    'StageListener': 'Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It\nmust not call the library. What it throws is ignored.',
     'StageListener.on_begin': 'A stage begins on this thread.',
     'StageListener.on_end': 'The stage that began last on this thread ends.',
 }

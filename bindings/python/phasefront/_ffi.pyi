@@ -998,8 +998,8 @@ class SessionListener:
         """The frames after this one are made on another rung of the ladder."""
 
 class StageListener:
-    """Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
-    not call the library. What it throws is ignored.
+    """Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
+    must not call the library. What it throws is ignored.
     """
     def on_begin(self, stage: Stage) -> None:
         """A stage begins on this thread."""

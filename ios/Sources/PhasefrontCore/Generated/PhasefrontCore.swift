@@ -2488,8 +2488,8 @@ public func FfiConverterTypeSessionListener_lower(_ value: SessionListener) -> U
 
 
 /**
- * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
- * not call the library. What it throws is ignored.
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
+ * must not call the library. What it throws is ignored.
  */
 public protocol StageListener: AnyObject, Sendable {
     
@@ -2505,8 +2505,8 @@ public protocol StageListener: AnyObject, Sendable {
     
 }
 /**
- * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It must
- * not call the library. What it throws is ignored.
+ * Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It
+ * must not call the library. What it throws is ignored.
  */
 open class StageListenerImpl: StageListener, @unchecked Sendable {
     fileprivate let handle: UInt64
