@@ -4,8 +4,8 @@ use crate::clock::Instant;
 use std::time::Duration;
 use tracing::span::EnteredSpan;
 
-/// A stage that is under way on this thread. Its span ends when it is dropped. Without a listener a span costs two
-/// comparisons.
+/// A stage that is under way on this thread. Its span ends when it is dropped. Without a listener a span costs
+/// some 20 ns.
 pub(crate) struct Stage {
     start: Instant,
     _span: EnteredSpan,
