@@ -13,6 +13,11 @@ cannot() {
     exit 77
 }
 
+# Copies the tree to folder $1, with a history and what is not committed yet, or fails.
+copy_tree() {
+    git clone --quiet . "$1" && git ls-files -z -m -o --exclude-standard | xargs -0 -r cp --parents -Pt "$1"
+}
+
 # Runs a command as root, or fails.
 as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
