@@ -3,6 +3,9 @@
 //! again.
 #![allow(dead_code)]
 
+#[path = "../../sdk/src/cancel.rs"]
+mod cancel;
+
 mod error {
     pub use phasefront::{Error, Result};
 }

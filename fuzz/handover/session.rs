@@ -58,6 +58,10 @@ impl Work for Fake {
     fn recover(&mut self) {
         self.broken = false;
     }
+
+    fn cancel(&self) -> crate::cancel::Cancel {
+        crate::cancel::Cancel::default()
+    }
 }
 
 /// Two cameras, one that resets, pauses and closes, a listener that panics at times.

@@ -7,7 +7,7 @@ use phasefront::input::{
     Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
 };
 use phasefront::session::RunningMode;
-use phasefront::{Display, Method, Result, Session, SessionOptions, Sweep};
+use phasefront::{Display, EncoderOptions, Encoding, Method, Result, Session, SessionOptions, Sweep};
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 
@@ -59,6 +59,7 @@ fn session() -> &'static Session {
         };
         let method = Method::Sweep(sweep);
         let mut options = SessionOptions::new(display, method);
+        options.encoder = EncoderOptions::plain(Encoding::DoublePhase);
         options.threads = NonZeroUsize::new(1);
         Session::new(options, RunningMode::Video).expect("a session")
     })

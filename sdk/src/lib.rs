@@ -72,6 +72,7 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod brightness;
+mod cancel;
 mod clock;
 mod depth;
 pub mod device;

@@ -1,5 +1,6 @@
 //! How the hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
 
+use crate::cancel::Cancel;
 use crate::depth::sharpness;
 use crate::display::Display;
 use crate::error::{Error, Result};
@@ -87,6 +88,21 @@ enum Scratch {
         /// Whether the frame before was sharp.
         was_sharp: Option<bool>,
     },
+}
+
+impl MethodScratch {
+    /// Has frames end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        match &mut self.0 {
+            Scratch::Network(scratch) => scratch.heed(cancel),
+            Scratch::Sweep(scratch) => scratch.heed(cancel),
+            Scratch::Seeded(scratch) => scratch.heed(cancel),
+            Scratch::BySharpness { sweep, trained, .. } => {
+                sweep.heed(cancel);
+                trained.heed(cancel);
+            }
+        }
+    }
 }
 
 impl MethodPlan {

@@ -4,6 +4,7 @@
 //! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
 
 use crate::brightness::{Brightness, Past, Percentile};
+use crate::cancel::Cancel;
 use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
 use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
 use crate::error::Result;
@@ -45,6 +46,18 @@ pub struct ModulatorScratch {
     /// Where phases lie in memory before they become levels.
     phases: Vec<f32>,
     percentile: Percentile,
+    cancel: Cancel,
+}
+
+impl ModulatorScratch {
+    /// Has fields end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.encoder.heed(cancel);
+        if let Some(midpoint) = &mut self.midpoint {
+            midpoint.heed(cancel);
+        }
+        self.cancel = cancel.clone();
+    }
 }
 
 /// What became of a field on the modulator.
@@ -126,6 +139,7 @@ impl Modulator {
                 false => Vec::new(),
             },
             percentile: Percentile::new(),
+            cancel: Cancel::default(),
         }
     }
 
@@ -134,9 +148,12 @@ impl Modulator {
     /// # Panics
     /// If `scratch` is another plan's, or `field` has not C·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
-        if let (Some(plans), Some(scratch)) = (&self.offset, &mut scratch.propagation) {
+        if let (Some(plans), Some(waves)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
-                plan.propagate(plane, scratch);
+                if scratch.cancel.requested() {
+                    return;
+                }
+                plan.propagate(plane, waves);
             }
         }
         if let Some(plan) = &self.registration {

@@ -28,6 +28,7 @@ pub use head::Head;
 use metadata::{Description, Served};
 pub use metadata::{InputKind, TrainedDisplay};
 
+use crate::cancel::Cancel;
 use crate::display::Display;
 use crate::{Error, Result};
 use chain::Chain;
@@ -434,6 +435,11 @@ pub struct NetworkScratch {
 }
 
 impl NetworkScratch {
+    /// Has runs end where `cancel` is requested; those on tract go on to their end.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.fused.cancel = cancel.clone();
+    }
+
     /// Bytes held between frames.
     pub fn bytes(&self) -> usize {
         #[cfg(feature = "tract")]

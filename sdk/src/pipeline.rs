@@ -2,6 +2,7 @@
 //! of each. Many frames are a session's work.
 
 use crate::brightness::Past;
+use crate::cancel::Cancel;
 use crate::encode::EncoderOptions;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
@@ -51,6 +52,14 @@ pub struct FrameReport {
     pub scale: f32,
     /// How long it took.
     pub times: StageTimes,
+}
+
+impl PipelineScratch {
+    /// Has frames end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.method.heed(cancel);
+        self.modulator.heed(cancel);
+    }
 }
 
 impl Pipeline {
@@ -195,5 +204,76 @@ impl Pipeline {
                 encode: modulation.encode,
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::display::Display;
+    use crate::encode::Encoding;
+    use crate::network::Network;
+    use crate::sweep::Sweep;
+    use std::sync::Arc;
+
+    fn network(bytes: &[u8]) -> Arc<Network> {
+        Arc::new(Network::from_onnx(bytes).unwrap())
+    }
+
+    /// What has been given up is not computed, in any stage, and leaves nothing behind that the next frame would see.
+    #[test]
+    fn a_frame_that_is_given_up_is_left_as_it_is() {
+        let (height, width) = (19, 33);
+        let display = Display::from_toml("width = 33\nheight = 19\noffset_mm = 6").unwrap();
+        let target = Target::from(display.clone());
+        let seeded = network(include_bytes!("../../models/seeded-6.onnx"));
+        let int8 = network(include_bytes!("../../models/rgbd-8-int8.onnx"));
+        let sweep = Sweep::of_planes(&display, 8);
+        let deep = network(include_bytes!("../../models/ddpm-8-6mm-prefilter.onnx"));
+        let steps = EncoderOptions {
+            midpoint_steps: 1,
+            ..EncoderOptions::default()
+        };
+        let deep = EncoderOptions {
+            encoding: Encoding::Deep(deep),
+            ..EncoderOptions::default()
+        };
+        let mut frame = RgbdFrame::black(3, (height, width));
+        let (amplitude, depth) = frame.planes_mut();
+        (amplitude.iter_mut().enumerate()).for_each(|(i, a)| *a = (i % 7) as f32 / 7.0);
+        (depth.iter_mut().enumerate()).for_each(|(i, d)| *d = (i % 5) as f32 / 5.0);
+        for (method, options) in [
+            (Method::Network(int8.clone()), EncoderOptions::default()),
+            (Method::Network(int8.clone()), deep),
+            (Method::Seeded(seeded), EncoderOptions::default()),
+            (Method::Sweep(sweep), steps),
+            (Method::BySharpness(sweep, int8), EncoderOptions::default()),
+        ] {
+            let pipeline = Pipeline::new((height, width), method, &target, &options).unwrap();
+            let values = 3 * height * width;
+            let untouched = Complex32::new(1.5, -2.5);
+            let run = |scratch: &mut PipelineScratch| {
+                let (mut field, mut levels) = (vec![untouched; values], vec![77; values]);
+                pipeline.process(&frame, &mut field, &mut levels, scratch).unwrap();
+                (field, levels)
+            };
+            let whole = run(&mut pipeline.scratch());
+            assert!(whole.1.iter().any(|level| *level != 77));
+            let (mut scratch, cancel) = (pipeline.scratch(), Cancel::default());
+            scratch.heed(&cancel);
+            cancel.request();
+            let (field, levels) = run(&mut scratch);
+            // But for the mean phase, which every value is turned by.
+            assert!(field.iter().all(|u| (u.norm() - untouched.norm()).abs() < 1e-5));
+            let changed = levels.iter().filter(|level| **level != 77).count();
+            // Where phases lie in memory first, those of nothing become levels.
+            assert!(
+                changed == 0 || levels.iter().all(|level| *level == levels[0]),
+                "{changed}"
+            );
+            cancel.clear();
+            assert!(run(&mut scratch) == whole);
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½) of the three
 //! colours, then ½ Im u, so that one range of 8 bits holds all. Its head adds the output to u.
 
+use crate::cancel::Cancel;
 use crate::display::Display;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
@@ -33,6 +34,14 @@ pub struct SeededScratch {
     seed: Vec<Complex32>,
     sweep: SweepScratch,
     network: NetworkScratch,
+}
+
+impl SeededScratch {
+    /// Has frames end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.sweep.heed(cancel);
+        self.network.heed(cancel);
+    }
 }
 
 impl SeededPlan {

@@ -33,6 +33,7 @@ pub use on_gpu::GpuOptions;
 pub use quality::{Backend, Quality, QualityChange, QualityReason, Rung, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
+use crate::cancel::Cancel;
 use crate::clock::Instant;
 use crate::depth::camera::CameraFrame;
 use crate::encode::EncoderOptions;
@@ -176,6 +177,7 @@ struct Shared {
     stages: Mutex<Option<Stages>>,
     control: Mutex<Control>,
     recent: Mutex<Recent>,
+    cancel: Cancel,
 }
 
 enum Mode {
@@ -233,6 +235,10 @@ impl Work for LiveWork {
     fn recover(&mut self) {
         self.0.recover();
     }
+
+    fn cancel(&self) -> Cancel {
+        self.0.cancel.clone()
+    }
 }
 
 impl Drop for LiveWork {
@@ -280,17 +286,19 @@ impl Session {
             thermal: Thermal::Nominal,
         };
         let period_ns = options.target_rate_hz.map(|rate| (1e9 / rate) as u64);
-        let mut stages = Stages::new(options)?;
+        let cancel = Cancel::default();
+        let mut stages = Stages::new(options, cancel.clone())?;
         let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.rung());
         let shared = Arc::new(Shared {
             home: Home::here(),
             stages: Mutex::new(Some(stages)),
             control: Mutex::new(control),
             recent: Mutex::new(recent),
+            cancel: cancel.clone(),
         });
         let mode = match mode {
-            RunningMode::Image => Mode::Image(Mutex::new(Gate::new())),
-            RunningMode::Video => Mode::Video(Mutex::new(Gate::new())),
+            RunningMode::Image => Mode::Image(Mutex::new(Gate::new(cancel))),
+            RunningMode::Video => Mode::Video(Mutex::new(Gate::new(cancel))),
             RunningMode::Live(_) if cfg!(target_family = "wasm") => {
                 return Err(Error::Session(
                     "a live one has a thread of its own, and WebAssembly has none; make a video session, and process frames \
@@ -311,8 +319,8 @@ impl Session {
     /// answered one after another.
     ///
     /// # Errors
-    /// A frame that is not usable, a late one in a video session, a session that is live, paused or closed, or a panic
-    /// inside. None of them harms the frames that follow.
+    /// A frame that is not usable, a late one in a video session, a session that is live, paused or closed, or reset or
+    /// closed while the frame is computed, or a panic inside. None of them harms the frames that follow.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         let (gate, video) = match &self.mode {
             Mode::Image(gate) => (gate, false),
@@ -332,7 +340,7 @@ impl Session {
                 gate.counts.dropped.count(DropReason::Paused);
                 return Err(Error::Session("it is paused; resume it first".into()));
             }
-            std::mem::take(&mut gate.fresh)
+            gate.begin()
         };
         // There are stages as long as the gate is open.
         let stages = stages.as_mut().ok_or_else(queue::closed)?;
@@ -343,14 +351,18 @@ impl Session {
         if panicked {
             stages.recover();
         }
-        let counts = &mut lock(gate).counts;
+        let Gate { counts, closed, .. } = &mut *lock(gate);
         match result {
             Ok(made) => {
                 counts.processed += 1;
                 Ok(made.hologram)
             }
             Err(error) => {
-                counts.failed += 1;
+                match (self.shared.cancel.requested(), *closed) {
+                    (false, _) => counts.failed += 1,
+                    (true, true) => counts.dropped.count(DropReason::Closed),
+                    (true, false) => counts.dropped.count(DropReason::Reset),
+                }
                 Err(error)
             }
         }
@@ -371,7 +383,7 @@ impl Session {
         let fresh = {
             let mut gate = lock(gate);
             gate.admit(frame.timestamp_ns, true)?;
-            std::mem::take(&mut gate.fresh)
+            gate.begin()
         };
         let stages = stages.as_mut().ok_or_else(queue::closed)?;
         let (result, panicked) = guarded(|| {
@@ -422,7 +434,8 @@ impl Session {
     }
 
     /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
-    /// first again.
+    /// first again. A frame that is being computed is given up, on the CPU within a row, tile or plane of its work; a GPU
+    /// and a network on tract end it first. [`Self::process`] then gives an error.
     pub fn reset(&self) {
         match &self.mode {
             Mode::Image(gate) | Mode::Video(gate) => lock(gate).reset(),
@@ -450,14 +463,14 @@ impl Session {
         }
     }
 
-    /// Takes no more frames and gives the memory back; the statistics stay. An image or video session first ends the
-    /// frame in flight. A live session drops what waits or is in flight; when this returns, its listener has heard
+    /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up, as
+    /// by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has heard
     /// everything and will not be called again. Called by a listener, of this session or another, it does not wait for
     /// that. Results that were handed out stay valid. Dropping a session closes it.
     pub fn close(&self) {
         match &self.mode {
             Mode::Image(gate) | Mode::Video(gate) => {
-                lock(gate).closed = true;
+                lock(gate).close();
                 if self.shared.home.is_here() {
                     self.shared.end();
                 }

@@ -22,6 +22,7 @@ pub mod reference;
 mod tile;
 mod workers;
 
+use crate::cancel::Cancel;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::frame::RgbdFrame;
@@ -179,6 +180,14 @@ pub struct SweepScratch {
     sources: Vec<u32>,
     hidden: HiddenScratch,
     tiles: Workers<TileScratch>,
+    cancel: Cancel,
+}
+
+impl SweepScratch {
+    /// Has frames end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.cancel = cancel.clone();
+    }
 }
 
 impl SweepPlan {
@@ -279,6 +288,7 @@ impl SweepPlan {
                 scratch.reserve(self.layout.most_points(layers + 1).min(all));
                 scratch
             }),
+            cancel: Cancel::default(),
         }
     }
 
@@ -319,6 +329,9 @@ impl SweepPlan {
         let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
         let (down, across) = self.layout.count(self.height, self.width);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
+            if scratch.cancel.requested() {
+                return;
+            }
             let tile = Tile::of(&self.layout, self.fir, surfaces, index);
             scratch.tiles.with(|scratch| {
                 tile.gather(scratch);

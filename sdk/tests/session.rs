@@ -298,6 +298,43 @@ fn timestamp_of(session: &Session) -> u64 {
     }
 }
 
+/// One who resets or closes a session does not wait for a frame that nobody wants any more.
+#[test]
+fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
+    let (height, width) = (480, 640);
+    let scene = Scene::new(height, width, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let session = Session::new(options(width, height), RunningMode::Video).unwrap();
+    let first = session.process(&frame(1, &scene, &metres)).unwrap();
+    // Again and again, until a frame is met while it is computed.
+    let met = |end: &(dyn Fn() + Sync)| {
+        let processing = std::sync::atomic::AtomicBool::new(true);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while processing.load(std::sync::atomic::Ordering::Relaxed) {
+                    end();
+                    std::thread::sleep(std::time::Duration::from_millis(1));
+                }
+            });
+            let why = (2..).find_map(|time| session.process(&frame(time, &scene, &metres)).err());
+            processing.store(false, std::sync::atomic::Ordering::Relaxed);
+            why.unwrap().to_string()
+        })
+    };
+    let why = met(&|| session.reset());
+    assert!(why.contains("given up"), "{why}");
+    let s = session.statistics();
+    assert_eq!((s.dropped.reset, s.failed, s.pending), (1, 0, 0));
+    session.reset();
+    let again = session.process(&frame(1, &scene, &metres)).unwrap();
+    assert!(again.levels() == first.levels());
+    // Closed before a frame begins it refuses the frame; either way nothing is pending.
+    let why = met(&|| session.close());
+    assert!(why.contains("given up") || why.contains("closed"), "{why}");
+    let s = session.statistics();
+    assert_eq!((s.dropped.closed + s.refused, s.failed, s.pending), (1, 0, 0));
+}
+
 #[test]
 fn modes_pause_and_close_are_kept_to() {
     let scene = Scene::new(H, W, 10);
@@ -454,7 +491,8 @@ fn closing_while_a_frame_is_processed_leaves_none_pending() {
             session.close();
             let statistics = session.statistics();
             assert_eq!(statistics.pending, 0);
-            assert_eq!(statistics.submitted, statistics.processed + statistics.refused);
+            let known = statistics.processed + statistics.refused + statistics.dropped.closed;
+            assert_eq!(statistics.submitted, known);
         });
         assert!(session.warm_up().unwrap_err().to_string().contains("closed"));
     }

@@ -184,6 +184,11 @@ pub trait Rows<const PLANES: usize>: Sync {
 
     /// Takes the values of `row` from column `from` on, one run of pixels for each output; they may be worked on there.
     fn write(&self, row: usize, from: usize, values: [&mut [f32]; OUTPUTS], band: &mut Band<'_, Self::Value, PLANES>);
+
+    /// Whether nobody wants the rest any more. Asked before each row of a strip; what follows is then left out.
+    fn given_up(&self) -> bool {
+        false
+    }
 }
 
 /// Some rows of the planes that a chain's rows are written to.
@@ -440,6 +445,9 @@ impl<C: Chain, R> Frame<'_, C, R> {
         let (top, bottom) = (rows.start as isize, rows.end as isize);
         let (height, depth) = (self.height as isize, layers as isize);
         for step in top - depth..bottom + depth {
+            if self.rows.given_up() {
+                return;
+            }
             for (i, reach) in (1..=depth).rev().enumerate() {
                 let row = step - i as isize;
                 if !(top - reach..bottom + reach).contains(&row) {

@@ -6,6 +6,7 @@ use super::encoding::{Prefilter, PrefilterScratch};
 use super::local::{LocalFilter, LocalScratch, Wanted};
 use super::start::{Start, StartScratch};
 use super::{EncoderOptions, double_phase};
+use crate::cancel::Cancel;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
 use crate::slm::Response;
@@ -40,6 +41,17 @@ pub struct EncoderScratch {
     parts: Vec<PartScratch>,
     /// The largest |u|² of each row.
     most: Vec<f32>,
+    cancel: Cancel,
+}
+
+impl EncoderScratch {
+    /// Has fields end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        if let Some(prefilter) = &mut self.prefilter {
+            prefilter.heed(cancel);
+        }
+        self.cancel = cancel.clone();
+    }
 }
 
 struct PartScratch {
@@ -116,6 +128,7 @@ impl Encoder {
             wanted,
             parts: (0..2 * rayon::current_num_threads()).map(|_| part()).collect(),
             most: vec![0.0; self.colours * self.height],
+            cancel: Cancel::default(),
         }
     }
 
@@ -232,10 +245,15 @@ impl Encoder {
         let (height, width) = (self.height, self.width);
         let per_row = out.len() / (self.colours * height);
         assert!(out.len() == self.colours * height * per_row && (per_row == 1 || per_row == width));
-        let EncoderScratch { wanted, parts, .. } = scratch;
+        let EncoderScratch {
+            wanted, parts, cancel, ..
+        } = scratch;
         let wanted: &[Complex32] = if wanted.is_empty() { field } else { wanted };
         let band = height.div_ceil(parts.len());
         for (colour, out) in out.chunks_exact_mut(height * per_row).enumerate() {
+            if cancel.requested() {
+                return;
+            }
             let plane = |stack| &<[Complex32]>::as_ref(stack)[colour * height * width..][..height * width];
             let start = Start {
                 plane: plane(field),

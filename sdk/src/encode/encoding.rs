@@ -5,6 +5,7 @@ pub mod anti_alias;
 pub mod band_limit;
 pub mod deep;
 
+use crate::cancel::Cancel;
 use crate::display::Display;
 use crate::error::Result;
 use crate::network::Network;
@@ -77,6 +78,15 @@ pub(super) enum Prefilter {
 pub(super) enum PrefilterScratch {
     Spectrum(ConvolveScratch),
     Deep(DeepScratch),
+}
+
+impl PrefilterScratch {
+    /// Has a network end where `cancel` is requested.
+    pub(super) fn heed(&mut self, cancel: &Cancel) {
+        if let PrefilterScratch::Deep(scratch) = self {
+            scratch.heed(cancel);
+        }
+    }
 }
 
 impl Prefilter {

@@ -10,6 +10,7 @@
 //! λ = 0 asks for the amplitude alone, as Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
 //! focus; λ = 1 asks for the wave, whose phase the eye does not see.
 
+use crate::cancel::Cancel;
 use crate::error::Result;
 use crate::illumination::Illumination;
 use crate::target::Target;
@@ -58,6 +59,14 @@ pub struct MidpointScratch {
     shown: Vec<Complex32>,
     /// L.
     light: Vec<f32>,
+    cancel: Cancel,
+}
+
+impl MidpointScratch {
+    /// Has steps end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.cancel = cancel.clone();
+    }
 }
 
 impl MidpointSteps {
@@ -113,6 +122,7 @@ impl MidpointSteps {
             missing: plane(),
             shown: plane(),
             light: vec![1.0; self.height * self.width],
+            cancel: Cancel::default(),
         }
     }
 
@@ -170,6 +180,7 @@ impl MidpointSteps {
             missing,
             shown,
             light,
+            cancel,
         } = scratch;
         let (width, radius) = (self.width, self.aperture_radius);
         if let Some((illumination, modulator)) = &self.illumination {
@@ -189,6 +200,9 @@ impl MidpointSteps {
             }
         });
         for _ in 0..self.steps {
+            if cancel.requested() {
+                return;
+            }
             missing.copy_from_slice(shown);
             self.back[colour].propagate_through(missing, radius, wave);
             let rows = missing.par_chunks_exact_mut(width).zip(wanted.par_chunks_exact(width));

@@ -3,6 +3,7 @@
 
 use super::fused::{FusedChain, FusedScratch, tanh};
 use super::{Engine, Head, InputKind};
+use crate::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
 
@@ -24,6 +25,13 @@ pub struct FilterScratch {
     fused: FusedScratch,
     /// The rows around each border between bands, as they were: border by border, (C, 2·reach, W).
     borders: Vec<Complex32>,
+}
+
+impl FilterScratch {
+    /// Has runs end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.fused.cancel = cancel.clone();
+    }
 }
 
 impl FilterPlan {
@@ -76,6 +84,7 @@ impl FilterPlan {
             head: self.head,
             colours,
             tanh: self.chain.has_tanh(),
+            cancel: &scratch.fused.cancel,
             borders: &scratch.borders,
             band_rows: tiling.band_rows,
             reach,
@@ -92,6 +101,7 @@ struct InPlace<'a, const C: usize> {
     head: Head,
     colours: [usize; C],
     tanh: bool,
+    cancel: &'a Cancel,
     borders: &'a [Complex32],
     band_rows: usize,
     reach: usize,
@@ -146,6 +156,10 @@ impl<const C: usize> Rows<C> for InPlace<'_, C> {
                 }
             }
         });
+    }
+
+    fn given_up(&self) -> bool {
+        self.cancel.requested()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::chain::{Chain, Precision, Quantisation, Weights};
 use super::{Head, InputKind, Source};
+use crate::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{
     Band, F32Chain, F32Layer, Int8Chain, Int8Layer, Isa, OUTPUTS, Quantiser, Requantise, Rows, Scratch, SkipSum,
@@ -25,6 +26,7 @@ enum Kernels {
 pub(super) struct FusedScratch {
     int8: Scratch<u8>,
     f32: Scratch<f32>,
+    pub(super) cancel: Cancel,
 }
 
 impl FusedScratch {
@@ -85,6 +87,7 @@ impl FusedChain {
             source,
             into,
             tanh: self.tanh,
+            cancel: &scratch.cancel,
         };
         let mut planes = field.chunks_exact_mut((size.0 * size.1).max(1));
         let planes: [_; C] = std::array::from_fn(|_| planes.next().unwrap_or_default());
@@ -141,6 +144,7 @@ struct FieldRows<'a, S: ?Sized, const C: usize> {
     source: &'a S,
     into: FieldOf<C>,
     tanh: bool,
+    cancel: &'a Cancel,
 }
 
 impl<S: Source + ?Sized, const C: usize> Rows<C> for FieldRows<'_, S, C> {
@@ -168,6 +172,10 @@ impl<S: Source + ?Sized, const C: usize> Rows<C> for FieldRows<'_, S, C> {
             let FieldOf { kind, head, colours } = &self.into;
             head.row(*kind, colours, values, base, field);
         });
+    }
+
+    fn given_up(&self) -> bool {
+        self.cancel.requested()
     }
 }
 

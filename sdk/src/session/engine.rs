@@ -8,6 +8,7 @@ use super::on_cpu::OnCpu;
 use super::on_gpu::{Failure, OnGpu};
 use super::quality::{Backend, Rung};
 use super::statistics::BackendReport;
+use crate::cancel::Cancel;
 use crate::depth::camera::CameraFrame;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
@@ -54,6 +55,8 @@ pub(super) struct RungContext<'a> {
     pub(super) options: &'a SessionOptions,
     pub(super) rung: &'a Rung,
     pub(super) gpu: &'a mut GpuState,
+    /// Gives up a frame on the CPU.
+    pub(super) cancel: &'a Cancel,
 }
 
 /// The plan of a rung.
@@ -79,7 +82,7 @@ impl Engine {
     pub(super) fn new(context: &mut RungContext<'_>) -> Result<Self> {
         let asked = context.rung.backend.unwrap_or(context.options.backend);
         let on_cpu = |context: &RungContext<'_>| -> Result<Processor> {
-            let cpu = OnCpu::new(context.options, context.rung)?;
+            let cpu = OnCpu::new(context.options, context.rung, context.cancel)?;
             Ok(Processor::Cpu(Box::new(cpu)))
         };
         let (processor, refusal) = match asked {
@@ -99,7 +102,7 @@ impl Engine {
     /// The GPU, or why not.
     #[cfg(feature = "gpu")]
     fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
-        let RungContext { options, rung, gpu } = context;
+        let RungContext { options, rung, gpu, .. } = context;
         if let Some(why) = &gpu.refusal {
             return Ok(Err(why.clone()));
         }
@@ -173,7 +176,7 @@ impl Engine {
                         gpu.release();
                         context.gpu.device = None;
                         self.refusal = Some(context.gpu.refuse(&why));
-                        let cpu = OnCpu::new(context.options, context.rung)?;
+                        let cpu = OnCpu::new(context.options, context.rung, context.cancel)?;
                         self.processor = Processor::Cpu(Box::new(cpu));
                         self.report_is_new = true;
                         self.process(context, input, brightness, out)

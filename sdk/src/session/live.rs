@@ -5,6 +5,7 @@ use super::event::DropReason;
 use super::home::Home;
 use super::queue::{Queue, Ticket};
 use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
+use crate::cancel::Cancel;
 use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -22,6 +23,9 @@ pub(super) trait Work: Send + 'static {
 
     /// Makes good what a panic may have left half done.
     fn recover(&mut self);
+
+    /// What gives up a frame while it is processed.
+    fn cancel(&self) -> Cancel;
 }
 
 /// What the listener of a [`Live`] hears.
@@ -94,7 +98,7 @@ impl<W: Work> Live<W> {
         listener: impl FnMut(Report<W::Output>) + Send + 'static,
     ) -> Result<Self> {
         let shared = Arc::new(Shared {
-            queue: Mutex::new(Queue::new(period_ns)),
+            queue: Mutex::new(Queue::new(period_ns, work.cancel())),
             wake: Condvar::new(),
             spare: Mutex::new(Vec::new()),
         });
@@ -278,6 +282,10 @@ mod tests {
 
         fn recover(&mut self) {
             self.broken = false;
+        }
+
+        fn cancel(&self) -> Cancel {
+            Cancel::default()
         }
     }
 

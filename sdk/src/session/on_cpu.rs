@@ -5,6 +5,7 @@ use super::engine::{Encoded, LevelsOut};
 use super::quality::Rung;
 use super::statistics::BackendReport;
 use crate::brightness::Past;
+use crate::cancel::Cancel;
 use crate::error::Result;
 use crate::frame::RgbdFrame;
 use crate::pipeline::{Pipeline, PipelineScratch};
@@ -21,13 +22,15 @@ pub(super) struct OnCpu {
 }
 
 impl OnCpu {
-    pub(super) fn new(options: &SessionOptions, rung: &Rung) -> Result<Self> {
+    pub(super) fn new(options: &SessionOptions, rung: &Rung, cancel: &Cancel) -> Result<Self> {
         let (height, width) = (rung.height, rung.width);
         let pipeline = Self::plan(options, rung)?;
         let display = &options.target.display;
         let (bits, values) = (display.bits(), display.colours() * height * width);
+        let mut scratch = pipeline.scratch();
+        scratch.heed(cancel);
         Ok(OnCpu {
-            scratch: pipeline.scratch(),
+            scratch,
             pipeline,
             field: vec![Complex32::ZERO; values],
             bits,

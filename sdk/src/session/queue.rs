@@ -3,6 +3,7 @@
 
 use super::event::DropReason;
 use super::statistics::Counts;
+use crate::cancel::Cancel;
 use crate::error::{Error, Result};
 use std::collections::VecDeque;
 
@@ -15,12 +16,15 @@ pub(super) struct Gate {
     /// Whether the next frame has no past.
     pub(super) fresh: bool,
     last_ns: Option<u64>,
+    /// Gives up the frame that is being computed.
+    cancel: Cancel,
 }
 
 impl Gate {
-    pub(super) fn new() -> Self {
+    pub(super) fn new(cancel: Cancel) -> Self {
         Gate {
             fresh: true,
+            cancel,
             ..Gate::default()
         }
     }
@@ -44,10 +48,23 @@ impl Gate {
         Ok(())
     }
 
-    /// Forgets the past.
+    /// Begins a frame; says whether it has no past.
+    pub(super) fn begin(&mut self) -> bool {
+        self.cancel.clear();
+        std::mem::take(&mut self.fresh)
+    }
+
+    /// Forgets the past, and gives up what is being computed.
     pub(super) fn reset(&mut self) {
         self.last_ns = None;
         self.fresh = true;
+        self.cancel.request();
+    }
+
+    /// Lets nothing in any more, and gives up what is being computed.
+    pub(super) fn close(&mut self) {
+        self.closed = true;
+        self.cancel.request();
     }
 }
 
@@ -98,9 +115,9 @@ pub(super) struct Queue<F> {
 
 impl<F> Queue<F> {
     /// An open queue that lets frames in no more often than every `period_ns`.
-    pub(super) fn new(period_ns: Option<u64>) -> Self {
+    pub(super) fn new(period_ns: Option<u64>, cancel: Cancel) -> Self {
         Queue {
-            gate: Gate::new(),
+            gate: Gate::new(cancel),
             waiting: None,
             in_flight: None,
             taken_ns: None,
@@ -185,7 +202,7 @@ impl<F> Queue<F> {
         self.taken_ns = Some(waiting.timestamp_ns);
         Some(Taken {
             timestamp_ns: waiting.timestamp_ns,
-            fresh: std::mem::take(&mut self.gate.fresh),
+            fresh: self.gate.begin(),
             frame: waiting.frame,
         })
     }
@@ -233,7 +250,7 @@ impl<F> Queue<F> {
 
     /// Drops what is on its way and lets nothing in any more. Gives back a frame that is not needed.
     pub(super) fn close(&mut self) -> Option<F> {
-        self.gate.closed = true;
+        self.gate.close();
         self.drop_waiting(DropReason::Closed)
     }
 
@@ -292,7 +309,7 @@ mod tests {
             let period = random.random_bool(0.3).then_some(20);
             Run {
                 random,
-                queue: Queue::new(period),
+                queue: Queue::new(period, Cancel::default()),
                 clock: 0,
                 tickets: Vec::new(),
                 flying: None,
@@ -458,7 +475,7 @@ mod tests {
             (10.0, 98, 102),
             (60.0, 300, 300),
         ] {
-            let mut queue = Queue::new(Some((1e9 / target) as u64));
+            let mut queue = Queue::new(Some((1e9 / target) as u64), Cancel::default());
             let mut random = ChaCha8Rng::seed_from_u64(4);
             let mut kept = 0;
             for frame in 0..300u64 {

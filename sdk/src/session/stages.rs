@@ -9,10 +9,11 @@ use super::on_cpu::OnCpu;
 use super::quality::{Ladder, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use super::threads::Threads;
+use crate::cancel::Cancel;
 use crate::clock::Instant;
 use crate::depth::camera::CameraFrame;
 use crate::depth::stream::{DepthReport, DepthStream};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
 use crate::stage::stage;
 use std::sync::Arc;
@@ -85,6 +86,7 @@ pub(super) struct Stages {
     words: Pool<u16>,
     depths: Pool<u16>,
     last_ns: Option<u64>,
+    cancel: Cancel,
 }
 
 /// What a frame became.
@@ -94,7 +96,8 @@ pub(super) struct Made {
 }
 
 impl Stages {
-    pub(super) fn new(options: SessionOptions) -> Result<Self> {
+    /// Frames are given up where `cancel` is requested.
+    pub(super) fn new(options: SessionOptions, cancel: Cancel) -> Result<Self> {
         let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
@@ -115,6 +118,7 @@ impl Stages {
             words: Pool::default(),
             depths: Pool::default(),
             last_ns: None,
+            cancel,
             pool,
             options,
         };
@@ -129,13 +133,19 @@ impl Stages {
             pool,
             ladder,
             gpu,
+            cancel,
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
         let shape = (rung.height, rung.width);
         let depth = DepthStream::new(options.depth, shape)?;
         let colours = options.target.display.colours();
-        let mut context = RungContext { options, rung, gpu };
+        let mut context = RungContext {
+            options,
+            rung,
+            gpu,
+            cancel,
+        };
         Ok(RungPlan {
             engine: pool.install(|| Engine::new(&mut context))?,
             frame: RgbdFrame::black(colours, shape),
@@ -178,15 +188,22 @@ impl Stages {
             options,
             gpu,
             ladder,
+            cancel,
             ..
         } = self;
+        cancel.clear();
         let rung = &options.ladder[ladder.rung()];
         let mut levels = levels.take(options.target.display.colours() * rung.height * rung.width);
         let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
         let result = pool.install(|| {
             plan.engine.process(
-                &mut RungContext { options, rung, gpu },
+                &mut RungContext {
+                    options,
+                    rung,
+                    gpu,
+                    cancel,
+                },
                 &FrameInput {
                     camera: None,
                     rgbd: &plan.frame,
@@ -281,6 +298,7 @@ impl Stages {
             options,
             ladder,
             gpu,
+            cancel,
             ..
         } = self;
         let rung = &options.ladder[ladder.rung()];
@@ -294,12 +312,18 @@ impl Stages {
         let (report, scale) = pool.install(|| -> Result<_> {
             let _frame = stage!("frame", timestamp_ns = frame.timestamp_ns);
             let report = plan.take_in(frame, elapsed, &mut times)?;
+            given_up(cancel)?;
             let depth = plan.frame.depth();
             for (to, d) in depths.values.iter_mut().zip(depth) {
                 *to = (d * 65535.0 + 0.5) as u16;
             }
             let encoded = plan.engine.process(
-                &mut RungContext { options, rung, gpu },
+                &mut RungContext {
+                    options,
+                    rung,
+                    gpu,
+                    cancel,
+                },
                 &FrameInput {
                     camera: Some(frame),
                     rgbd: &plan.frame,
@@ -311,6 +335,7 @@ impl Stages {
                     words: words.as_mut().map(|words| &mut words.values[..]),
                 },
             )?;
+            given_up(cancel)?;
             times.method = encoded.method;
             times.propagate = encoded.propagate;
             times.encode = encoded.encode;
@@ -332,6 +357,15 @@ impl Stages {
     }
 }
 
+fn given_up(cancel: &Cancel) -> Result<()> {
+    match cancel.requested() {
+        false => Ok(()),
+        true => Err(Error::Session(
+            "the frame was given up: the session was reset or closed while it was computed".into(),
+        )),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
@@ -350,7 +384,7 @@ mod tests {
         let mut options = SessionOptions::new(display, Method::Sweep(sweep));
         let best = options.ladder[0].clone();
         options.ladder.push(best.clone());
-        let mut stages = Stages::new(options).unwrap();
+        let mut stages = Stages::new(options, Cancel::default()).unwrap();
         // What was fine at the start is not any more.
         let worse = Sweep { planes: 0, ..sweep };
         stages.options.ladder[1] = Rung {

@@ -5,6 +5,7 @@
 //! it asks for that, AA-DPM's blur has gone over the field first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
+use crate::cancel::Cancel;
 use crate::display::Display;
 use crate::error::Result;
 use crate::network::{FilterPlan, FilterScratch, Network};
@@ -30,6 +31,13 @@ pub struct Deep {
 pub struct DeepScratch {
     blur: Option<AntiAliasScratch>,
     network: FilterScratch,
+}
+
+impl DeepScratch {
+    /// Has fields end where `cancel` is requested.
+    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+        self.network.heed(cancel);
+    }
 }
 
 impl Deep {

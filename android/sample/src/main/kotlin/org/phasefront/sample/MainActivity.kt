@@ -177,7 +177,7 @@ class MainActivity : Activity() {
         super.onStop()
         source?.close()
         source = null
-        // Closing waits for the frame in flight; its listener only posts to this thread, so it cannot wait for us.
+        // Closing waits for the listener, which only posts to this thread and so cannot wait for us.
         session?.close()
         session = null
         output?.dismiss()
