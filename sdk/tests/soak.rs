@@ -8,13 +8,15 @@ mod camera;
 use camera::{Scene, depth, frame, options};
 use phasefront::input::{CameraFrame, DepthFormat};
 use phasefront::session::{Event, Quality, Rung, RunningMode, Thermal};
-use phasefront::{Session, SessionOptions, Sweep};
+use phasefront::{Error, Session, SessionOptions, Sweep};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
+use tracing::span::{Attributes, Id, Record};
+use tracing::{Event as TracedEvent, Metadata, Subscriber};
 
 const W: usize = 32;
 const H: usize = 24;
@@ -48,6 +50,31 @@ struct Heard {
     made: AtomicU64,
     dropped: AtomicU64,
     failed: AtomicU64,
+    /// Of these by a panic of the work.
+    panicked: AtomicU64,
+}
+
+/// Panics in the midst of a frame: where one of so many stages begins, on the threads that compute.
+struct Panicking(AtomicU64);
+
+impl Subscriber for Panicking {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        ["colour", "depth", "method", "propagate", "encode"].contains(&metadata.name())
+    }
+
+    fn new_span(&self, _: &Attributes<'_>) -> Id {
+        if self.0.fetch_add(1, Ordering::Relaxed) % 499 == 498 {
+            // Without the hook's message on stderr.
+            std::panic::resume_unwind(Box::new("the work"));
+        }
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+    fn event(&self, _: &TracedEvent<'_>) {}
+    fn enter(&self, _: &Id) {}
+    fn exit(&self, _: &Id) {}
 }
 
 /// A ladder of a network and a sweep, so that both are worked with.
@@ -137,7 +164,13 @@ fn run(frames: u64, seed: u64) -> Heard {
                     }
                 }
                 Event::Dropped { .. } => _ = heard.dropped.fetch_add(1, Ordering::Relaxed),
-                Event::Failed { .. } => _ = heard.failed.fetch_add(1, Ordering::Relaxed),
+                Event::Failed { error, .. } => {
+                    heard.failed.fetch_add(1, Ordering::Relaxed);
+                    if let Error::Internal(why) = error {
+                        assert_eq!(why, "the work");
+                        heard.panicked.fetch_add(1, Ordering::Relaxed);
+                    }
+                }
                 _ => {}
             }
             if random.random_bool(0.02) {
@@ -168,12 +201,17 @@ fn run(frames: u64, seed: u64) -> Heard {
 #[test]
 fn nothing_grows_and_nothing_is_lost_under_load_and_faults() {
     let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(4000, |n| n.parse().unwrap());
+    tracing::subscriber::set_global_default(Panicking(AtomicU64::new(0))).unwrap();
     // Two short runs first, so that all that is made once is there.
     (0..2).for_each(|seed| _ = run(1000, seed));
     let before = Held::now();
     let heard = run(frames, 2);
     // A short run may drop each of its few frames that show nothing.
-    assert!(heard.failed.load(Ordering::Relaxed) > 0, "no frame failed");
+    let [failed, panicked] = [&heard.failed, &heard.panicked].map(|count| count.load(Ordering::Relaxed));
+    assert!(
+        failed > panicked && panicked > 0,
+        "{failed} failed, {panicked} of them by panics"
+    );
     let mut after = Held::now();
     // Threads end a moment after their pool.
     for _ in 0..100 {
@@ -184,8 +222,8 @@ fn nothing_grows_and_nothing_is_lost_under_load_and_faults() {
         after = Held::now();
     }
     println!(
-        "{frames} frames: {:?} made, {:?} dropped, {:?} failed; {before:?}, then {after:?}",
-        heard.made, heard.dropped, heard.failed
+        "{frames} frames: {:?} made, {:?} dropped, {failed} failed, {panicked} of them by panics; {before:?}, then {after:?}",
+        heard.made, heard.dropped
     );
     assert!(
         after.threads <= before.threads && after.handles <= before.handles,

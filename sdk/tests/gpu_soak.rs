@@ -1,0 +1,77 @@
+//! A live session whose GPU goes again and again. A test by itself, because it measures its process.
+//! `PHASEFRONT_SOAK=10000 cargo test --release --workspace --test gpu_soak -- --nocapture` is the long run.
+#![cfg(all(feature = "gpu", target_os = "linux"))]
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+#[path = "../../tests/driver.rs"]
+mod driver;
+
+use camera::{Scene, frame, options};
+use phasefront::input::DepthFormat;
+use phasefront::session::{Backend, Event, RunningMode};
+use phasefront::unstable::gpu::{Device, DeviceOptions};
+use phasefront::{Error, Session};
+use std::sync::mpsc;
+
+/// Each frame is answered, and memory does not grow with the losses.
+#[test]
+fn nothing_grows_where_devices_go() {
+    // glibc keeps what threads that have ended freed, for others of their kind, and each opening has a few: with one pool of
+    // memory it is seen what is held.
+    if std::env::var_os("MALLOC_ARENA_MAX").is_none() {
+        let mut again = std::process::Command::new(std::env::current_exe().unwrap());
+        again.args(std::env::args_os().skip(1)).env("MALLOC_ARENA_MAX", "1");
+        assert!(again.status().unwrap().success());
+        return;
+    }
+    let open = |name| {
+        let device = DeviceOptions { name, programs: None };
+        Device::open(&device).map(|_| device)
+    };
+    let Some(device) = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into())))) else {
+        return;
+    };
+    let mut options = options(32, 24);
+    options.backend = Backend::Gpu;
+    options.gpu.device = device;
+    let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(240, |n| n.parse().unwrap());
+    let scene = Scene::new(24, 32, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let held = || {
+        let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
+        let pages: usize = statm.split(' ').nth(1).unwrap().parse().unwrap();
+        let handles = std::fs::read_dir("/proc/self/fd").unwrap().count();
+        (4096 * pages, handles)
+    };
+    let (sender, events) = mpsc::channel();
+    let listener = move |event| sender.send(event).unwrap();
+    let session = Session::new(options, RunningMode::Live(Box::new(listener))).unwrap();
+    let (mut made, mut lost) = (0, 0);
+    let mut run = |frames: std::ops::Range<u64>| {
+        for i in frames {
+            session.submit(&frame(i + 1, &scene, &metres)).unwrap();
+            if let (true, Some(device)) = (i % 40 == 39, session.gpu()) {
+                device.wgpu().0.destroy();
+            }
+            match events.recv().unwrap() {
+                Event::Hologram(_) => made += 1,
+                Event::Failed {
+                    error: Error::Lost(_), ..
+                } => lost += 1,
+                other => panic!("{other:?}"),
+            }
+        }
+    };
+    run(0..frames / 3);
+    let before = held();
+    run(frames / 3..frames);
+    let after = held();
+    println!("{frames} frames: {made} made, {lost} lost; {before:?}, then {after:?}");
+    assert_eq!(made + lost, frames);
+    assert!(session.statistics().backend.why.contains("opened again after"));
+    assert!(
+        after.0 < before.0 + (16 << 20) && after.1 <= before.1 + 4,
+        "{before:?}, then {after:?}"
+    );
+}
