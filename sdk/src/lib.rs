@@ -101,6 +101,7 @@ pub mod target;
 mod wave;
 
 pub mod input;
+#[cfg_attr(surface, doc(hidden))]
 pub mod unstable;
 
 pub use brightness::Brightness;
