@@ -125,7 +125,7 @@ fn int8_sums(
                         }
                     }
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }
@@ -277,7 +277,7 @@ fn f32_sums<const O: usize>(
                         }
                     }
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }

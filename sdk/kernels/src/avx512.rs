@@ -114,7 +114,7 @@ fn sums<const O: usize, const B: usize>(
                     }
                     weight = weight.add(O);
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }

@@ -130,7 +130,7 @@ unsafe fn sums<const O: usize, const B: usize>(
                     }
                     weight = weight.add(O);
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }

@@ -100,7 +100,7 @@ fn sums<const O: usize>(
                         }
                     }
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
         sums
@@ -231,7 +231,7 @@ macro_rules! int8_kernels {
                                 sums[7][block] = dot::<3>(sums[7][block], values, b);
                             }
                         }
-                        pixels = pixels.add(geometry.stride());
+                        pixels = pixels.wrapping_add(geometry.stride());
                     }
                 }
             }

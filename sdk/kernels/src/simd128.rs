@@ -103,7 +103,7 @@ fn int8_sums(
                         }
                     }
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }
@@ -256,7 +256,7 @@ fn f32_sums<const O: usize>(
                         }
                     }
                 }
-                pixels = pixels.add(geometry.stride());
+                pixels = pixels.wrapping_add(geometry.stride());
             }
         }
     }
