@@ -1,0 +1,42 @@
+# Sourced by tests/kotlin and release/linux, which set `cache`: the Kotlin API's documents and its artefact for JVMs, by Maven.
+# shellcheck shell=bash
+
+# What an earlier run of these pom.xml fetched is there; nothing is asked of Maven Central then.
+fetched="$cache/maven/fetched-$(cat android/pom.xml tests/maven/pom.xml | sha256sum | cut -c 1-16)"
+offline=()
+[ ! -e "$fetched" ] || offline=(--offline -Daether.offline.protocols=file)
+maven() {
+    mvn --batch-mode "${offline[@]}" "-Dmaven.repo.local=$cache/maven" --file android/pom.xml "$@"
+}
+
+# generate_kotlin GENERATOR LIBRARY FOLDER: what UniFFI generates for JVMs and for Android, into FOLDER/jvm and FOLDER/android.
+generate_kotlin() {
+    "$1" generate "$2" --language kotlin --no-format --config bindings/generators.toml --out-dir "$3/jvm" &&
+        "$1" generate "$2" --language kotlin --no-format --config android/uniffi.toml --out-dir "$3/android" &&
+        tests/snippets kotlin "$3/snippets"
+}
+
+# document_kotlin FOLDER: the documents of what was generated there and of the layers by hand, into FOLDER/documents. The links of
+# what is generated are Rust's; they become words.
+document_kotlin() {
+    mkdir -p "$1/documented"
+    cp -r "$1/android/." "$1/documented"
+    find "$1/documented" -name '*.kt' -exec sed -i -E 's/\[`(Self::)?(\w+)`\]/`\2`/g' {} +
+    maven -Pandroid "-Dsnippets=$1/snippets" "-Dgenerated=$1/documented" "-Doutput=$1/android-classes" "-Ddocuments=$1/documents" \
+        dokka:dokka >"$1/dokka.log" 2>&1 && grep -q 'Rendering' "$1/dokka.log" && [ -e "$1/documents/index.html" ] || {
+        tail -20 "$1/dokka.log"
+        return 1
+    }
+}
+
+# publish_jvm FOLDER NATIVES: the artefact for JVMs into the Maven repository FOLDER/repository. NATIVES has a folder for each platform,
+# as JNA calls it, with its library.
+publish_jvm() {
+    mkdir -p "$1/sources"
+    cp -r android/phasefront/src/core/kotlin/. "$1/jvm/." "$1/sources"
+    # Maven deploys nothing while it is offline, not even into a folder.
+    local offline=()
+    maven --quiet -Ppublish "-Dsnippets=$1/snippets" "-Dgenerated=$1/jvm" "-Doutput=$1/published" "-Dsources=$1/sources" \
+        "-Ddocuments=$1/documents" "-Dnatives=$2" "-DaltDeploymentRepository=made::file://$1/repository" \
+        -Dmaven.test.skip -Dmaven.install.skip deploy
+}
