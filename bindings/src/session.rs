@@ -204,7 +204,7 @@ impl RawSession {
         guard(|| Ok(self.session()?.warm_up()?))
     }
 
-    /// Forgets all frames so far; the next, of any timestamp, is the first again.
+    /// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
     pub fn reset(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.session()?.reset();

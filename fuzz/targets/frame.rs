@@ -1,5 +1,5 @@
-//! Frames of every format, size, stride and orientation: what becomes of them before the hologram, and one in sixteen through a
-//! session in video.
+//! Frames of every format, size, stride and orientation: what becomes of them before the hologram, and one in sixteen
+//! through a session in video.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -434,8 +434,8 @@ impl Session {
     }
 
     /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
-    /// first again. A frame that is being computed is given up, on the CPU within a row, tile or plane of its work; a GPU
-    /// and a network on tract end it first. [`Self::process`] then gives an error.
+    /// first again. A frame that is being computed is given up, on the CPU within a row, tile or plane of its work; a
+    /// GPU and a network on tract end it first. [`Self::process`] then gives an error.
     pub fn reset(&self) {
         match &self.mode {
             Mode::Image(gate) | Mode::Video(gate) => lock(gate).reset(),
@@ -463,10 +463,10 @@ impl Session {
         }
     }
 
-    /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up, as
-    /// by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has heard
-    /// everything and will not be called again. Called by a listener, of this session or another, it does not wait for
-    /// that. Results that were handed out stay valid. Dropping a session closes it.
+    /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up,
+    /// as by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has
+    /// heard everything and will not be called again. Called by a listener, of this session or another, it does not
+    /// wait for that. Results that were handed out stay valid. Dropping a session closes it.
     pub fn close(&self) {
         match &self.mode {
             Mode::Image(gate) | Mode::Video(gate) => {

@@ -17,8 +17,8 @@ use std::sync::mpsc;
 /// Each frame is answered, and memory does not grow with the losses.
 #[test]
 fn nothing_grows_where_devices_go() {
-    // glibc keeps what threads that have ended freed, for others of their kind, and each opening has a few: with one pool of
-    // memory it is seen what is held.
+    // glibc keeps what threads that have ended freed, for others of their kind, and each opening has a few: with one
+    // pool of memory it is seen what is held.
     if std::env::var_os("MALLOC_ARENA_MAX").is_none() {
         let mut again = std::process::Command::new(std::env::current_exe().unwrap());
         again.args(std::env::args_os().skip(1)).env("MALLOC_ARENA_MAX", "1");

@@ -633,7 +633,7 @@ enum PfStatus pf_session_submit(const struct PfSession *session,
 // Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
 enum PfStatus pf_session_warm_up(const struct PfSession *session);
 
-// Forgets all frames so far; the next, of any timestamp, is the first again.
+// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
 enum PfStatus pf_session_reset(const struct PfSession *session);
 
 // Takes no frames until pf_session_resume.

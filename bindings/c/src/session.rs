@@ -344,7 +344,7 @@ pub unsafe extern "C" fn pf_session_warm_up(session: *const PfSession) -> PfStat
     unsafe { with(session, RawSession::warm_up) }
 }
 
-/// Forgets all frames so far; the next, of any timestamp, is the first again.
+/// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_reset(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.

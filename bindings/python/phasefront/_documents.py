@@ -109,7 +109,7 @@ DOCUMENTS = {
     'RawSession.__init__': 'A session that runs in `mode`; live, it needs a `listener`.\n\nErrors: Options that cannot be meant or planned for, a live session without a listener, another with one, or threads\nthat cannot be started.',
     'RawSession.pause': 'Takes no frames until `resume`.',
     'RawSession.process': 'The hologram of a frame, in an image or a video session. `luma_or_colour` is the first plane of its colour,\n`chroma` and `chroma_v` the others; what the frame has not, is empty.\n\nErrors: A frame that is not usable or late, or a session that is live, paused or closed. None of them harms the frames\nthat follow.',
-    'RawSession.reset': 'Forgets all frames so far; the next, of any timestamp, is the first again.',
+    'RawSession.reset': 'Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.',
     'RawSession.resume': 'Takes frames again.',
     'RawSession.set_quality': 'Allows or forbids steps on the ladder.\n\nErrors: A rung that is not on the ladder.',
     'RawSession.set_thermal': 'Says how hot the device is.',

@@ -957,7 +957,7 @@ class RawSession:
         that follow.
         """
     def reset(self) -> None:
-        """Forgets all frames so far; the next, of any timestamp, is the first again."""
+        """Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again."""
     def resume(self) -> None:
         """Takes frames again."""
     def set_quality(self, quality: Quality) -> None:

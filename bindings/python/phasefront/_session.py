@@ -184,7 +184,7 @@ class Session:
         self._raw.warm_up()
 
     def reset(self) -> None:
-        """Forgets all frames so far; the next, of any timestamp, is the first again."""
+        """Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again."""
         self._raw.reset()
 
     def pause(self) -> None:

@@ -191,7 +191,7 @@ namespace Phasefront
         /// <summary>Runs an empty frame through the stages, so that the first real one is as fast as the others.</summary>
         public void WarmUp() => Check(Native.pf_session_warm_up(this));
 
-        /// <summary>Forgets all frames so far; the next, of any timestamp, is the first again.</summary>
+        /// <summary>Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.</summary>
         public void Reset() => Check(Native.pf_session_reset(this));
 
         /// <summary>Takes no frames until Resume.</summary>

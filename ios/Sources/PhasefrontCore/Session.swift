@@ -63,7 +63,7 @@ public final class Session: Sendable {
     /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
     public func warmUp() throws { try raw.warmUp() }
 
-    /// Forgets all frames so far; the next, of any timestamp, is the first again.
+    /// Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
     public func reset() throws { try raw.reset() }
 
     /// Takes no frames until ``resume()``.

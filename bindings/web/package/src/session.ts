@@ -180,7 +180,7 @@ export class Session {
     guard(() => session.warmUp());
   }
 
-  /** Forgets all frames so far; the next, of any timestamp, is the first again. */
+  /** Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again. */
   reset(): void {
     const session = this.#open();
     guard(() => session.reset());

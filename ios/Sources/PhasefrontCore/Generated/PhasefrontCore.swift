@@ -1803,7 +1803,7 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
     func process(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, confidence: Data, info: FrameInfo) throws  -> RawHologram
     
     /**
-     * Forgets all frames so far; the next, of any timestamp, is the first again.
+     * Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
      */
     func reset() throws 
     
@@ -1972,7 +1972,7 @@ open func process(lumaOrColour: Data, chroma: Data, chromaV: Data, depth: Data, 
 }
     
     /**
-     * Forgets all frames so far; the next, of any timestamp, is the first again.
+     * Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again.
      */
 open func reset()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -7611,7 +7611,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_process() != 26197) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_reset() != 25645) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_reset() != 47763) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_resume() != 10084) {

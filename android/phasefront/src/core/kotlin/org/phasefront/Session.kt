@@ -82,7 +82,7 @@ public class Session(
     /** Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it. */
     public fun warmUp(): Unit = raw.warmUp()
 
-    /** Forgets all frames so far; the next, of any timestamp, is the first again. */
+    /** Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again. */
     public fun reset(): Unit = raw.reset()
 
     /** Takes no frames until [resume]. */
