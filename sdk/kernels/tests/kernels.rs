@@ -340,28 +340,30 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     }
 }
 
-/// What `fuzz/miri` runs, an interpreter some ten thousand times as slow.
+/// What `fuzz/miri` runs, an interpreter some ten thousand times as slow: there the fastest instruction set that it knows.
 #[test]
 fn small_chains_agree_on_every_instruction_set() {
-    let size = (3, 5);
-    let tilings = [size, (2, 3)].map(|(band_rows, strip_columns)| Tiling {
+    let size = (2, 3);
+    let tilings = [size, (1, 2)].map(|(band_rows, strip_columns)| Tiling {
         band_rows,
         strip_columns,
     });
+    let sets = |found: Vec<Isa>| found.into_iter().take(if cfg!(miri) { 1 } else { usize::MAX });
     let input = frame(4, size, 9);
     let case = Int8Case::random(4, 8, 4, 2);
     let expected = case.expected(&input, size);
-    for isa in Isa::int8() {
+    for isa in sets(Isa::int8()) {
         let (chain, scratch) = (case.chain(isa).unwrap(), Scratch::default());
         for tiling in tilings {
             let mut output = vec![f32::NAN; expected.len()];
             chain.run(&input, &mut output, size, tiling, &scratch);
             assert_eq!(output, expected, "{isa}, {tiling:?}");
         }
+        println!("int8 on {isa}");
     }
     let layers = f32_layers(4, 8, 4, 5);
     let expected = f32_expected(&layers, &input, size);
-    for isa in Isa::f32() {
+    for isa in sets(Isa::f32()) {
         let (chain, scratch) = (F32Chain::new(&layers, isa).unwrap(), Scratch::default());
         for tiling in tilings {
             let mut output = vec![f32::NAN; expected.len()];
@@ -369,6 +371,7 @@ fn small_chains_agree_on_every_instruction_set() {
             let apart = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
             assert!(apart.fold(0.0, f32::max) < 1e-5, "{isa}, {tiling:?}");
         }
+        println!("f32 on {isa}");
     }
 }
 
