@@ -1,5 +1,6 @@
-//! Frames of every format through the bindings, some right, most wrong in one place or many: each becomes a hologram or is
-//! refused in one line. `PHASEFRONT_FRAMES=1000000 cargo test --release --workspace --test any_frame` is the long run.
+//! Frames of every format through the bindings, some right, most wrong in one place or many: each becomes a hologram or
+//! is refused in one line. `PHASEFRONT_FRAMES=1000000 cargo test --release --workspace --test any_frame` is the long
+//! run.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{

@@ -340,7 +340,8 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     }
 }
 
-/// What `fuzz/miri` runs, an interpreter some ten thousand times as slow: there the fastest instruction set that it knows.
+/// What `fuzz/miri` runs, an interpreter some ten thousand times as slow: there the fastest instruction set that it
+/// knows.
 #[test]
 fn small_chains_agree_on_every_instruction_set() {
     let size = (2, 3);
