@@ -72,6 +72,24 @@ impl Random {
     }
 }
 
+/// Two cameras a centimetre apart, at times.
+fn cameras(random: &mut Random) -> Option<Cameras> {
+    let camera = |random: &mut Random| Intrinsics {
+        fx: random.float(20.0),
+        fy: random.float(20.0),
+        cx: random.float(10.0),
+        cy: random.float(10.0),
+    };
+    random.often(0.3).then(|| Cameras {
+        colour: camera(random),
+        depth: camera(random),
+        pose: random.often(0.5).then(|| Pose {
+            rotation: random.floats(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
+            translation_m: random.floats(&[0.01, 0.0, 0.0]),
+        }),
+    })
+}
+
 /// A frame, and the memory of its three planes, its depth and its confidence.
 fn frame(random: &mut Random, timestamp_ns: u64) -> (FrameInfo, [Vec<u8>; 5]) {
     use ColourFormat::{Bgra, Nv12, Rgb, Rgba, Yuv420};
@@ -122,20 +140,6 @@ fn frame(random: &mut Random, timestamp_ns: u64) -> (FrameInfo, [Vec<u8>; 5]) {
     if let Some(confidence) = &confidence {
         memory[4] = random.memory(&confidence.plane, size.1);
     }
-    let camera = |random: &mut Random| Intrinsics {
-        fx: random.float(20.0),
-        fy: random.float(20.0),
-        cx: random.float(10.0),
-        cy: random.float(10.0),
-    };
-    let cameras = random.often(0.3).then(|| Cameras {
-        colour: camera(random),
-        depth: camera(random),
-        pose: random.often(0.5).then(|| Pose {
-            rotation: random.floats(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]),
-            translation_m: random.floats(&[0.01, 0.0, 0.0]),
-        }),
-    });
     let info = FrameInfo {
         timestamp_ns,
         colour: ColourInfo {
@@ -162,7 +166,7 @@ fn frame(random: &mut Random, timestamp_ns: u64) -> (FrameInfo, [Vec<u8>; 5]) {
             ]),
             mirrored: random.often(0.5),
         },
-        cameras,
+        cameras: cameras(random),
     };
     (info, memory)
 }
