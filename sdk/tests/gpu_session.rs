@@ -4,14 +4,14 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
-#[path = "../../tests/driver.rs"]
-mod driver;
+mod on_gpu;
 
 use camera::{Scene, colour_formats, depth, frame, options};
+use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
 use phasefront::session::{Backend, DropReason, Event, Quality, RunningMode};
 use phasefront::target::Response;
-use phasefront::unstable::gpu::{ChainOptions, DeviceOptions, Float};
+use phasefront::unstable::gpu::{ChainOptions, Float};
 use phasefront::{Brightness, Display, Error, Method, Network, Session, SessionOptions, Sweep};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
@@ -19,19 +19,6 @@ use std::time::Duration;
 
 const W: usize = 64;
 const H: usize = 48;
-
-/// The options of the tests on the GPU; none where there is no driver, which is said.
-fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
-    let open = |name| {
-        let device = DeviceOptions { name, programs: None };
-        phasefront::unstable::gpu::Device::open(&device).map(|_| device)
-    };
-    let device = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into()))))?;
-    let mut options = options;
-    options.backend = Backend::Gpu;
-    options.gpu.device = device;
-    Some(options)
-}
 
 /// Compares levels around the circle of `steps`: gives the share that differs, and asserts that none does by over one
 /// step but for a share of `far`.

@@ -4,13 +4,12 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
-#[path = "../../tests/driver.rs"]
-mod driver;
+mod on_gpu;
 
 use camera::{Scene, frame, options};
+use on_gpu::on_gpu;
 use phasefront::input::DepthFormat;
-use phasefront::session::{Backend, Event, RunningMode};
-use phasefront::unstable::gpu::{Device, DeviceOptions};
+use phasefront::session::{Event, RunningMode};
 use phasefront::{Error, Session};
 use std::sync::mpsc;
 
@@ -25,16 +24,9 @@ fn nothing_grows_where_devices_go() {
         assert!(again.status().unwrap().success());
         return;
     }
-    let open = |name| {
-        let device = DeviceOptions { name, programs: None };
-        Device::open(&device).map(|_| device)
-    };
-    let Some(device) = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into())))) else {
+    let Some(options) = on_gpu(options(32, 24)) else {
         return;
     };
-    let mut options = options(32, 24);
-    options.backend = Backend::Gpu;
-    options.gpu.device = device;
     let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(240, |n| n.parse().unwrap());
     let scene = Scene::new(24, 32, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);

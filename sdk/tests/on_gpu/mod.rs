@@ -1,0 +1,21 @@
+//! Sessions on any GPU that there is, Mesa's driver in software too.
+
+#[path = "../../../tests/driver.rs"]
+mod driver;
+
+use phasefront::SessionOptions;
+use phasefront::session::Backend;
+use phasefront::unstable::gpu::{Device, DeviceOptions};
+
+/// The options of the tests on the GPU; none where there is no driver, which is said.
+pub(crate) fn on_gpu(options: SessionOptions) -> Option<SessionOptions> {
+    let open = |name| {
+        let device = DeviceOptions { name, programs: None };
+        Device::open(&device).map(|_| device)
+    };
+    let device = driver::or_skip(open(None).or_else(|_| open(Some("llvmpipe".into()))))?;
+    let mut options = options;
+    options.backend = Backend::Gpu;
+    options.gpu.device = device;
+    Some(options)
+}
