@@ -28,6 +28,7 @@ def command(last, init):
     parts = ["python", "-m", "phasefront_training", last.kind, "--data", *names("DATA", last), "-o", "OUT"]
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
+        parts += ["--halved"] if architecture.halved else []
     if architecture.input == "seeded":
         parts += ["--seeds", *names("SEEDS", last)]
     if last.kind == "stage2":
@@ -55,7 +56,7 @@ def describe(name, last, figures):
     lines = [f"# {name}", ""]
     for part, (a, _) in last.networks.items():
         lines.append(
-            f"- {part}: {a.layers} layers of {a.filters} filters 3x3, input `{a.input}`, head `{a.head}`; "
+            f"- {part}: {a.layers} layers of {a.filters} filters 3x3{' at half the resolution' if a.halved else ''}, input `{a.input}`, head `{a.head}`; "
             f"{multiplies_per_pixel(a):,} multiply-accumulates a pixel."
         )
     d, data = last.display, last.extra["data"]

@@ -3,7 +3,9 @@
 The graph is written node by node, so that its names are stable and a network's file is the same to the byte each time:
 input `rgbd` (1, 4, H, W) (`ldi` or `field` for the other kinds), nodes `conv_0`, `relu_0`, …, `add_3` before each
 layer that has a skip, `concat_L` before the last convolution, `tanh` behind it for the amplitude-phase head, output
-`field` (1, 6, H, W) (`filtered` where the input is `field`), the six channels of the last layer as networks.py gives them. H and W are dynamic. What the
+`field` (1, 6, H, W) (`filtered` where the input is `field`), the six channels of the last layer as networks.py gives them. H and W are dynamic.
+A halved network's graph begins with the node `squares` (SpaceToDepth), whose output `squares_out` the first and the last
+layer read, and `pixels` (DepthToSpace) follows the last convolution; it takes even H and W. What the
 network is stands in `metadata_props`, keys `phasefront.*`; of a seeded one also of how many planes its seed was. The int8 form is written by export_int8.py.
 """
 
@@ -73,6 +75,27 @@ def build(architecture, nodes, initializers, properties):
     return model
 
 
+def entering(architecture):
+    """The name of what the first layer and the last one read, and the nodes before it."""
+    given = input_name(architecture)
+    if not architecture.halved:
+        return given, []
+    return "squares_out", [helper.make_node("SpaceToDepth", [given], ["squares_out"], "squares", blocksize=2)]
+
+
+def leaving(architecture):
+    """The name of what the last convolution gives, and the nodes behind it."""
+    conv = f"conv_{architecture.layers - 1}_out"
+    tanh = architecture.head == "amplitude-phase"
+    pixels = "pixels_out" if tanh else output_name(architecture)
+    nodes = []
+    if architecture.halved:
+        nodes.append(helper.make_node("DepthToSpace", [conv], [pixels], "pixels", blocksize=2, mode="DCR"))
+    if tanh:
+        nodes.append(helper.make_node("Tanh", [pixels if nodes else conv], [output_name(architecture)], "tanh"))
+    return (conv, nodes) if nodes else (output_name(architecture), [])
+
+
 def conv_node(i, inputs, output):
     """The convolution of layer i."""
     return helper.make_node("Conv", inputs, [output], f"conv_{i}", kernel_shape=[3, 3], pads=[1, 1, 1, 1], strides=[1, 1])
@@ -81,8 +104,9 @@ def conv_node(i, inputs, output):
 def float_model(network, display, offset_m=0.0, seed_planes=None):
     """The float32 model of a Chain."""
     a = network.architecture
-    nodes, initializers, inputs = [], [], []
-    h = input_name(a)
+    given, nodes = entering(a)
+    initializers, inputs = [], []
+    h = given
     for i, conv in enumerate(network.convs):
         if a.has_skip(i):
             nodes.append(helper.make_node("Add", [h, inputs[i - 2]], [f"add_{i}_out"], f"add_{i}"))
@@ -90,20 +114,16 @@ def float_model(network, display, offset_m=0.0, seed_planes=None):
         inputs.append(h)
         last = i == a.layers - 1
         if last:
-            nodes.append(helper.make_node("Concat", [h, input_name(a)], [f"concat_{i}_out"], f"concat_{i}", axis=1))
+            nodes.append(helper.make_node("Concat", [h, given], [f"concat_{i}_out"], f"concat_{i}", axis=1))
             h = f"concat_{i}_out"
         for part in ("weight", "bias"):
             values = getattr(conv, part).detach().cpu().float().contiguous().numpy()
             initializers.append(numpy_helper.from_array(values, f"conv_{i}.{part}"))
-        tanh = a.head == "amplitude-phase"
-        out = f"conv_{i}_out" if not last or tanh else output_name(a)
-        nodes.append(conv_node(i, [h, f"conv_{i}.weight", f"conv_{i}.bias"], out))
-        h = out
+        out, behind = leaving(a) if last else (f"conv_{i}_out", [])
+        nodes += [conv_node(i, [h, f"conv_{i}.weight", f"conv_{i}.bias"], out), *behind]
         if not last:
-            nodes.append(helper.make_node("Relu", [h], [f"relu_{i}_out"], f"relu_{i}"))
+            nodes.append(helper.make_node("Relu", [out], [f"relu_{i}_out"], f"relu_{i}"))
             h = f"relu_{i}_out"
-        elif tanh:
-            nodes.append(helper.make_node("Tanh", [h], [output_name(a)], "tanh"))
     return build(a, nodes, initializers, metadata(a, display, offset_m, seed_planes))
 
 
@@ -144,7 +164,8 @@ def read_onnx(path):
     layers = sum(node.op_type == "Conv" for node in model.graph.node)
     if f"conv_{layers - 1}.weight" not in weights or weights["conv_0.weight"].dtype != np.float32:
         raise ExportError(f"{path}: weights are not float32 constants conv_i.weight; take the float32 file, not the int8 one")
-    architecture = Architecture(layers, weights["conv_0.weight"].shape[0], found["input"], found["head"])
+    halved = any(node.op_type == "SpaceToDepth" for node in model.graph.node)
+    architecture = Architecture(layers, weights["conv_0.weight"].shape[0], found["input"], found["head"], halved)
     network = Chain(architecture)
     try:
         network.load_state_dict({f"convs.{n[5:]}": torch.from_numpy(w.copy()) for n, w in weights.items()})

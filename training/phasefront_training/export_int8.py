@@ -3,7 +3,7 @@
 Names as in export.py. For each quantized tensor T of quantize.py there are the constants `T.scale` (float32 scalar) and
 `T.zero_point` (uint8 scalar) and the nodes `quantize_T` and `dequantize_T`. The order is that of the layers:
 
-    rgbd → quantize_input → dequantize_input → conv_0 → relu_0 → quantize_relu_0 → dequantize_relu_0 → conv_1 → …
+    rgbd → [squares →] quantize_input → dequantize_input → conv_0 → relu_0 → quantize_relu_0 → dequantize_relu_0 → conv_1 → …
 
 * Every `conv_i` reads three dequantized values: activations (uint8, per tensor); weights, `conv_i.weight` int8
   (O, I, 3, 3) by `dequantize_conv_i.weight` with `conv_i.weight.scale` (O,) and `conv_i.weight.zero_point` (O,) all 0,
@@ -12,8 +12,8 @@ Names as in export.py. For each quantized tensor T of quantize.py there are the 
 * A skip, odd i >= 3: add_i(dequantize_relu_{i-1}, input of layer i-2 as that layer read it) → quantize_add_i →
   dequantize_add_i → conv_i. Zero points of relu_i and add_i are 0.
 * The last layer l: its features (add_l where it has a skip, else relu_{l-1}) → quantize_features →
-  dequantize_features; the graph's input again → quantize_skip → dequantize_skip; concat_l of both, in this order, on
-  axis 1 → quantize_concat_l → dequantize_concat_l → conv_l → [tanh →] field, float. All three pairs take
+  dequantize_features; what quantize_input reads again → quantize_skip → dequantize_skip; concat_l of both, in this order, on
+  axis 1 → quantize_concat_l → dequantize_concat_l → conv_l → [pixels →] [tanh →] field, float. All three pairs take
   `concat.scale` and `concat.zero_point`, so the pair behind concat_l changes nothing.
 * A convolution pads with the value 0, that is with the zero point of what it reads (not 0 for conv_0 and conv_l).
 """
@@ -21,7 +21,7 @@ Names as in export.py. For each quantized tensor T of quantize.py there are the 
 import numpy as np
 from onnx import helper, numpy_helper
 
-from .export import build, conv_node, input_name, metadata, output_name
+from .export import build, conv_node, entering, leaving, metadata
 from .quantize import tensors
 
 
@@ -29,7 +29,8 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
     """The QDQ model of a Quantized network."""
     a = quantized.architecture
     last = a.layers - 1
-    nodes, constants = [], []
+    given, nodes = entering(a)
+    constants = []
 
     def constant(name, value):
         constants.append(numpy_helper.from_array(np.asarray(value, order="C"), name))
@@ -65,7 +66,6 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
             parts.append(f"{full}_dq")
         nodes.append(conv_node(i, [source, *parts], output))
 
-    given = input_name(a)
     h, parameters, inputs = rounded(given, "input", "input"), "input", []
     for i in range(last):
         if a.has_skip(i):
@@ -83,8 +83,7 @@ def int8_model(quantized, display, offset_m=0.0, seed_planes=None):
     parts = [rounded(h, "features", "concat"), rounded(given, "skip", "concat")]
     nodes.append(helper.make_node("Concat", parts, [f"concat_{last}_out"], f"concat_{last}", axis=1))
     h = rounded(f"concat_{last}_out", f"concat_{last}", "concat")
-    tanh = a.head == "amplitude-phase"
-    layer(last, h, "concat", f"conv_{last}_out" if tanh else output_name(a))
-    if tanh:
-        nodes.append(helper.make_node("Tanh", [f"conv_{last}_out"], [output_name(a)], "tanh"))
+    out, behind = leaving(a)
+    layer(last, h, "concat", out)
+    nodes += behind
     return build(a, nodes, constants, metadata(a, display, offset_m, seed_planes))

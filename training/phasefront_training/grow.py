@@ -15,7 +15,7 @@ from dataclasses import replace
 import torch
 from torch.nn import functional as F
 
-from .networks import Architecture, Chain
+from .networks import Chain
 
 BRANCH = 0.1  # of a fresh residual branch
 GAIN = 4.0  # of the copy that a skip's sum must not drown
@@ -59,7 +59,7 @@ def widen(network, kind):
 
 
 def _chain(old, layers):
-    return Chain(Architecture(layers, old.filters, old.input, old.head))
+    return Chain(replace(old, layers=layers))
 
 
 def _insert_pairs(network, layers):

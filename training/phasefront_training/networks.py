@@ -17,6 +17,10 @@ rgbd, then the plane sweep's field as data.network_input lays it; the field is t
 real parts of the three colours, then the imaginary ones; a pre-filter of the deep double phase method),
 ``blurred-field`` (the same of a field that AA-DPM's blur has gone over: what is left for the network is small, so that
 its rounding is too) and ``split-blurred-field`` (12 channels: the same in two parts, see `split`, for int8).
+
+A halved network runs at half the resolution: the four pixels of a square of two by two are channels of one, those of the
+upper left first, then upper right, lower left, lower right; so are the outputs. It sees twice as far for as many layers.
+Frames with odd sides repeat their last row or column.
 """
 
 import math
@@ -42,6 +46,7 @@ class Architecture:
     filters: int = 24
     input: str = "rgbd"
     head: str = "real-imaginary"
+    halved: bool = False
 
     def __post_init__(self):
         if self.layers < 3:
@@ -77,8 +82,15 @@ class Architecture:
     def channels(self, i):
         """(input, output) channels of layer i."""
         last = i == self.layers - 1
-        inputs = self.input_channels if i == 0 else self.filters
-        return inputs + (self.input_channels if last else 0), 6 if last else self.filters
+        pixels = 4 if self.halved else 1
+        given = pixels * self.input_channels
+        inputs = given if i == 0 else self.filters
+        return inputs + (given if last else 0), 6 * pixels if last else self.filters
+
+    @property
+    def reach_px(self):
+        """How far it sees, in pixels of the frame."""
+        return self.layers * (2 if self.halved else 1)
 
     def has_skip(self, i):
         """Whether the input of layer i is output[i-1] + input[i-2]."""
@@ -111,6 +123,22 @@ class Chain(nn.Module):
             self.convs[-1].weight *= 0.1
 
     def forward(self, x):
+        return self.leaving(self._chain(self.entering(x)).float(), x.shape[-2:])
+
+    def entering(self, x):
+        """What the first layer and the last one read of the network's input."""
+        if not self.architecture.halved:
+            return x
+        height, width = x.shape[-2:]
+        return unshuffle(F.pad(x, (0, width % 2, 0, height % 2), mode="replicate"))
+
+    def leaving(self, h, size):
+        """The network's output (N, 6, *size) of what the last layer gives."""
+        if self.architecture.halved:
+            h = shuffle(h)[..., : size[0], : size[1]]
+        return torch.tanh(h) if self.architecture.head == "amplitude-phase" else h
+
+    def _chain(self, x):
         last = self.architecture.layers - 1
         inputs, h = [], x
         for i, conv in enumerate(self.convs):
@@ -122,11 +150,23 @@ class Chain(nn.Module):
             h = conv(h)
             if i < last:
                 h = F.relu(h)
-        return torch.tanh(h.float()) if self.architecture.head == "amplitude-phase" else h.float()
+        return h
 
     def field(self, x):
         """The complex field (N, 3, H, W) for network inputs (N, C, H, W)."""
         return head_field(self.architecture, self(x), x)
+
+
+def unshuffle(x):
+    """(N, C, 2·H, 2·W) as (N, 4·C, H, W): squares of two by two pixels, pixel by pixel (ONNX's SpaceToDepth)."""
+    n, c, h, w = x.shape
+    return x.reshape(n, c, h // 2, 2, w // 2, 2).permute(0, 3, 5, 1, 2, 4).reshape(n, 4 * c, h // 2, w // 2)
+
+
+def shuffle(x):
+    """The inverse of `unshuffle` (ONNX's DepthToSpace, DCR)."""
+    n, c, h, w = x.shape
+    return x.reshape(n, 2, 2, c // 4, h, w).permute(0, 3, 4, 1, 5, 2).reshape(n, c // 4, 2 * h, 2 * w)
 
 
 def split(x):
@@ -158,4 +198,5 @@ def head_field(architecture, output, x):
 
 def multiplies_per_pixel(architecture):
     """Multiply-accumulates per pixel of the whole chain."""
-    return sum(9 * a * b for a, b in map(architecture.channels, range(architecture.layers)))
+    count = sum(9 * a * b for a, b in map(architecture.channels, range(architecture.layers)))
+    return count // 4 if architecture.halved else count

@@ -120,7 +120,8 @@ class Quantized(nn.Module):
         """Yields each layer's number, what it reads and as which tensor; is sent what it gives, and returns the output."""
         a = self.architecture
         last = a.layers - 1
-        inputs, name = [], "input"
+        inputs, name, size = [], "input", x.shape[-2:]
+        x = self.chain.entering(x)
         h = self.activation(name, x)
         for i in range(a.layers):
             if a.has_skip(i):
@@ -133,11 +134,12 @@ class Quantized(nn.Module):
             if i < last:
                 name = f"relu_{i}" if i < last - 1 or a.has_skip(last) else "concat"
                 h = self.activation(name, F.relu(h))
-        return torch.tanh(h) if a.head == "amplitude-phase" else h
+        return self.chain.leaving(h, size)
 
 
 def activations(chain, x):
     """Yields the names of `tensors` with what is rounded there, for a network input (1, C, H, W)."""
+    x = chain.entering(x)
     a = chain.architecture
     last = a.layers - 1
     yield "input", x

@@ -25,9 +25,9 @@ REVIVALS_END = 0.6  # of the training: what begins again needs time to learn
 REVIVAL_SCENES = 4  # whose crops show which units fire
 
 
-def margin(network_layers):
+def margin(architecture):
     """Pixels of a cut side left out of the loss: what the network cannot see there, at most the light's reach."""
-    return min(network_layers, LIGHT_REACH_PX)
+    return min(architecture.reach_px, LIGHT_REACH_PX)
 
 
 class Stage1(Task):
@@ -46,7 +46,7 @@ class Stage1(Task):
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.facts = scenes.facts
-        cut, kind = margin(network.architecture.layers), network.architecture.input
+        cut, kind = margin(network.architecture), network.architecture.input
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind, dimmed)
         self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind, dimmed)
 

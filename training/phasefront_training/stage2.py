@@ -38,7 +38,7 @@ class _OnHolograms(Task):
         self.display, self.validation, self.device = scenes.display, validation, workers.device
         self.networks = {"hologram": model.hologram, "prefilter": model.prefilter}
         self.seed, self.rank = seed, workers.rank
-        cut = margin(model.hologram.architecture.layers) + self.display.reach_px(model.offset_m)
+        cut = margin(model.hologram.architecture) + self.display.reach_px(model.offset_m)
         self.facts = scenes.facts
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, model.hologram.architecture.input)
 

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from phasefront_training.grow import grow, widen
-from phasefront_training.networks import Architecture, Chain, multiplies_per_pixel
+from phasefront_training.networks import Architecture, Chain, multiplies_per_pixel, shuffle, unshuffle
 
 
 def test_sizes_are_the_papers():
@@ -91,3 +91,19 @@ def test_inputs_that_the_core_refuses_are_refused(name):
 @pytest.mark.parametrize("count", range(2, 10))
 def test_layered_inputs_that_the_core_takes_are_taken(count):
     assert Architecture(8, input=f"ldi{count}").input_channels == 4 * count
+
+
+@pytest.mark.parametrize("size", [(16, 20), (17, 23)])
+def test_a_halved_network_is_a_network_on_squares_of_pixels(size):
+    halved = Chain(Architecture(5, 8, halved=True))
+    x = torch.rand(1, 4, *size) - 0.5
+    assert torch.equal(shuffle(unshuffle(x[..., :16, :20])), x[..., :16, :20])
+    out = halved(x)
+    assert out.shape == (1, 6, *size)
+    assert multiplies_per_pixel(halved.architecture) == 9 * (16 * 8 + 3 * 64 + 24 * 24) / 4
+    # Twice as far as its layers, and no farther.
+    near, far = x.clone(), x.clone()
+    near[..., 10:] += 1
+    far[..., 12:] += 1
+    assert (halved(near) != out)[..., :2].any()
+    assert not (halved(far) != out)[..., :2].any()

@@ -13,7 +13,7 @@ from phasefront_training.networks import Architecture, Chain
 from phasefront_training.optics import Display
 from phasefront_training.quantize import Quantized, calibrate, extremes, tensors
 
-CASES = [Architecture(8), Architecture(5, 8), Architecture(4, 8, head="amplitude-phase"), Architecture(6, 8, "ldi2"), Architecture(8, 8, "field")]
+CASES = [Architecture(8), Architecture(5, 8), Architecture(4, 8, head="amplitude-phase"), Architecture(6, 8, "ldi2"), Architecture(8, 8, "field"), Architecture(8, 8, halved=True)]
 
 
 def network(architecture):
@@ -33,7 +33,7 @@ def test_the_int8_file_is_the_rounded_network(architecture, tmp_path):
     path = tmp_path / "n.onnx"
     write(int8_model(quantized, Display()), path)
     session = onnx_session(path)
-    x = torch.rand(1, architecture.input_channels, 21, 34) - 0.5
+    x = torch.rand(1, architecture.input_channels, 22, 34) - 0.5
     with torch.no_grad():
         ours, exact = quantized(x).numpy(), chain(x).numpy()
     theirs = session.run(None, {session.get_inputs()[0].name: x.numpy()})[0]
