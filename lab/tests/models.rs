@@ -300,6 +300,8 @@ fn broken_gltf_is_refused_by_name() {
     refused(&folder.join("absent.glb"), "No such file");
     fs::write(folder.join("model.stl"), "solid").unwrap();
     refused(&folder.join("model.stl"), ".gltf, .glb and .obj");
+    fs::write(folder.join("short.glb"), b"glTF\x02\0\0\0\x0b\0\0\0").unwrap();
+    refused(&folder.join("short.glb"), "it has 11 bytes; 12 are the fewest");
     fs::write(folder.join("empty.glb"), "").unwrap();
     assert!(read_model(&folder.join("empty.glb"), 20, 40, None).is_err());
 

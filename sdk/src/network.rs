@@ -125,6 +125,11 @@ impl Network {
                 chain.outputs()
             )));
         }
+        if chain.halved && input.is_field() {
+            return Err(Error::Network(format!(
+                "a network for '{input}' is a pre-filter, which runs at the whole resolution: no SpaceToDepth is right"
+            )));
+        }
         match (head, chain.tanh) {
             (Head::AmplitudePhase, false) => {
                 return Err(Error::Network(
@@ -331,10 +336,15 @@ impl Network {
             name: isa.name(),
             isa: Some(isa),
             why: format!(
-                "{} layers of {} filters in {}: one fused chain",
+                "{} layers of {} filters in {}{}: one fused chain",
                 self.layers(),
                 self.filters(),
-                self.precision()
+                self.precision(),
+                if self.chain.halved {
+                    " at half the resolution"
+                } else {
+                    ""
+                }
             ),
         }
     }
@@ -347,7 +357,7 @@ impl Network {
     #[cfg(feature = "tract")]
     pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
         let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
-        operator::model(&self.onnx, chain, self.chain.inputs)
+        operator::model(&self.input.to_string(), chain, self.chain.inputs)
     }
 
     /// Prepares the network on stock tract whatever the fast path could do: the independent check of that path.
@@ -357,6 +367,11 @@ impl Network {
     #[cfg(feature = "tract")]
     pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         check_size(height, width, MAX_STOCK_PIXELS)?;
+        if self.chain.halved && (height % 2 == 1 || width % 2 == 1) {
+            return Err(Error::Network(format!(
+                "a network at half the resolution takes frames of even sides on tract, not {width}×{height}"
+            )));
+        }
         let plan = StockPlan::new(&self.onnx, [1, self.chain.inputs, height, width])?;
         Ok(NetworkPlan {
             input: self.input,

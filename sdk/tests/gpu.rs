@@ -76,6 +76,12 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
         // Filters that fill no block of eight, and a width that fills no group.
         Model::new(7, 12),
         Model::new(6, 5),
+        Model::new(4, 16).halved(),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(5, 8).halved()
+        },
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
@@ -119,6 +125,7 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
         (Model::new(5, 8), Float::F32, 1e-4),
         (Model::new(5, 8), Float::F16, 0.02),
         (Model::int8(5, 8), Float::F32, 0.0),
+        (Model::int8(5, 16).halved(), Float::F32, 0.0),
     ] {
         if float == Float::F16 && !device.has_half() {
             println!("skipped: {device:?} has no 16-bit floating point");
@@ -170,6 +177,11 @@ fn chains_in_int8_have_the_bits_of_the_cpu() {
             ..Model::int8(6, 8)
         },
         Model::int8(8, 24),
+        Model::int8(4, 48).halved(),
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8).halved()
+        },
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
@@ -741,27 +753,29 @@ fn an_app_shows_the_texture_itself() {
 }
 
 #[test]
-fn a_network_that_reads_the_place_is_that_of_the_cpu() {
+fn networks_that_read_the_place_or_squares_of_pixels_are_those_of_the_cpu() {
     let Some(device) = device() else { return };
-    let model = Model {
+    let of_place = Model {
         inputs: 6,
         input: "rgbdxy",
         ..Model::new(5, 8)
     };
-    let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
-    let (h, w) = (21, 34);
-    let display = Display::default();
-    let method = Method::Network(network);
-    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
-    let mut job = planned((h, w), method, &display, encoding, scale);
-    job.chain.float = Float::F32;
-    let frame = rgbd(h, w);
-    let (expected, _) = on_cpu(&job, &frame);
-    let mut levels = vec![0; 3 * h * w];
-    let mut plan = GpuPipeline::new(&device, &job).unwrap();
-    plan.process(&Frame::of(&frame), &mut levels).unwrap();
-    let apart = apart(&levels, &expected, &job.target.response);
-    assert!(apart < 0.003, "{apart}");
+    for model in [of_place, Model::new(5, 8).halved(), Model::int8(4, 8).halved()] {
+        let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let (h, w) = (21, 35);
+        let display = Display::default();
+        let method = Method::Network(network);
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.chain.float = Float::F32;
+        let frame = rgbd(h, w);
+        let (expected, _) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        assert!(apart < 0.003, "{apart}");
+    }
 }
 
 #[test]

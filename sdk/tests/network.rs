@@ -17,6 +17,14 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
+/// `size`, or for a model at half the resolution, which tract runs so alone, the next of even sides.
+fn even((height, width): (usize, usize), model: &Model) -> (usize, usize) {
+    match model.halved {
+        true => (height.next_multiple_of(2), width.next_multiple_of(2)),
+        false => (height, width),
+    }
+}
+
 fn run_stock(network: &Network, input: &[f32], height: usize, width: usize) -> Vec<f32> {
     let plan = network.plan_on_stock_tract(height, width).unwrap();
     let mut output = vec![f32::NAN; 6 * height * width];
@@ -39,10 +47,16 @@ fn stock_tract_agrees_with_the_definition_in_f32() {
             input: "ldi5",
             ..Model::new(8, 16)
         },
+        Model::new(5, 16).halved(),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(3, 5).halved()
+        },
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
-        for (height, width) in SIZES {
+        for (height, width) in SIZES.map(|size| even(size, &model)) {
             let input = frame(model.inputs, height, width, 7);
             let expected = reference::run(network.chain(), &input, height, width);
             let output = run_stock(&network, &input, height, width);
@@ -114,7 +128,10 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
         Model::int8(2, 8),
         Model::int8(3, 24),
         Model::int8(4, 16),
-        Model { int8: true, ..tanh },
+        Model {
+            int8: true,
+            ..tanh.clone()
+        },
         Model {
             inner_roundings: false,
             ..Model::int8(5, 8)
@@ -124,6 +141,13 @@ fn the_fused_chain_agrees_with_the_definition_on_every_instruction_set() {
             ..Model::int8(8, 8)
         },
         Model::int8(8, 24),
+        Model::new(4, 48).halved(),
+        Model::int8(4, 48).halved(),
+        Model { halved: true, ..tanh },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8).halved()
+        },
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
@@ -197,6 +221,8 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
             input: "field",
             ..tanh.clone()
         },
+        Model::int8(3, 48).halved(),
+        tanh.clone().halved(),
         tanh,
     ];
     for model in models {
@@ -208,7 +234,8 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
                 values: &values,
                 size: (height, width),
             };
-            for stock in [false, true] {
+            let stock_too = even((height, width), &model) == (height, width);
+            for stock in [false, true].into_iter().take(1 + usize::from(stock_too)) {
                 let plan = match stock {
                     false => network.plan(height, width),
                     true => network.plan_on_stock_tract(height, width),
@@ -311,6 +338,7 @@ fn the_operator_in_a_tract_graph_yields_the_same_bits_at_any_size() {
     use tract_onnx::prelude::*;
     for model in [
         Model::int8(5, 8),
+        Model::int8(3, 8).halved(),
         Model {
             tanh: true,
             head: "amplitude-phase",
@@ -372,6 +400,22 @@ fn a_network_tells_what_it_is() {
         (plan.size(), plan.channels(), plan.engine().name),
         ((5, 9), (4, 6), "tract")
     );
+}
+
+#[test]
+fn a_network_at_half_the_resolution_tells_so() {
+    let network = Network::from_onnx(&Model::int8(8, 48).halved().bytes()).unwrap();
+    assert_eq!((network.layers(), network.filters()), (8, 48));
+    let macs = 9 * (16 * 48 + 6 * 48 * 48 + (48 + 16) * 24) / 4;
+    assert_eq!(network.chain().macs_per_pixel(), macs);
+    let plan = network.plan(5, 9).unwrap();
+    assert_eq!((plan.size(), plan.channels()), ((5, 9), (4, 6)));
+    assert!(plan.engine().why.contains("half the resolution"));
+    let why = network.plan_on_stock_tract(5, 9).err().unwrap().to_string();
+    assert!(why.contains("even sides on tract, not 9×5"), "{why}");
+    let prefilter = Model::prefilter("0").halved();
+    let why = Network::from_onnx(&prefilter.bytes()).unwrap_err().to_string();
+    assert!(why.contains("whole resolution"), "{why}");
 }
 
 #[test]
@@ -537,6 +581,27 @@ fn graphs_of_another_shape_are_refused() {
         &model,
         |p| node(p, "relu1").op_type = "Sigmoid".into(),
         &["'relu1' (Sigmoid)", "not an operator"],
+    );
+    let halved = Model::int8(6, 8).halved();
+    check(
+        &halved,
+        |p| node(p, "squares").attribute[0].i = 4,
+        &["'squares' (SpaceToDepth)", "blocksize 2 is right"],
+    );
+    check(
+        &halved,
+        |p| node(p, "squares_out/q").input[0] = "rgbd".into(),
+        &["before SpaceToDepth; after it is right"],
+    );
+    check(
+        &halved,
+        |p| node(p, "pixels").op_type = "Identity".into(),
+        &["'field' is not the last layer's", "the last layer's pixels or its tanh"],
+    );
+    check(
+        &Model::new(6, 8),
+        |p| node(p, "relu1").op_type = "DepthToSpace".into(),
+        &["blocksize 2 is right"],
     );
     check(
         &model,

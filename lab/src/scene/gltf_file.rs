@@ -25,6 +25,7 @@ const GAMMA: f64 = 2.2;
 /// The parts of the file's default scene, or of its first.
 pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
     let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    check_length(&bytes)?;
     let unchecked = Gltf::from_slice_without_validation(&bytes).map_err(|e| one_line(&e))?;
     check_names(unchecked.as_json())?;
     let Gltf { document, blob } = Gltf::from_slice(&bytes).map_err(|e| one_line(&e))?;
@@ -318,6 +319,20 @@ fn product(a: Matrix, b: Matrix) -> Matrix {
 /// A linear colour factor for values coded for the eye.
 fn coded(factor: f32) -> f32 {
     libm::pow(f64::from(factor.clamp(0.0, 1.0)), 1.0 / GAMMA) as f32
+}
+
+/// A GLB's length holds its header, which the crate takes off it.
+fn check_length(bytes: &[u8]) -> Result<()> {
+    const HEADER: u32 = 12;
+    match bytes {
+        [b'g', b'l', b'T', b'F', _, _, _, _, a, b, c, d, ..] => match u32::from_le_bytes([*a, *b, *c, *d]) {
+            length if length < HEADER => Err(format!(
+                "it says that it has {length} bytes; {HEADER} are the fewest, its header"
+            )),
+            _ => Ok(()),
+        },
+        _ => Ok(()),
+    }
 }
 
 /// What the crate's own validation and reading take for granted: attributes name accessors that are there, images say

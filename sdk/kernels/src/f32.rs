@@ -20,6 +20,19 @@ pub struct F32Layer {
     pub bias: Vec<f32>,
 }
 
+impl F32Layer {
+    /// Of a last layer, what gives the outputs of one pixel of each place.
+    fn of_pixel(&self, pixel: usize) -> F32Layer {
+        let weights = OUTPUTS * self.inputs * 9;
+        F32Layer {
+            inputs: self.inputs,
+            outputs: OUTPUTS,
+            kernel: self.kernel[pixel * weights..][..weights].to_vec(),
+            bias: self.bias[pixel * OUTPUTS..][..OUTPUTS].to_vec(),
+        }
+    }
+}
+
 /// A layer as the kernels read it.
 pub(crate) struct Packed {
     pub(crate) inputs: usize,
@@ -60,7 +73,12 @@ fn kernels(isa: Isa) -> Option<Kernels> {
 pub struct F32Chain {
     isa: Isa,
     kernels: Kernels,
+    /// Pixels along each side of a place.
+    side: usize,
+    /// All but the last.
     layers: Vec<Packed>,
+    /// The last one, of each pixel of a place.
+    last: Vec<Packed>,
 }
 
 impl F32Chain {
@@ -73,11 +91,13 @@ impl F32Chain {
         let kernels = kernels(isa)
             .filter(|_| Isa::f32().contains(&isa))
             .ok_or_else(|| format!("this processor has no f32 kernels '{isa}'"))?;
-        crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
-        let pack = |layer: &F32Layer| {
+        let side = crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
+        for layer in layers {
             if layer.kernel.len() != layer.outputs * layer.inputs * 9 || layer.bias.len() != layer.outputs {
                 return Err(format!("weights or biases do not fit {} filters", layer.outputs));
             }
+        }
+        let pack = |layer: &F32Layer| {
             let mut weights = Vec::with_capacity(layer.kernel.len());
             let mut first = 0;
             while first < layer.outputs {
@@ -94,15 +114,23 @@ impl F32Chain {
                 }
                 first += size;
             }
-            Ok(Packed {
+            Packed {
                 inputs: layer.inputs,
                 outputs: layer.outputs,
                 bias: layer.bias.clone(),
                 weights,
-            })
+            }
         };
-        let layers = layers.iter().map(pack).collect::<Result<_, _>>()?;
-        Ok(F32Chain { isa, kernels, layers })
+        let [hidden @ .., last] = layers else {
+            return Err("a chain has two layers at least".into());
+        };
+        Ok(F32Chain {
+            isa,
+            kernels,
+            side,
+            layers: hidden.iter().map(pack).collect(),
+            last: (0..side * side).map(|pixel| pack(&last.of_pixel(pixel))).collect(),
+        })
     }
 
     /// The kernels in use.
@@ -112,7 +140,7 @@ impl F32Chain {
 
     /// How many layers.
     pub fn layers(&self) -> usize {
-        self.layers.len()
+        self.layers.len() + 1
     }
 
     /// The tiling that suits a frame size and the current rayon pool.
@@ -126,7 +154,8 @@ impl F32Chain {
     /// If a length does not fit the size.
     pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<f32>) {
         let area = size.0 * size.1;
-        assert_eq!(input.len(), self.inputs() * area, "planes of the input");
+        let inputs = self.inputs() / (self.side * self.side);
+        assert_eq!(input.len(), inputs * area, "planes of the input");
         assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
         let mut planes = output.chunks_exact_mut(area.max(1));
         let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
@@ -158,7 +187,11 @@ impl Chain for F32Chain {
     const CACHE: usize = 1 << 20;
 
     fn layers(&self) -> usize {
-        self.layers.len()
+        self.layers.len() + 1
+    }
+
+    fn side(&self) -> usize {
+        self.side
     }
 
     fn inputs(&self) -> usize {
@@ -166,7 +199,7 @@ impl Chain for F32Chain {
     }
 
     fn groups(&self, i: usize) -> usize {
-        self.layers[i].inputs
+        self.layers.get(i).unwrap_or(&self.last[0]).inputs
     }
 
     fn zero(&self, _i: usize) -> f32 {
@@ -185,10 +218,15 @@ impl Chain for F32Chain {
         (self.kernels.hidden_row)(&self.layers[i], &window.rows(), skip, out, geometry);
     }
 
-    fn last_row(&self, window: Window<'_, f32>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-        if let Some(layer) = self.layers.last() {
-            (self.kernels.last_row)(layer, &window.rows(), out, from, geometry);
-        }
+    fn last_row(
+        &self,
+        pixel: usize,
+        window: Window<'_, f32>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    ) {
+        (self.kernels.last_row)(&self.last[pixel], &window.rows(), out, from, geometry);
     }
 }
 

@@ -42,7 +42,7 @@ pub struct SkipSum {
 }
 
 /// From a hidden layer's sums to the next layer's input.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Requantise {
     /// The sum with a skip, where there is one.
     pub skip: Option<SkipSum>,
@@ -67,6 +67,20 @@ pub struct Int8Layer {
     pub multiplier: Vec<f32>,
     /// What follows a hidden layer; means nothing for the last.
     pub requantise: Requantise,
+}
+
+impl Int8Layer {
+    /// Of a last layer, what gives the outputs of one pixel of each place.
+    fn of_pixel(&self, pixel: usize) -> Int8Layer {
+        let (weights, from) = (OUTPUTS * self.inputs * 9, pixel * OUTPUTS);
+        Int8Layer {
+            outputs: OUTPUTS,
+            kernel: self.kernel[pixel * weights..][..weights].to_vec(),
+            bias: self.bias[from..][..OUTPUTS].to_vec(),
+            multiplier: self.multiplier[from..][..OUTPUTS].to_vec(),
+            ..*self
+        }
+    }
 }
 
 /// A layer as the kernels read it.
@@ -233,7 +247,12 @@ pub struct Int8Chain {
     concatenated: Quantiser,
     /// Whether the concatenated input is rounded as `input` before.
     rounded_twice: bool,
+    /// Pixels along each side of a place.
+    side: usize,
+    /// All but the last.
     layers: Vec<Packed>,
+    /// The last one, of each pixel of a place.
+    last: Vec<Packed>,
     rescale: Option<f32>,
     zero_points: Vec<u8>,
 }
@@ -259,8 +278,8 @@ impl Int8Chain {
             return Err("a chain has two layers at least".into());
         };
         let (inputs, filters) = (first.inputs, first.outputs);
-        crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
-        let mut packed = Vec::new();
+        let side = crate::check_shapes(layers.iter().map(|l| (l.inputs, l.outputs)))?;
+        let (mut hidden, mut of_pixels) = (Vec::new(), Vec::new());
         for (i, layer) in layers.iter().enumerate() {
             let is_last = i + 1 == layers.len();
             check_numbers(layer, is_last).map_err(|why| format!("layer {i}: {why}"))?;
@@ -275,12 +294,15 @@ impl Int8Chain {
                     "layer {i}: only what the concatenation reads is rounded a second time"
                 ));
             }
-            let taps = Taps {
-                layer,
-                features: if is_last { filters } else { layer.inputs },
+            let pack = |layer: &Int8Layer, features| {
+                let next_zero = layers.get(i + 1).map_or(0, |next| next.zero_point);
+                Packed::new(&Taps { layer, features }, next_zero, &kernels)
             };
-            let next_zero = layers.get(i + 1).map_or(0, |next| next.zero_point);
-            packed.push(Packed::new(&taps, next_zero, &kernels));
+            if is_last {
+                of_pixels = (0..side * side).map(|k| pack(&layer.of_pixel(k), filters)).collect();
+            } else {
+                hidden.push(pack(layer, layer.inputs));
+            }
         }
         let zero_points: Vec<u8> = layers.iter().map(|l| l.zero_point).collect();
         let settled = first.zero_point == input.zero_point && last.zero_point == concatenated.zero_point;
@@ -300,7 +322,9 @@ impl Int8Chain {
             input,
             concatenated,
             rounded_twice,
-            layers: packed,
+            side,
+            layers: hidden,
+            last: of_pixels,
             rescale,
             zero_points,
         })
@@ -313,7 +337,7 @@ impl Int8Chain {
 
     /// How many layers.
     pub fn layers(&self) -> usize {
-        self.layers.len()
+        self.layers.len() + 1
     }
 
     /// The tiling that suits a frame size and the current rayon pool.
@@ -327,7 +351,8 @@ impl Int8Chain {
     /// If a length does not fit the size.
     pub fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), tiling: Tiling, scratch: &Scratch<u8>) {
         let area = size.0 * size.1;
-        assert_eq!(input.len(), self.inputs() * area, "planes of the input");
+        let inputs = self.inputs / (self.side * self.side);
+        assert_eq!(input.len(), inputs * area, "planes of the input");
         assert_eq!(output.len(), OUTPUTS * area, "planes of the output");
         let mut planes = output.chunks_exact_mut(area.max(1));
         let planes = std::array::from_fn(|_| planes.next().unwrap_or_default());
@@ -395,7 +420,11 @@ impl Chain for Int8Chain {
     const CACHE: usize = 1 << 21;
 
     fn layers(&self) -> usize {
-        self.layers.len()
+        self.layers.len() + 1
+    }
+
+    fn side(&self) -> usize {
+        self.side
     }
 
     fn inputs(&self) -> usize {
@@ -403,7 +432,7 @@ impl Chain for Int8Chain {
     }
 
     fn groups(&self, i: usize) -> usize {
-        self.layers[i].groups
+        self.layers.get(i).unwrap_or(&self.last[0]).groups
     }
 
     fn zero(&self, i: usize) -> u8 {
@@ -438,10 +467,15 @@ impl Chain for Int8Chain {
         (self.kernels.hidden_row)(&self.layers[i], window, skip, out, geometry);
     }
 
-    fn last_row(&self, window: Window<'_, u8>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry) {
-        if let Some(layer) = self.layers.last() {
-            (self.kernels.last_row)(layer, window, out, from, geometry);
-        }
+    fn last_row(
+        &self,
+        pixel: usize,
+        window: Window<'_, u8>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    ) {
+        (self.kernels.last_row)(&self.last[pixel], window, out, from, geometry);
     }
 }
 

@@ -11,6 +11,9 @@
 //!
 //! [`fir`] is apart from them: the filter that carries a wave from plane to plane.
 //!
+//! A chain may run at half the resolution: then its last layer has an output for each of a square's four pixels
+//! (`places`).
+//!
 //! Nothing here knows ONNX, tract or optics.
 
 mod f32;
@@ -18,6 +21,7 @@ pub mod fir;
 mod int8;
 mod isa;
 mod peak;
+mod places;
 mod tiles;
 mod wavefront;
 mod wide;
@@ -54,8 +58,9 @@ pub use wide::{has_avx2, has_avx512, in_avx2, in_avx512};
 /// Planes of a hologram network's output: two a colour.
 pub const OUTPUTS: usize = 6;
 
-/// A chain's shapes: `(inputs, outputs)` of each layer.
-fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Result<(), String> {
+/// Checks a chain's shapes, `(inputs, outputs)` of each layer, and gives the side of its places: 2 where the last layer
+/// has outputs for the four pixels of a square, else 1.
+fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Result<usize, String> {
     let count = layers.len();
     let Some((inputs, filters)) = layers.next().filter(|_| count >= 2) else {
         return Err("a chain has two layers at least".into());
@@ -63,9 +68,13 @@ fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Re
     if filters == 0 || filters % 8 != 0 || inputs == 0 {
         return Err(format!("{filters} filters; kernels take a multiple of 8"));
     }
+    let mut side = 1;
     for (i, shape) in layers.enumerate() {
         let right = if i + 2 == count {
-            (filters + inputs, OUTPUTS)
+            if shape.1 == 4 * OUTPUTS && inputs % 4 == 0 {
+                side = 2;
+            }
+            (filters + inputs, side * side * OUTPUTS)
         } else {
             (filters, filters)
         };
@@ -76,5 +85,5 @@ fn check_shapes(mut layers: impl ExactSizeIterator<Item = (usize, usize)>) -> Re
             ));
         }
     }
-    Ok(())
+    Ok(side)
 }

@@ -9,6 +9,7 @@
 //! is the same to the bit however the frame was cut. The same holds for columns where a band is cut into strips.
 
 use crate::OUTPUTS;
+use crate::places::{Places, runs};
 use std::sync::{Mutex, PoisonError};
 
 /// Pixels before a row's first and after its last one; kernels may read one and write up to this many past the end.
@@ -18,7 +19,8 @@ pub(crate) const BLOCK: usize = 64;
 /// Rows kept of each layer's input.
 const RING: usize = 3;
 
-/// How a frame is cut. The result does not depend on it.
+/// How a frame is cut. The result does not depend on it. Rows and columns are those of the chain's places: pixels, or
+/// squares of two by two where it runs at half the resolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Tiling {
     /// Rows of a band; a band is one task.
@@ -30,6 +32,11 @@ pub struct Tiling {
 /// A tiling for `chain` on the current pool: up to three bands a thread, so that a slower core gets fewer of them, as
 /// long as a sixteenth at most is computed twice; and strips whose rings stay in [`Chain::CACHE`].
 pub(crate) fn tiling_for<C: Chain>(chain: &C, height: usize, width: usize) -> Tiling {
+    let places = Places {
+        side: chain.side(),
+        frame: (height, width),
+    };
+    let (height, width) = places.size();
     let layers = chain.layers();
     let ring_column: usize = (0..layers)
         .map(|i| RING * chain.groups(i) * C::GROUP * size_of::<C::Element>())
@@ -113,7 +120,9 @@ pub(crate) trait Chain: Sync {
     const CACHE: usize;
 
     fn layers(&self) -> usize;
-    /// Channels of the network's input.
+    /// Pixels along each side of a place: 1, or 2 at half the resolution.
+    fn side(&self) -> usize;
+    /// Channels of a place of the network's input.
     fn inputs(&self) -> usize;
     /// Groups of `x[i]`, the concatenated network input of the last layer included.
     fn groups(&self, i: usize) -> usize;
@@ -133,8 +142,16 @@ pub(crate) trait Chain: Sync {
         out: &mut [Self::Element],
         geometry: Geometry,
     );
-    /// Runs the last layer: pixels `from..from + out[c].len()` of the row, into the output planes' rows.
-    fn last_row(&self, window: Window<'_, Self::Element>, out: [&mut [f32]; OUTPUTS], from: usize, geometry: Geometry);
+    /// Runs the last layer for one pixel of each place (see [`crate::places`]): places `from..from + out[c].len()` of the
+    /// row, into the output planes' rows.
+    fn last_row(
+        &self,
+        pixel: usize,
+        window: Window<'_, Self::Element>,
+        out: [&mut [f32]; OUTPUTS],
+        from: usize,
+        geometry: Geometry,
+    );
 }
 
 /// Three rows of a layer's input, adjacent in memory but turned: the row above lies in slot `first`, the next ones
@@ -175,10 +192,11 @@ pub trait Rows<const PLANES: usize>: Sync {
     /// A value of the planes that are written.
     type Value: Send;
 
-    /// Fills `into`, one run of `into.len() / inputs` pixels for each of the chain's input planes, with `row` from
+    /// Fills `into`, one run of `into.len() / inputs` pixels for each of the frame's input planes, with `row` from
     /// column `from` on.
     ///
-    /// Called twice for each row that a band needs. Where strips are as wide as the frame, a row is read for the last
+    /// Called twice for each row that a band needs, and more often for the last of a frame whose rows are paired. Where
+    /// strips are as wide as the frame, a row is read for the last
     /// time before the row above it is written, so that what is written may replace what is read.
     fn read(&self, row: usize, from: usize, band: &Band<'_, Self::Value, PLANES>, into: &mut [f32]);
 
@@ -269,7 +287,7 @@ impl<E> Scratch<E> {
         free.iter()
             .map(|memory| {
                 let rings: usize = memory.rings.iter().map(|r| r.memory.capacity()).sum();
-                let rows = memory.input.capacity() + memory.output.capacity();
+                let rows = memory.input.capacity() + memory.output.capacity() + memory.pixels.capacity();
                 rings * size_of::<E>() + rows * size_of::<f32>()
             })
             .sum()
@@ -285,6 +303,8 @@ struct Memory<E> {
     input: Vec<f32>,
     /// A row of its output.
     output: Vec<f32>,
+    /// A frame's row of either, on its way to or from places.
+    pixels: Vec<f32>,
 }
 
 impl<E> Default for Memory<E> {
@@ -293,6 +313,7 @@ impl<E> Default for Memory<E> {
             rings: Vec::new(),
             input: Vec::new(),
             output: Vec::new(),
+            pixels: Vec::new(),
         }
     }
 }
@@ -349,6 +370,10 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     scratch: &Scratch<C::Element>,
 ) {
     let area = height * width;
+    let places = Places {
+        side: chain.side(),
+        frame: (height, width),
+    };
     assert!(
         PLANES > 0 && planes.iter().all(|plane| plane.len() == area),
         "planes of the output"
@@ -356,15 +381,17 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
     if area == 0 {
         return;
     }
+    let (place_rows, place_columns) = places.size();
     let frame = Frame {
         chain,
         rows,
-        height,
-        width,
+        places,
+        height: place_rows,
+        width: place_columns,
         tiling,
         scratch,
     };
-    let bands = height.div_ceil(tiling.band_rows.max(1));
+    let bands = place_rows.div_ceil(tiling.band_rows.max(1));
     let whole = Band { top: 0, width, planes };
     frame.bands(0, bands, whole);
 }
@@ -372,6 +399,8 @@ pub(crate) fn run<C: Chain, R: Rows<PLANES>, const PLANES: usize>(
 struct Frame<'a, C: Chain, R> {
     chain: &'a C,
     rows: &'a R,
+    places: Places,
+    /// Rows and columns of places.
     height: usize,
     width: usize,
     tiling: Tiling,
@@ -388,15 +417,12 @@ impl<C: Chain, R> Frame<'_, C, R> {
             return self.band(band);
         }
         let middle = (from + to) / 2;
-        let rows = (middle - from) * self.tiling.band_rows.max(1);
-        let mut halves = band.planes.map(|plane| plane.split_at_mut(rows * self.width));
+        let rows = (middle - from) * self.tiling.band_rows.max(1) * self.places.side;
+        let width = self.places.frame.1;
+        let mut halves = band.planes.map(|plane| plane.split_at_mut(rows * width));
         let second = halves.each_mut().map(|half| std::mem::take(&mut half.1));
         let first = halves.map(|half| half.0);
-        let part = |top, planes| Band {
-            top,
-            width: self.width,
-            planes,
-        };
+        let part = |top, planes| Band { top, width, planes };
         rayon::join(
             || self.bands(from, middle, part(band.top, first)),
             || self.bands(middle, to, part(band.top + rows, second)),
@@ -422,7 +448,12 @@ impl<C: Chain, R> Frame<'_, C, R> {
         &self,
         (left, right): (usize, usize),
         band: &mut Band<'_, R::Value, PLANES>,
-        Memory { rings, input, output }: &mut Memory<C::Element>,
+        Memory {
+            rings,
+            input,
+            output,
+            pixels,
+        }: &mut Memory<C::Element>,
     ) where
         R: Rows<PLANES>,
     {
@@ -440,9 +471,10 @@ impl<C: Chain, R> Frame<'_, C, R> {
         }
         let columns = end - start;
         let input = grown(input, chain.inputs() * columns);
-        let output = grown(output, OUTPUTS * (right - left));
+        let side = self.places.side;
+        let output = grown(output, side * side * OUTPUTS * (right - left));
         let rows = band.rows();
-        let (top, bottom) = (rows.start as isize, rows.end as isize);
+        let (top, bottom) = ((rows.start / side) as isize, rows.end.div_ceil(side) as isize);
         let (height, depth) = (self.height as isize, layers as isize);
         for step in top - depth..bottom + depth {
             if self.rows.given_up() {
@@ -460,7 +492,8 @@ impl<C: Chain, R> Frame<'_, C, R> {
                     continue;
                 }
                 if i == 0 || i == layers - 1 {
-                    self.rows.read(row as usize, start, band, input);
+                    let run = (row as usize, start, columns);
+                    self.places.read(self.rows, run, band, pixels, input);
                 }
                 let source = SourceRow {
                     planes: input,
@@ -484,18 +517,19 @@ impl<C: Chain, R> Frame<'_, C, R> {
             }
             let row = step - depth;
             if (top..bottom).contains(&row) {
-                let mut planes = output.chunks_exact_mut(right - left);
-                let mut planes: [_; OUTPUTS] = std::array::from_fn(|_| planes.next().unwrap_or_default());
-                let out = planes.each_mut().map(|plane| &mut **plane);
-                chain.last_row(rings[layers - 1].window(row), out, left - start, geometry);
-                self.rows.write(row as usize, left, planes, band);
+                let window = rings[layers - 1].window(row);
+                for (pixel, out) in output.chunks_exact_mut(OUTPUTS * (right - left)).enumerate() {
+                    chain.last_row(pixel, window, runs(out, right - left), left - start, geometry);
+                }
+                let run = (row as usize, left, right - left);
+                self.places.write(self.rows, run, band, pixels, output);
             }
         }
     }
 }
 
 /// The first `count` values of `memory`, which grows where it has fewer.
-fn grown(memory: &mut Vec<f32>, count: usize) -> &mut [f32] {
+pub(crate) fn grown(memory: &mut Vec<f32>, count: usize) -> &mut [f32] {
     if memory.len() < count {
         memory.resize(count, 0.0);
     }

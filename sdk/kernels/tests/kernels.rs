@@ -340,6 +340,85 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     }
 }
 
+/// `values` (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉), the pixels of a square of two by two one after another.
+fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+    let pixels = [(0, 0), (0, 1), (1, 0), (1, 1)];
+    let planes = pixels
+        .iter()
+        .flat_map(|pixel| values.chunks(height * width).map(move |plane| (pixel, plane)));
+    planes
+        .flat_map(|((dy, dx), plane)| {
+            let at = move |k: usize| {
+                let (y, x) = (k / width.div_ceil(2), k % width.div_ceil(2));
+                plane[(2 * y + dy).min(height - 1) * width + (2 * x + dx).min(width - 1)]
+            };
+            (0..height.div_ceil(2) * width.div_ceil(2)).map(at)
+        })
+        .collect()
+}
+
+/// The inverse of [`squares`].
+fn pixels(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
+    let columns = width.div_ceil(2);
+    let area = height.div_ceil(2) * columns;
+    let at = |k: usize| {
+        let (c, y, x) = (k / (height * width), k / width % height, k % width);
+        let plane = (y % 2 * 2 + x % 2) * OUTPUTS + c;
+        values[plane * area + y / 2 * columns + x / 2]
+    };
+    (0..OUTPUTS * height * width).map(at).collect()
+}
+
+#[test]
+fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
+    for (channels, filters, count) in [(4, 48, 3), (4, 8, 5), (6, 16, 2)] {
+        let mut case = Int8Case::random(4 * channels, filters, count, 2);
+        let mut layers = f32_layers(4 * channels, filters, count, 5);
+        for pixel in 1..4 {
+            let more = Int8Case::random(4 * channels, filters, count, 10 + pixel)
+                .layers
+                .pop()
+                .unwrap();
+            let last = case.layers.last_mut().unwrap();
+            last.outputs += OUTPUTS;
+            last.kernel.extend(more.kernel);
+            last.bias.extend(more.bias);
+            last.multiplier.extend(more.multiplier);
+            let more = f32_layers(4 * channels, filters, count, 10 + pixel).pop().unwrap();
+            let last = layers.last_mut().unwrap();
+            last.outputs += OUTPUTS;
+            last.kernel.extend(more.kernel);
+            last.bias.extend(more.bias);
+        }
+        for size in [(1, 1), (6, 4), (7, 5), (1, 301), (23, 66)] {
+            let input = frame(channels, size, 3);
+            let (given, half) = (squares(&input, size), (size.0.div_ceil(2), size.1.div_ceil(2)));
+            let expected = pixels(&case.expected(&given, half), size);
+            for isa in Isa::int8() {
+                let (chain, scratch) = (case.chain(isa).unwrap(), Scratch::default());
+                for tiling in tilings(half).into_iter().chain([chain.tiling(size.0, size.1)]) {
+                    let mut output = vec![f32::NAN; expected.len()];
+                    chain.run(&input, &mut output, size, tiling, &scratch);
+                    assert!(
+                        output == expected,
+                        "{isa}, {count} layers of {filters}, {size:?}, {tiling:?}"
+                    );
+                }
+            }
+            let expected = pixels(&f32_expected(&layers, &given, half), size);
+            for isa in Isa::f32() {
+                let (chain, scratch) = (F32Chain::new(&layers, isa).unwrap(), Scratch::default());
+                for tiling in tilings(half).into_iter().chain([chain.tiling(size.0, size.1)]) {
+                    let mut output = vec![f32::NAN; expected.len()];
+                    chain.run(&input, &mut output, size, tiling, &scratch);
+                    let apart = output.iter().zip(&expected).map(|(a, b)| (a - b).abs());
+                    assert!(apart.fold(0.0, f32::max) < 1e-5, "{isa}, {size:?}, {tiling:?}");
+                }
+            }
+        }
+    }
+}
+
 /// What `fuzz/miri` runs, an interpreter some ten thousand times as slow: there the fastest instruction set that it
 /// knows.
 #[test]

@@ -44,6 +44,12 @@ pub(super) enum Numbers {
 impl Numbers {
     /// What a chain is computed in on `device`.
     pub(super) fn of(device: &Device, chain: &Chain, float: Float) -> Result<Numbers> {
+        if chain.halved && !chain.inputs.is_multiple_of(GROUP) {
+            return Err(GpuError::Refused(format!(
+                "{} input channels at half the resolution; fours are right, the CPU takes others",
+                chain.inputs
+            )));
+        }
         Ok(match (chain.precision, float) {
             (Precision::Int8, _) => Numbers::Int8,
             (_, Float::F32) => Numbers::F32,
@@ -135,6 +141,7 @@ pub(super) struct ChainPlan {
 struct Maker<'a> {
     device: &'a Device,
     numbers: Numbers,
+    /// Rows and columns of the layers' own pixels.
     size: (usize, usize),
     frame: Constants,
 }
@@ -175,13 +182,14 @@ impl ChainPlan {
                 .map(|(i, layer)| pack_float(chain, i, layer, numbers))
                 .collect::<Result<_>>()?,
         };
-        let (height, width) = size;
+        let pixels = size.0 * size.1;
+        let (height, width) = (size.0.div_ceil(chain.side()), size.1.div_ceil(chain.side()));
         let tiles = (width.div_ceil(TILE.0), height.div_ceil(TILE.1));
-        let constants = [width, height, width * height, tiles.0].map(|n| n as u32);
+        let constants = [width, height, width * height, tiles.0, size.1, size.0, 0, 0].map(|n| n as u32);
         let maker = Maker {
             device,
             numbers,
-            size,
+            size: (height, width),
             frame: device.constants("frame", bytemuck::cast_slice(&constants))?,
         };
         let groups = chain.filters().div_ceil(GROUP);
@@ -191,8 +199,8 @@ impl ChainPlan {
             device.buffer("a layer's output", bytes)?,
         ];
         let (planes, field) = match end {
-            End::Planes => (24 * width * height, 0),
-            End::Field(..) => (0, 24 * width * height),
+            End::Planes => (24 * pixels, 0),
+            End::Field(..) => (0, 24 * pixels),
         };
         let mut plan = ChainPlan {
             steps: Vec::new(),
@@ -226,13 +234,13 @@ impl ChainPlan {
             }
             _ => (make(Fusion::Layers)?, Fusion::Layers),
         };
-        let input = chain.inputs.div_ceil(GROUP) * width * height * numbers.value_bytes();
+        let input = chain.inputs.div_ceil(GROUP) * pixels * numbers.value_bytes();
         // Features in and out of each hidden layer and into the last one; skips are read once more where layers are
         // not fused; the input twice; the end once.
         let hidden = plan.dispatches() - 1;
         let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
         let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
-        plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * width * height;
+        plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * pixels;
         Ok(plan)
     }
 
@@ -344,7 +352,8 @@ impl Maker<'_> {
             End::Field(Head::RealImaginary, _) => 2,
         };
         let more = format!(
-            "const HEAD: u32 = {head}u;\nconst TANH: bool = {};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            "const HEAD: u32 = {head}u;\nconst SIDE: i32 = {};\nconst TANH: bool = {};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            all.chain.side(),
             all.chain.tanh,
             InputKind::REMAINDER_GAIN
         );
@@ -447,9 +456,23 @@ impl Maker<'_> {
 
 /// Groups of a layer's features and of what is concatenated with them.
 fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
-    let beside = if i + 1 == chain.layers.len() { chain.inputs } else { 0 };
+    let last = i + 1 == chain.layers.len();
+    let beside = if last { chain.layers[0].inputs } else { 0 };
     let features = layer.inputs - beside;
     (features, features.div_ceil(GROUP), beside.div_ceil(GROUP))
+}
+
+/// Values of a layer's outputs; in the last layer of a halved chain those of each pixel of a square in a block of their own.
+fn by_pixel<T: Copy + Default>(chain: &Chain, i: usize, values: &[T]) -> Vec<T> {
+    if !chain.halved || i + 1 < chain.layers.len() {
+        return values.to_vec();
+    }
+    let of_pixel = values.len() / 4;
+    let padding = of_pixel / chain.outputs() * (BLOCK - chain.outputs());
+    let blocks = values.chunks_exact(of_pixel);
+    blocks
+        .flat_map(|block| [block, &vec![T::default(); padding]].concat())
+        .collect()
 }
 
 /// The channel of a layer's input that lies at place `k` of a group, if there is one.
@@ -465,8 +488,10 @@ fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Resul
         return Err(crate::Error::Network(format!("layer {i} is int8 in an f32 chain")).into());
     };
     let (features, groups, beside) = groups(chain, i, layer);
-    let blocks = layer.outputs.div_ceil(BLOCK);
-    let mut values = bias.clone();
+    let (kernel, bias) = (by_pixel(chain, i, kernel), by_pixel(chain, i, bias));
+    let outputs = bias.len();
+    let blocks = outputs.div_ceil(BLOCK);
+    let mut values = bias;
     values.resize(blocks * BLOCK, 0.0);
     for block in 0..blocks {
         for kx in 0..3 {
@@ -475,7 +500,7 @@ fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Resul
                     for k in 0..GROUP {
                         let c = channel(features, groups, layer.inputs, group, k);
                         values.extend((block * BLOCK..(block + 1) * BLOCK).map(|o| match c {
-                            Some(c) if o < layer.outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx],
+                            Some(c) if o < outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx],
                             _ => 0.0,
                         }));
                     }
@@ -494,7 +519,7 @@ fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Resul
         bytes,
         groups,
         beside,
-        outputs: layer.outputs,
+        outputs,
         requantise: None,
         zero: 0,
     })
@@ -506,13 +531,15 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
     let mut all = Vec::new();
     for (i, layer) in whole.layers.iter().enumerate() {
         let (features, groups, beside) = groups(chain, i, &chain.layers[i]);
-        let blocks = layer.outputs.div_ceil(BLOCK);
         let per_filter = layer.inputs * 9;
+        let (kernel, biases) = (by_pixel(chain, i, &layer.kernel), by_pixel(chain, i, &layer.bias));
+        let outputs = biases.len();
+        let blocks = outputs.div_ceil(BLOCK);
         let mut bias = Vec::new();
-        for (o, weights) in layer.kernel.chunks_exact(per_filter).enumerate() {
+        for (o, weights) in kernel.chunks_exact(per_filter).enumerate() {
             let total: i64 = weights.iter().map(|&w| i64::from(w)).sum();
             let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum();
-            let plain = i64::from(layer.bias[o]) - i64::from(layer.zero_point) * total;
+            let plain = i64::from(biases[o]) - i64::from(layer.zero_point) * total;
             if plain.abs() + reach > LARGEST_SUM {
                 return Err(GpuError::Refused(format!(
                     "sums of layer {i} exceed 24 bits, which f32 holds; the CPU is right"
@@ -523,7 +550,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
         }
         let mut words: Vec<u32> = bias.iter().map(|&b| b as u32).collect();
         words.resize(blocks * BLOCK, 0);
-        words.extend(layer.multiplier.iter().map(|m| m.to_bits()));
+        words.extend(by_pixel(chain, i, &layer.multiplier).iter().map(|m| m.to_bits()));
         words.resize(2 * blocks * BLOCK, 0);
         for block in 0..blocks {
             for kx in 0..3 {
@@ -532,9 +559,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
                         words.extend((block * BLOCK..(block + 1) * BLOCK).map(|o| {
                             u32::from_le_bytes(std::array::from_fn(|k| {
                                 match channel(features, groups, layer.inputs, group, k) {
-                                    Some(c) if o < layer.outputs => {
-                                        layer.kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx] as u8
-                                    }
+                                    Some(c) if o < outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx] as u8,
                                     _ => 0,
                                 }
                             }))
@@ -558,7 +583,7 @@ fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
             bytes: bytemuck::cast_slice(&words).to_vec(),
             groups,
             beside,
-            outputs: layer.outputs,
+            outputs,
             requantise: Some(Tables {
                 skip: after(skip.map_or(0.0, |s| s.skip)),
                 relu: skip.and_then(|s| s.relu).map(after),

@@ -5,7 +5,8 @@
 // pixels, and the weights, the same for all threads, come from uniform memory where they fit. They lie in the order in
 // which they are read: biases, then `[eight filters][column of taps][group][row of taps]`.
 
-struct Frame { width: i32, height: i32, plane: u32, tiles: u32 }
+// Columns, rows and places of what layers compute: pixels, or squares of two by two. Then the frame's own pixels.
+struct Frame { width: i32, height: i32, plane: u32, tiles: u32, columns: i32, rows: i32, unused: vec2u }
 struct Totals {
     a0: vec4f, a1: vec4f, a2: vec4f, a3: vec4f, b0: vec4f, b1: vec4f, b2: vec4f, b3: vec4f,
 }

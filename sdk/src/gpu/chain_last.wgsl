@@ -1,7 +1,8 @@
 // The last layer and what becomes of its six planes: the planes themselves, or the complex field that they stand for,
 // with each workgroup's sum of it for the mean phase. Goes behind chain.wgsl or chain_int8.wgsl, whose `sums` gives
 // the planes as t.a… (0 to 3) and t.b… (4 and 5). HEAD: 0 planes, 1 amplitude and phase, 2 correction of the image,
-// 3 correction of a field, 4 correction of a seed.
+// 3 correction of a field, 4 correction of a seed. Where layers compute squares, SIDE is 2, and each of a square's
+// pixels has a block of filters, and groups of the input, of its own.
 
 @group(0) @binding(5) var<storage, read_write> planes: array<f32>;
 @group(0) @binding(6) var<storage, read_write> field: array<vec2f>;
@@ -30,9 +31,16 @@ fn direction(t: f32) -> vec2f {
     return select(v, -v, (quarter & 2) == 2);
 }
 
-fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
-    if (x >= frame.width || y >= frame.height) { return; }
-    let at = u32(y * frame.width + x);
+// `pixel` of the square at (place_x, place_y).
+fn finish(thread: u32, pixel: i32, place_x: i32, place_y: i32, low: vec4f, high: vec4f) {
+    if (place_x >= frame.width || place_y >= frame.height) { return; }
+    let x = SIDE * place_x + pixel % SIDE;
+    let y = SIDE * place_y + pixel / SIDE;
+    if (x >= frame.columns || y >= frame.rows) { return; }
+    let at = u32(y * frame.columns + x);
+    let plane = u32(frame.columns * frame.rows);
+    let groups = BESIDE / u32(SIDE * SIDE);
+    let input = u32(pixel) * groups * frame.plane + u32(place_y * frame.width + place_x);
     var a = low;
     var b = high;
     if (TANH) {
@@ -41,11 +49,11 @@ fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
     }
     if (HEAD == 0u) {
         planes[at] = a.x;
-        planes[frame.plane + at] = a.y;
-        planes[2u * frame.plane + at] = a.z;
-        planes[3u * frame.plane + at] = a.w;
-        planes[4u * frame.plane + at] = b.x;
-        planes[5u * frame.plane + at] = b.y;
+        planes[plane + at] = a.y;
+        planes[2u * plane + at] = a.z;
+        planes[3u * plane + at] = a.w;
+        planes[4u * plane + at] = b.x;
+        planes[5u * plane + at] = b.y;
         return;
     }
     let first = a.xyz;
@@ -63,29 +71,29 @@ fn finish(thread: u32, x: i32, y: i32, low: vec4f, high: vec4f) {
         var im = second;
         if (HEAD == 2u) {
             // Colours come in minus a half.
-            re += base(at).xyz + 0.5;
+            re += base(input).xyz + 0.5;
         } else if (HEAD == 3u) {
-            re += base(at).xyz;
-            im += vec3f(base(at).w, base(frame.plane + at).xy);
+            re += base(input).xyz;
+            im += vec3f(base(input).w, base(frame.plane + input).xy);
         } else if (HEAD == 5u) {
             // A field in two parts.
-            let second = base(frame.plane + at);
-            let third = base(2u * frame.plane + at);
-            re += base(at).xyz + vec3f(second.zw, third.x) / REMAINDER_GAIN;
-            im += vec3f(base(at).w, second.xy) + third.yzw / REMAINDER_GAIN;
+            let second = base(frame.plane + input);
+            let third = base(2u * frame.plane + input);
+            re += base(input).xyz + vec3f(second.zw, third.x) / REMAINDER_GAIN;
+            im += vec3f(base(input).w, second.xy) + third.yzw / REMAINDER_GAIN;
         } else {
             // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
-            let seed = base(frame.plane + at);
+            let seed = base(frame.plane + input);
             re += 2.0 * seed.xyz + 0.5;
-            im += 2.0 * vec3f(seed.w, base(2u * frame.plane + at).xy);
+            im += 2.0 * vec3f(seed.w, base(2u * frame.plane + input).xy);
         }
         red = vec2f(re.x, im.x);
         green = vec2f(re.y, im.y);
         blue = vec2f(re.z, im.z);
     }
     field[at] = red;
-    field[frame.plane + at] = green;
-    field[2u * frame.plane + at] = blue;
+    field[plane + at] = green;
+    field[2u * plane + at] = blue;
     shared_sums[3u * thread] += red;
     shared_sums[3u * thread + 1u] += green;
     shared_sums[3u * thread + 2u] += blue;
@@ -102,11 +110,13 @@ fn last(
     shared_sums[3u * thread] = vec2f(0);
     shared_sums[3u * thread + 1u] = vec2f(0);
     shared_sums[3u * thread + 2u] = vec2f(0);
-    let t = sums(0u, x, y);
-    finish(thread, x, y, t.a0, t.b0);
-    finish(thread, x, y + 1, t.a1, t.b1);
-    finish(thread, x, y + 2, t.a2, t.b2);
-    finish(thread, x, y + 3, t.a3, t.b3);
+    for (var pixel = 0; pixel < SIDE * SIDE; pixel++) {
+        let t = sums(u32(pixel), x, y);
+        finish(thread, pixel, x, y, t.a0, t.b0);
+        finish(thread, pixel, x, y + 1, t.a1, t.b1);
+        finish(thread, pixel, x, y + 2, t.a2, t.b2);
+        finish(thread, pixel, x, y + 3, t.a3, t.b3);
+    }
     if (HEAD != 0u) {
         for (var step = THREADS / 2u; step > 0u; step /= 2u) {
             workgroupBarrier();

@@ -32,6 +32,14 @@ impl Form<'_> {
         }
     }
 
+    /// Pixels along each side of what the chain's layers take as one.
+    fn side(&self) -> usize {
+        match self {
+            Form::Chain(chain, ..) => chain.side(),
+            Form::Surfaces => 1,
+        }
+    }
+
     fn numbers(&self) -> Numbers {
         match self {
             Form::Chain(_, numbers, _) => *numbers,
@@ -53,8 +61,9 @@ impl Form<'_> {
             Form::Surfaces => (0.0, 1.0),
         };
         let header = format!(
-            "{enable}alias Value = {};\nconst CHANNELS: u32 = {channels}u;\nconst GROUPS: u32 = {}u;\nconst MIDDLE: f32 = {middle:?};\nconst DEPTH_SCALE: f32 = {scale:?};\n",
+            "{enable}alias Value = {};\nconst SIDE: u32 = {}u;\nconst CHANNELS: u32 = {channels}u;\nconst GROUPS: u32 = {}u;\nconst MIDDLE: f32 = {middle:?};\nconst DEPTH_SCALE: f32 = {scale:?};\n",
             numbers.value(),
+            self.side(),
             channels.div_ceil(GROUP),
         );
         header + &reader.header + include_str!("input/pack.wgsl") + &reader.text + store
@@ -112,10 +121,11 @@ impl Packer {
     ) -> Result<Self> {
         let (height, width) = size;
         let area = height * width;
-        let groups = form.channels().div_ceil(GROUP);
+        let (rows, columns) = (height.div_ceil(form.side()), width.div_ceil(form.side()));
+        let groups = form.channels().div_ceil(GROUP) * form.side().pow(2);
         let input = match input {
             Some(input) => input,
-            None => ChainInput::new(device, groups * area, form.numbers())?,
+            None => ChainInput::new(device, groups * rows * columns, form.numbers())?,
         };
         let frame = [width, height, area, 0].map(|n| n as u32);
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
@@ -143,7 +153,7 @@ impl Packer {
             arguments.push((7, camera.constants.buffer.as_entire_binding()));
             arguments.push((8, camera.taps.buffer.as_entire_binding()));
         }
-        let step = program.on(device, &arguments, [width.div_ceil(64), height, 1])?;
+        let step = program.on(device, &arguments, [columns.div_ceil(64), rows, 1])?;
         Ok(Packer {
             planes: reader.first,
             frames,

@@ -6,6 +6,10 @@
 //! - `input[0]` is the network's input, `input[i] = output[i−1]`;
 //! - for odd `i ≥ 3`, `input[i] = output[i−1] + input[i−2]`;
 //! - the last layer's input has the network's input concatenated behind the features.
+//!
+//! A halved chain does so at half the resolution: a square of two by two pixels is a pixel of its layers, which have four
+//! times the channels of the network's input and output, those of the upper left pixel first, then upper right, lower left,
+//! lower right. Where a side is odd, its last row or column is repeated. It sees twice as far for as many layers.
 
 /// Numbers of a chain's layers: one of the two precisions, throughout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,6 +109,8 @@ pub struct Layer {
 pub struct Chain {
     /// Channels of the network's input.
     pub inputs: usize,
+    /// Whether it runs at half the resolution.
+    pub halved: bool,
     /// The layers in order, two at least.
     pub layers: Vec<Layer>,
     /// Whether tanh follows the last convolution.
@@ -119,7 +125,12 @@ pub struct Chain {
 impl Chain {
     /// Channels of the network's output.
     pub fn outputs(&self) -> usize {
-        self.layers.last().map_or(0, |layer| layer.outputs)
+        self.layers.last().map_or(0, |layer| layer.outputs / self.side().pow(2))
+    }
+
+    /// Pixels of the frame along each side of one of the layers' own: 1, or 2 in a halved chain.
+    pub fn side(&self) -> usize {
+        if self.halved { 2 } else { 1 }
     }
 
     /// Filters of the hidden layers.
@@ -134,6 +145,7 @@ impl Chain {
 
     /// Multiply-accumulate operations for one pixel.
     pub fn macs_per_pixel(&self) -> usize {
-        self.layers.iter().map(|layer| 9 * layer.inputs * layer.outputs).sum()
+        let all: usize = self.layers.iter().map(|layer| 9 * layer.inputs * layer.outputs).sum();
+        all / self.side().pow(2)
     }
 }

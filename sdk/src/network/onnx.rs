@@ -17,6 +17,8 @@ const MAX_CHANNELS: usize = 1024;
 /// What a step of the chain yields, before any rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Step {
+    /// The graph's input, where layers read it as squares of pixels.
+    Frame,
     Input,
     Convolution(usize),
     Relu(usize),
@@ -24,17 +26,21 @@ enum Step {
     Sum(usize),
     /// The last layer's input.
     Concat,
+    /// The last layer's output, its squares as pixels again.
+    Pixels,
     Tanh,
 }
 
 impl std::fmt::Display for Step {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Step::Frame => write!(f, "the graph's input before SpaceToDepth"),
             Step::Input => write!(f, "the network's input"),
             Step::Convolution(i) => write!(f, "layer {i}'s convolution"),
             Step::Relu(i) => write!(f, "layer {i}'s output"),
             Step::Sum(i) => write!(f, "the sum for layer {i}"),
             Step::Concat => write!(f, "the concatenation"),
+            Step::Pixels => write!(f, "the last layer's pixels"),
             Step::Tanh => write!(f, "the tanh"),
         }
     }
@@ -108,6 +114,8 @@ type Read<T> = std::result::Result<T, String>;
 struct Reader<'a> {
     values: HashMap<&'a str, Value<'a>>,
     inputs: usize,
+    /// Whether layers read squares of two by two pixels.
+    halved: bool,
     layer_count: usize,
     layers: Vec<Layer>,
     /// For the concatenation: roundings of its features and of the network's input.
@@ -135,11 +143,12 @@ impl<'a> Reader<'a> {
                 inputs.len()
             )));
         };
+        let halved = graph.node.iter().any(|node| node.op_type == "SpaceToDepth");
         let mut values: HashMap<_, _> = constants.iter().map(|(&name, c)| (name, Value::Constant(c))).collect();
         values.insert(
             &input.name,
             Value::Activation {
-                step: Step::Input,
+                step: if halved { Step::Frame } else { Step::Input },
                 rounding: None,
             },
         );
@@ -147,6 +156,7 @@ impl<'a> Reader<'a> {
         Ok(Reader {
             values,
             inputs,
+            halved,
             layer_count,
             layers: Vec::new(),
             concat: None,
@@ -156,6 +166,19 @@ impl<'a> Reader<'a> {
 
     fn last(&self) -> usize {
         self.layer_count - 1
+    }
+
+    /// Channels of the network's input as layers read it.
+    fn read_channels(&self) -> usize {
+        self.inputs * if self.halved { 4 } else { 1 }
+    }
+
+    /// What the graph gives but for a tanh.
+    fn end(&self) -> Step {
+        match self.halved {
+            true => Step::Pixels,
+            false => Step::Convolution(self.last()),
+        }
     }
 
     /// What layer `i` reads, the concatenation left out.
@@ -189,14 +212,15 @@ impl<'a> Reader<'a> {
             "Relu" => self.relu(node)?,
             "Add" => self.sum(node)?,
             "Concat" => self.concatenation(node)?,
+            "SpaceToDepth" | "DepthToSpace" => self.squares(node)?,
             "Tanh" => self.tanh(node)?,
             "BatchNormalization" => {
                 return Err("fold batch normalisation into the convolution before export".into());
             }
             _ => {
                 return Err(
-                    "not an operator of the residual chain (Conv, Relu, Add, Concat, Tanh, QuantizeLinear, \
-                            DequantizeLinear)"
+                    "not an operator of the residual chain (Conv, Relu, Add, Concat, Tanh, SpaceToDepth, \
+                            DepthToSpace, QuantizeLinear, DequantizeLinear)"
                         .into(),
                 );
             }
@@ -270,7 +294,10 @@ impl<'a> Reader<'a> {
         if rounding.is_some() {
             return Err(format!("rounds {step} a second time; once is right"));
         }
-        if matches!(step, Step::Convolution(_) | Step::Tanh) {
+        if step == Step::Frame {
+            return Err("rounds the graph's input before SpaceToDepth; after it is right".into());
+        }
+        if matches!(step, Step::Convolution(_) | Step::Pixels | Step::Tanh) {
             return Err(format!(
                 "rounds {step}; a hidden layer is rounded after its ReLU and the output stays f32"
             ));
@@ -341,8 +368,8 @@ impl<'a> Reader<'a> {
             });
         }
         let inputs = match i {
-            0 => self.inputs,
-            _ if i == self.last() => self.layers[0].outputs + self.inputs,
+            0 => self.read_channels(),
+            _ if i == self.last() => self.layers[0].outputs + self.read_channels(),
             _ => self.layers[0].outputs,
         };
         let weights = self.weights(node, inputs, rounding)?;
@@ -555,9 +582,33 @@ impl<'a> Reader<'a> {
         })
     }
 
+    /// Pixels as squares at the beginning, and back at the end.
+    fn squares(&self, node: &Node) -> Read<Value<'a>> {
+        if int_attribute(node, "blocksize") != Some(2) {
+            return Err("blocksize 2 is right".into());
+        }
+        if let Some(mode) = node.attribute.iter().find(|a| a.name == "mode" && a.s != b"DCR") {
+            let mode = String::from_utf8_lossy(&mode.s).into_owned();
+            return Err(format!("mode '{mode}'; DCR is right"));
+        }
+        let (from, to) = match node.op_type.as_str() {
+            "SpaceToDepth" => (Step::Frame, Step::Input),
+            _ => (Step::Convolution(self.last()), Step::Pixels),
+        };
+        match self.activation(node, 0)? {
+            (step, None) if step == from => Ok(Value::Activation {
+                step: to,
+                rounding: None,
+            }),
+            (step, _) => Err(format!(
+                "follows {step}; it follows {from} in a chain of half the resolution"
+            )),
+        }
+    }
+
     fn tanh(&self, node: &Node) -> Read<Value<'a>> {
         match self.activation(node, 0)? {
-            (Step::Convolution(i), None) if i == self.last() => Ok(Value::Activation {
+            (step, None) if step == self.end() => Ok(Value::Activation {
                 step: Step::Tanh,
                 rounding: None,
             }),
@@ -577,14 +628,12 @@ impl<'a> Reader<'a> {
                 step: Step::Tanh,
                 rounding: None,
             }) => true,
-            Some(Value::Activation {
-                step: Step::Convolution(i),
-                rounding: None,
-            }) if *i == self.last() => false,
+            Some(Value::Activation { step, rounding: None }) if *step == self.end() => false,
             _ => {
                 return Err(Error::Network(format!(
-                    "output '{}' is not the last layer's; the last convolution or its tanh is right",
-                    output.name
+                    "output '{}' is not the last layer's; {} or its tanh is right",
+                    output.name,
+                    self.end()
                 )));
             }
         };
@@ -595,6 +644,7 @@ impl<'a> Reader<'a> {
         let concat_rounded_input = matches!(self.concat, Some([_, Some(_)]));
         Ok(Chain {
             inputs: self.inputs,
+            halved: self.halved,
             layers: self.layers,
             tanh,
             concat_rounded_input,

@@ -6,37 +6,21 @@ use std::sync::Arc;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::*;
 
-/// Loads the network's graph and puts one operator in place of all between its input and its output. Height and width
-/// stay symbols.
-pub(super) fn model(file: &[u8], chain: FusedChain, channels: usize) -> Result<TypedModel> {
+/// A graph of one operator, from `name`, (1, `channels`, H, W), to the network's output. Height and width are symbols.
+pub(super) fn model(name: &str, chain: FusedChain, channels: usize) -> Result<TypedModel> {
     let build = || -> TractResult<TypedModel> {
-        let symbols = SymbolScope::default();
-        let (height, width) = (symbols.sym("H"), symbols.sym("W"));
+        let mut model = TypedModel::default();
+        let (height, width) = (model.symbols.sym("H"), model.symbols.sym("W"));
         let shape = [1.to_dim(), channels.to_dim(), height.to_dim(), width.to_dim()];
-        let mut model = tract_onnx::onnx()
-            .model_for_proto_model_with_model_template(&super::stock::proto(file)?, template(symbols))?
-            .with_input_fact(0, f32::fact(shape).into())?
-            .into_typed()?
-            .into_decluttered()?;
-        let (input, output) = (model.input_outlets()?[0], model.output_outlets()?[0]);
+        let input = model.add_source(name, f32::fact(shape))?;
         let operator = FusedOperator {
             chain: Shared(Arc::new(chain)),
         };
-        let mut patch = TypedModelPatch::default();
-        let tap = patch.tap_model(&model, input)?;
-        let fused = patch.wire_node("chain", operator, &[tap])?;
-        patch.shunt_outside(&model, output, fused[0])?;
-        patch.apply(&mut model)?;
+        let output = model.wire_node("chain", operator, &[input])?;
+        model.select_output_outlets(&output)?;
         model.into_optimized()
     };
     build().map_err(|why| Error::Network(super::stock::one_line(&why)))
-}
-
-fn template(symbols: SymbolScope) -> InferenceModel {
-    InferenceModel {
-        symbols,
-        ..InferenceModel::default()
-    }
 }
 
 /// Compared by identity: two packed chains are the same operator if they are the same memory.

@@ -2,6 +2,9 @@
 
 use super::chain::{Chain, Quantisation, Weights};
 
+/// Pixels of a square of two by two, from the upper left.
+const PIXELS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
+
 /// Runs `chain` on one frame: `input` planar `(C, H, W)`, the result `(outputs, H, W)`.
 ///
 /// An int8 chain is computed in real numbers (f64 sums) with the roundings where the file has them.
@@ -9,8 +12,50 @@ use super::chain::{Chain, Quantisation, Weights};
 /// # Panics
 /// If `input` is not `chain.inputs · height · width` long.
 pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
-    let area = height * width;
-    assert_eq!(input.len(), chain.inputs * area);
+    assert_eq!(input.len(), chain.inputs * height * width);
+    let mut output = match chain.halved {
+        false => layers(chain, input, height, width),
+        true => {
+            let half = (height.div_ceil(2), width.div_ceil(2));
+            let output = layers(chain, &squares(input, height, width), half.0, half.1);
+            pixels(&output, chain.outputs(), height, width)
+        }
+    };
+    if chain.tanh {
+        output.iter_mut().for_each(|v| *v = v.tanh());
+    }
+    output
+}
+
+/// (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉).
+fn squares(values: &[f32], height: usize, width: usize) -> Vec<f32> {
+    let mut squares = Vec::new();
+    for (dy, dx) in PIXELS {
+        for plane in values.chunks(height * width) {
+            for y in (0..height).step_by(2) {
+                let row = (y + dy).min(height - 1) * width;
+                squares.extend((0..width).step_by(2).map(|x| plane[row + (x + dx).min(width - 1)]));
+            }
+        }
+    }
+    squares
+}
+
+/// The inverse of [`squares`].
+fn pixels(squares: &[f32], channels: usize, height: usize, width: usize) -> Vec<f32> {
+    let (rows, columns) = (height.div_ceil(2), width.div_ceil(2));
+    let mut values = Vec::new();
+    for channel in 0..channels {
+        for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+            let plane = (y % 2 * 2 + x % 2) * channels + channel;
+            values.push(squares[(plane * rows + y / 2) * columns + x / 2]);
+        }
+    }
+    values
+}
+
+/// The layers on (C, H, W) at their own resolution.
+fn layers(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
     let last = chain.layers.len() - 1;
     let mut inputs: Vec<Vec<f32>> = Vec::new();
     let mut output = input.to_vec();
@@ -39,9 +84,6 @@ pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32
             output.iter_mut().for_each(|v| *v = v.max(0.0));
         }
         inputs.push(x);
-    }
-    if chain.tanh {
-        output.iter_mut().for_each(|v| *v = v.tanh());
     }
     output
 }

@@ -14,7 +14,7 @@ impl StockPlan {
     pub(super) fn new(file: &[u8], shape: [usize; 4]) -> Result<StockPlan> {
         let model = || -> TractResult<_> {
             tract_onnx::onnx()
-                .model_for_proto_model(&proto(file)?)?
+                .model_for_proto_model(&prost::Message::decode(file)?)?
                 .with_input_fact(0, f32::fact(shape).into())?
                 .into_optimized()?
                 .into_runnable()
@@ -36,11 +36,6 @@ impl StockPlan {
         };
         run().map_err(|why| Error::Network(one_line(&why)))
     }
-}
-
-/// The file as tract reads it.
-pub(super) fn proto(file: &[u8]) -> TractResult<tract_onnx::pb::ModelProto> {
-    Ok(prost::Message::decode(file)?)
 }
 
 pub(super) fn one_line(why: &TractError) -> String {

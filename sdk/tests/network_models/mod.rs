@@ -20,6 +20,8 @@ pub struct Model {
     pub input: &'static str,
     pub offset_mm: &'static str,
     pub seed_planes: Option<usize>,
+    /// At half the resolution.
+    pub halved: bool,
 }
 
 impl Model {
@@ -36,7 +38,12 @@ impl Model {
             input: "rgbd",
             offset_mm: "0",
             seed_planes: None,
+            halved: false,
         }
+    }
+
+    pub fn halved(self) -> Model {
+        Model { halved: true, ..self }
     }
 
     pub fn int8(layers: usize, filters: usize) -> Model {
@@ -69,7 +76,13 @@ impl Model {
         b.graph.name = "chain".into();
         b.graph.input.push(planes("rgbd", self.inputs as i64));
         b.graph.output.push(planes("field", 6));
-        let rounded_input = self.round(&mut b, "rgbd", 1.0 / 254.0, 127);
+        let given = if self.halved { "squares_out" } else { "rgbd" };
+        if self.halved {
+            let squares = b.node("SpaceToDepth", "squares", &["rgbd"], given);
+            squares.attribute.push(int("blocksize", 2));
+        }
+        let pixels = if self.halved { 4 } else { 1 };
+        let rounded_input = self.round(&mut b, given, 1.0 / 254.0, 127);
         let mut current = rounded_input.clone();
         let (mut inputs, mut outputs): (Vec<String>, Vec<String>) = (vec![], vec![]);
         let mut scale = 1.0 / 254.0;
@@ -95,7 +108,7 @@ impl Model {
                     let original = if self.inner_roundings {
                         &rounded_input[..]
                     } else {
-                        "rgbd"
+                        given
                     };
                     b.node("Concat", "concat", &[&relu, original], "joined")
                         .attribute
@@ -109,13 +122,13 @@ impl Model {
             }
             inputs.push(current.clone());
             let reads = if i == 0 {
-                self.inputs
+                pixels * self.inputs
             } else {
-                self.filters + if last { self.inputs } else { 0 }
+                self.filters + if last { pixels * self.inputs } else { 0 }
             };
-            let writes = if last { 6 } else { self.filters };
+            let writes = if last { pixels * 6 } else { self.filters };
             self.weights(&mut b, i, reads, writes, scale);
-            let end = if last && !self.tanh {
+            let end = if last && !self.tanh && !self.halved {
                 "field".to_string()
             } else {
                 format!("conv{i}_out")
@@ -133,9 +146,9 @@ impl Model {
                 ints("pads", &[1, 1, 1, 1]),
                 ints("strides", &[1, 1]),
             ];
-            if last && self.tanh {
-                b.node("Tanh", "tanh", &[&end], "field");
-            } else if !last {
+            if last {
+                self.end(&mut b, end);
+            } else {
                 b.node("Relu", &format!("relu{i}"), &[&end], &format!("relu{i}_out"));
                 outputs.push(format!("relu{i}_out"));
             }
@@ -165,6 +178,19 @@ impl Model {
                 })
                 .collect(),
             ..Default::default()
+        }
+    }
+
+    /// What follows the last convolution.
+    fn end(&self, b: &mut Builder, mut end: String) {
+        if self.halved {
+            let to = if self.tanh { "pixels_out" } else { "field" };
+            let pixels = b.node("DepthToSpace", "pixels", &[&end], to);
+            pixels.attribute.push(int("blocksize", 2));
+            end = to.into();
+        }
+        if self.tanh {
+            b.node("Tanh", "tanh", &[&end], "field");
         }
     }
 

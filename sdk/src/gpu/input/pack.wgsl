@@ -1,6 +1,7 @@
 // A frame as it comes to what the chain reads: groups of four channels in the chain's numbers. The header that input.rs
 // writes before this text gives `Value` and the constants in capitals; behind it stand `channels`, which knows where
-// values come from, and `store`, which knows the numbers.
+// values come from, and `store`, which knows the numbers. Where the chain's layers take squares of two by two pixels as
+// one, SIDE is 2, and the groups of a square's pixels lie behind one another.
 
 struct Frame { width: u32, height: u32, plane: u32, unused: u32 }
 
@@ -9,9 +10,16 @@ struct Frame { width: u32, height: u32, plane: u32, unused: u32 }
 
 @compute @workgroup_size(64)
 fn pack(@builtin(global_invocation_id) at: vec3u) {
-    if (at.x >= frame.width) { return; }
-    let pixel = at.y * frame.width + at.x;
-    for (var group = 0u; group < GROUPS; group++) {
-        store(group * frame.plane + pixel, channels(group, at.x, at.y));
+    let columns = (frame.width + SIDE - 1u) / SIDE;
+    let rows = (frame.height + SIDE - 1u) / SIDE;
+    if (at.x >= columns) { return; }
+    let place = at.y * columns + at.x;
+    for (var pixel = 0u; pixel < SIDE * SIDE; pixel++) {
+        // Of an odd side the last row or column is repeated.
+        let x = min(SIDE * at.x + pixel % SIDE, frame.width - 1u);
+        let y = min(SIDE * at.y + pixel / SIDE, frame.height - 1u);
+        for (var group = 0u; group < GROUPS; group++) {
+            store((pixel * GROUPS + group) * columns * rows + place, channels(group, x, y));
+        }
     }
 }
