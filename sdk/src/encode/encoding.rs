@@ -71,7 +71,7 @@ pub(super) enum Prefilter {
     AntiAlias(AntiAlias),
     /// With the values of a plane.
     BandLimit(BandLimit, usize),
-    Deep(Deep),
+    Deep(Box<Deep>),
 }
 
 /// Working memory of a [`Prefilter`] that needs the whole field.
@@ -99,7 +99,7 @@ impl Prefilter {
                 let plane = height * width;
                 Prefilter::BandLimit(BandLimit::new(height, width, *k)?, plane)
             }
-            Encoding::Deep(network) => Prefilter::Deep(Deep::new(height, width, network, display)?),
+            Encoding::Deep(network) => Prefilter::Deep(Box::new(Deep::new(height, width, network, display)?)),
         })
     }
 
