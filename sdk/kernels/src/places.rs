@@ -1,7 +1,9 @@
-//! A chain's places: the pixels of a frame, or squares of two by two of them where the chain runs at half the resolution.
+//! A chain's places: the pixels of a frame, or squares of two by two of them where the chain runs at half the
+//! resolution.
 //!
-//! A square's pixels are channels of its place, those of the upper left first, then upper right, lower left, lower right;
-//! so are the outputs (SpaceToDepth and DepthToSpace of ONNX). Where a side is odd, its last row or column is repeated.
+//! A square's pixels are channels of its place, those of the upper left first, then upper right, lower left, lower
+//! right; so are the outputs (SpaceToDepth and DepthToSpace of ONNX). Where a side is odd, its last row or column is
+//! repeated.
 
 use crate::OUTPUTS;
 use crate::wavefront::{Band, Rows, grown};

@@ -142,8 +142,8 @@ pub(crate) trait Chain: Sync {
         out: &mut [Self::Element],
         geometry: Geometry,
     );
-    /// Runs the last layer for one pixel of each place (see [`crate::places`]): places `from..from + out[c].len()` of the
-    /// row, into the output planes' rows.
+    /// Runs the last layer for one pixel of each place (see [`crate::places`]): places `from..from + out[c].len()` of
+    /// the row, into the output planes' rows.
     fn last_row(
         &self,
         pixel: usize,

@@ -462,7 +462,8 @@ fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
     (features, features.div_ceil(GROUP), beside.div_ceil(GROUP))
 }
 
-/// Values of a layer's outputs; in the last layer of a halved chain those of each pixel of a square in a block of their own.
+/// Values of a layer's outputs; in the last layer of a halved chain those of each pixel of a square in a block of their
+/// own.
 fn by_pixel<T: Copy + Default>(chain: &Chain, i: usize, values: &[T]) -> Vec<T> {
     if !chain.halved || i + 1 < chain.layers.len() {
         return values.to_vec();
