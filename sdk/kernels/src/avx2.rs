@@ -226,7 +226,10 @@ fn f32_filters(
     geometry: Geometry,
 ) {
     assert!(out.len() == GROUP * geometry.stride() && skip.is_none_or(|skip| skip.len() == out.len()));
-    for x in (0..geometry.width).step_by(8 * F32_BLOCKS) {
+    const SPAN: usize = 8 * F32_BLOCKS;
+    for x in (0..geometry.width).step_by(SPAN) {
+        // The last of a row whose blocks are whole begins earlier, so that it ends in them.
+        let x = x.min(geometry.padded - SPAN);
         let sums = f32_sums::<GROUP>(layer, first, rows, x, geometry);
         for (o, sums) in sums.iter().enumerate() {
             for (b, sum) in sums.iter().enumerate() {

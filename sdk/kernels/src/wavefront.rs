@@ -196,8 +196,8 @@ pub trait Rows<const PLANES: usize>: Sync {
     /// column `from` on.
     ///
     /// Called twice for each row that a band needs, and more often for the last of a frame whose rows are paired. Where
-    /// strips are as wide as the frame, a row is read for the last
-    /// time before the row above it is written, so that what is written may replace what is read.
+    /// strips are as wide as the frame, a row is read for the last time before the row above it is written, so that
+    /// what is written may replace what is read.
     fn read(&self, row: usize, from: usize, band: &Band<'_, Self::Value, PLANES>, into: &mut [f32]);
 
     /// Takes the values of `row` from column `from` on, one run of pixels for each output; they may be worked on there.

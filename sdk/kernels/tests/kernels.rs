@@ -3,7 +3,8 @@
 
 use phasefront_kernels::*;
 
-const SIZES: [(usize, usize); 5] = [(1, 1), (7, 5), (1, 300), (23, 67), (40, 131)];
+/// With whole blocks of pixels, of which no kernel may step out: 128 and 192.
+const SIZES: [(usize, usize); 7] = [(1, 1), (7, 5), (1, 128), (2, 192), (1, 300), (23, 67), (40, 131)];
 
 /// A small linear congruential generator: the tests need no more, and build for every target.
 struct Random(u64);
@@ -340,6 +341,40 @@ fn f32_is_the_definition_to_rounding_on_every_instruction_set_and_equal_on_every
     }
 }
 
+/// Blocks of pixels end in a row in as many ways as there are widths.
+#[test]
+fn rows_of_every_width_agree_on_every_instruction_set() {
+    let (case, layers) = (Int8Case::random(4, 8, 3, 2), f32_layers(4, 8, 3, 5));
+    for width in 1..=400 {
+        let size = (1, width);
+        let input = frame(4, size, 7);
+        let tiling = tilings(size)[0];
+        let int8 = |isa| {
+            let mut output = vec![f32::NAN; OUTPUTS * width];
+            let chain = case.chain(isa).unwrap();
+            chain.run(&input, &mut output, size, tiling, &Scratch::default());
+            output
+        };
+        let f32 = |isa| {
+            let mut output = vec![f32::NAN; OUTPUTS * width];
+            let chain = F32Chain::new(&layers, isa).unwrap();
+            chain.run(&input, &mut output, size, tiling, &Scratch::default());
+            output
+        };
+        let expected = int8(Isa::Portable);
+        assert!(Isa::int8().into_iter().all(|isa| int8(isa) == expected), "{width}");
+        let expected = f32(Isa::Portable);
+        for isa in Isa::f32() {
+            let apart = f32(isa)
+                .iter()
+                .zip(&expected)
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f32::max);
+            assert!(apart < 1e-5, "{isa}, {width}: {apart}");
+        }
+    }
+}
+
 /// `values` (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉), the pixels of a square of two by two one after another.
 fn squares(values: &[f32], (height, width): (usize, usize)) -> Vec<f32> {
     let pixels = [(0, 0), (0, 1), (1, 0), (1, 1)];
@@ -390,7 +425,7 @@ fn chains_at_half_the_resolution_are_chains_on_squares_of_pixels() {
             last.kernel.extend(more.kernel);
             last.bias.extend(more.bias);
         }
-        for size in [(1, 1), (6, 4), (7, 5), (1, 301), (23, 66)] {
+        for size in [(1, 1), (6, 4), (7, 5), (2, 256), (1, 301), (23, 66)] {
             let input = frame(channels, size, 3);
             let (given, half) = (squares(&input, size), (size.0.div_ceil(2), size.1.div_ceil(2)));
             let expected = pixels(&case.expected(&given, half), size);
