@@ -588,6 +588,18 @@ fn squares_of_pixels_in_another_place_are_refused() {
         &["before SpaceToDepth; after it is right"],
     );
     check(
+        &Model::new(6, 8).halved(),
+        |p| {
+            for (name, dims) in [("w5", vec![26, 24, 3, 3]), ("b5", vec![26])] {
+                let tensors = &mut p.graph.as_mut().unwrap().initializer;
+                let tensor = tensors.iter_mut().find(|t| t.name == name).unwrap();
+                tensor.raw_data = vec![0; 4 * dims.iter().product::<i64>() as usize];
+                tensor.dims = dims;
+            }
+        },
+        &["'pixels' (DepthToSpace)", "reads 26 channels"],
+    );
+    check(
         &halved,
         |p| node(p, "pixels").op_type = "Identity".into(),
         &["'field' is not the last layer's", "the last layer's pixels or its tanh"],

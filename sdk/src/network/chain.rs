@@ -9,8 +9,8 @@
 //!
 //! A halved chain does so at half the resolution: a square of two by two pixels is a pixel of its layers, which have
 //! four times the channels of the network's input and output, those of the upper left pixel first, then upper right,
-//! lower left, lower right. Where a side is odd, its last row or column is repeated. It sees twice
-//! as far for as many layers.
+//! lower left, lower right. Where a side is odd, its last row or column is repeated. It sees twice as far for as many
+//! layers.
 
 /// Numbers of a chain's layers: one of the two precisions, throughout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

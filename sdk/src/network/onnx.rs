@@ -596,6 +596,10 @@ impl<'a> Reader<'a> {
             _ => (Step::Convolution(self.last()), Step::Pixels),
         };
         match self.activation(node, 0)? {
+            (Step::Convolution(i), None) if !self.layers[i].outputs.is_multiple_of(4) => Err(format!(
+                "reads {} channels; four for each channel of the output are right",
+                self.layers[i].outputs
+            )),
             (step, None) if step == from => Ok(Value::Activation {
                 step: to,
                 rounding: None,
