@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 
 import torch
 
@@ -224,7 +225,9 @@ def begun(args, wanted, train):
     """A fresh network, or the one of --init, told more and grown where the flags ask for it."""
     if not args.init:
         return networks.Chain(wanted)
-    network, _ = checkpoint.load_network(args.init)
+    network, display = checkpoint.load_network(args.init)
+    if (stretch := fmean(display.stretches(train.display))) != 1:
+        network = grow.of_depths(network, stretch)
     found = network.architecture
     if (found.filters, found.head, found.halved) != (wanted.filters, wanted.head, wanted.halved):
         raise ValueError(f"{args.init}: {found}, the flags ask for {wanted}")
@@ -407,7 +410,7 @@ def run_export(args):
 
 def run_evaluate(args):
     predictors = {str(path): evaluate.predictor(path, args.device) for path in args.networks}
-    inputs = {architecture.input for _, architecture in predictors.values()} or {"rgbd"}
+    inputs = {architecture.input for _, architecture, _ in predictors.values()} or {"rgbd"}
     scenes = scenes_for(args.data, args.seeds, args.split, inputs, args.scenes)
     methods = {
         "RGB as the field": evaluate.rgb_as_field,
@@ -415,7 +418,7 @@ def run_evaluate(args):
     }
     if scenes.seeded:
         methods["the sweep"] = evaluate.seed_as_field
-    methods |= {name: predict for name, (predict, _) in predictors.items()}
+    methods |= {name: evaluate.served(predict, trained, scenes.display) for name, (predict, _, trained) in predictors.items()}
     depths = ("clean",) if args.clean_only else evaluate.depths(scenes)
     results = {
         name: {depth: evaluate.evaluate(predict, scenes, depth, progress=True) for depth in depths}

@@ -18,14 +18,14 @@ import threading
 import zipfile
 import zlib
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from .degrade import degrade_depth
-from .optics import Display
+from .optics import Display, stretched
 
 FORMAT = "phasefront-dataset-1"
 _HEADER = threading.Lock()
@@ -126,6 +126,7 @@ class Scenes:
         self.damaged = []
         self.sets = []  # what each of several joined data sets is
         self.origin = {key: manifest.table[key] for key in ("seed", "planes")} | {"like": manifest.like}
+        self.origin["volume_depth_mm"] = manifest.table["display"]["volume_depth_mm"]
         self.corrected = bool(manifest.table.get("aberration"))
         numbers = list(manifest.indices(split))[:limit]
         present = [n for n in numbers if manifest.pair(n).exists()]
@@ -146,6 +147,7 @@ class Scenes:
         if not parts:
             raise DataError(f"{manifest.folder}: no readable pair in the split '{split}'")
         self.colour, self.depth, self.target = (_gather(parts, k, device) for k in range(3))
+        self.stretches = torch.ones(len(self.numbers))  # of each scene's depths about the middle, to those of `display`
         self.seeded = seeds is not None
         self.refined = seeds.refined if seeds else 0
         if seeds:
@@ -156,20 +158,27 @@ class Scenes:
 
     @classmethod
     def joined(cls, parts):
-        """The scenes of several data sets as one; they must be for one display and of one size."""
-        first, *others = parts
-        if not others:
-            return first
-        for other in others:
-            for what in ("display", "shape", "corrected", "refined", "seeded"):
-                mine, its = getattr(first, what), getattr(other, what)
+        """The scenes of several data sets as one, for the display of the deepest volume.
+
+        They must be of one size and, but for the volume, for one display: depths of a shallower volume are stretched.
+        """
+        if len(parts) == 1:
+            return parts[0]
+        deepest = max(parts, key=lambda part: part.display.volume_depth_m)
+        for part in parts:
+            for what in ("shape", "corrected", "refined", "seeded"):
+                mine, its = getattr(deepest, what), getattr(part, what)
                 if mine != its:
                     raise DataError(f"data sets that are trained on together must be alike: {what} {mine} and {its}")
-        whole = copy.copy(first)
+            if replace(part.display, volume_depth_m=deepest.display.volume_depth_m) != deepest.display:
+                raise DataError(f"data sets that are trained on together may differ in the volume's depth, in no more of the display: {deepest.display} and {part.display}")
+            if part is not deepest:
+                part.stretches.fill_(part.display.volume_depth_m / deepest.display.volume_depth_m)
+        whole = copy.copy(deepest)
         whole.sets = [part.facts for part in parts]
         whole.numbers = [number for part in parts for number in part.numbers]
         whole.damaged = [path for part in parts for path in part.damaged]
-        tensors = [name for name, value in vars(first).items() if isinstance(value, torch.Tensor)]
+        tensors = [name for name, value in vars(whole).items() if isinstance(value, torch.Tensor)]
         for name in tensors:
             setattr(whole, name, torch.cat([vars(part).pop(name) for part in parts]))
         return whole
@@ -188,13 +197,17 @@ class Scenes:
         return facts | ({"sets": self.sets} if self.sets else {})
 
     def scene(self, i):
-        """Colour (3·L, H, W) in [0, 1], normalized depth (L, H, W) and the true field (3, H, W) of scene i."""
+        """Colour (3·L, H, W) in [0, 1], depth (L, H, W) normalized to its own set's volume and the true field (3, H, W) of scene i."""
         target = self.target[i].float()
         return self.colour[i].float() / 255, self.depth[i].float(), torch.complex(target[:3], target[3:])
 
 
+    def stretch(self, i):
+        """What depths of scene i are stretched by to those of the display."""
+        return float(self.stretches[i])
+
     def variant(self, i, v):
-        """Depth (1, H, W) and seed (6, H, W) of variant v of scene i; v = 0 is clean, the last `refined` are refined."""
+        """Depth (1, H, W), normalized to its own set's volume, and seed (6, H, W) of variant v of scene i; v = 0 is clean, the last `refined` are refined."""
         return self.variant_depth[i, v][None].float(), self.variant_seed[i, v].float()
 
 
@@ -330,6 +343,8 @@ class Sampler:
             field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
         else:
             measured = degrade_depth(colour, depth[0], rng)[None] if degraded else depth
+        # Measured in its own volume, whose depth the sensor's errors are a share of.
+        measured, depth = (stretched(each, scenes.stretch(i)) for each in (measured, depth))
         if self.place is None:
             seen = network_input(colour, measured, self.kind, field)
         else:

@@ -20,9 +20,11 @@ from .degrade import degrade_depth
 from .files import replacing
 from .metrics import psnr, ssim
 from .networks import Architecture, head_field
-from .optics import padded_shape, propagate, transfer
+from .optics import padded_shape, propagate, stretched, transfer
 
 STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
+RANGE_TOLERANCE = 0.02  # over the range that was trained, as in the core
+COLOUR_TOLERANCE = 0.05  # of a colour's own range beside their mean, as in the core
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
 
 
@@ -116,11 +118,29 @@ def onnx_predictor(path, threads=None):
 
 
 def predictor(path, device="cpu"):
-    """(predict, architecture) of a checkpoint or an .onnx."""
+    """(predict, architecture, display that it was trained for) of a checkpoint or an .onnx."""
     if Path(path).suffix == ".onnx":
-        return onnx_predictor(path)
-    network, _ = load_network(path)
-    return torch_predictor(network.to(device).eval()), network.architecture
+        from .export import read_display
+
+        return *onnx_predictor(path), read_display(path)
+    network, display = load_network(path)
+    return torch_predictor(network.to(device).eval()), network.architecture, display
+
+
+def served(predict, trained, display):
+    """`predict` of a network for the display `trained` on frames for `display`, as sessions call it: depths stretched.
+
+    Raises ValueError where it cannot serve it.
+    """
+    if trained.corrected and display != trained:
+        raise ValueError("the network corrects the optics of one display and serves no other")
+    each = display.stretches(trained)
+    stretch = float(np.mean(each))
+    if any(abs(own - stretch) > COLOUR_TOLERANCE * stretch for own in each):
+        raise ValueError(f"the network was trained for wavelengths of {trained.wavelengths_m} m, the display has {display.wavelengths_m}")
+    if stretch > 1 + RANGE_TOLERANCE:
+        raise ValueError(f"the network was trained for depths of {trained}; those of {display} need {stretch:.2f} times the range")
+    return lambda colour, depth, seed=None: predict(colour, stretched(depth, stretch), seed)
 
 
 def compare(field, truth, display, full=True):
@@ -151,14 +171,14 @@ def depths(scenes):
 
 
 def scene_as_seen(scenes, i, kind):
-    """Colour, depth of one of the kinds of `depths`, seed (None where there is none) and truth of a scene."""
+    """Colour, depth of one of the kinds of `depths` in the display's volume, seed (None where there is none) and truth of a scene."""
     colour, depth, truth = scenes.scene(i)
+    seed = None
     if scenes.seeded:
-        variant = {"clean": 0, "degraded": 1, "refined": -scenes.refined}[kind]
-        return colour, *scenes.variant(i, variant), truth
-    if kind == "degraded":
+        depth, seed = scenes.variant(i, {"clean": 0, "degraded": 1, "refined": -scenes.refined}[kind])
+    elif kind == "degraded":
         depth = torch.cat([degrade_depth(colour[:3], depth[0], degradation(scenes.numbers[i]))[None], depth[1:]])
-    return colour, depth, None, truth
+    return colour, stretched(depth, scenes.stretch(i)), seed, truth
 
 
 def evaluate(predict, scenes, depth="clean", full=True, progress=False):

@@ -156,6 +156,20 @@ def _description(model, path):
     return found
 
 
+def read_display(path):
+    """The Display that a model was trained for."""
+    return _display(read_description(path))
+
+
+def _display(found):
+    return Display(
+        pitch_m=float(found["pitch_um"]) * 1e-6,
+        wavelengths_m=tuple(float(w) * 1e-9 for w in found["wavelengths_nm"].split(",")),
+        volume_depth_m=float(found["volume_depth_mm"]) * 1e-3,
+        corrected=found.get("corrected") == "true",
+    )
+
+
 def read_onnx(path):
     """(Chain, Display) of a float32 file of this package, to go on training from."""
     model = load_model(path)
@@ -171,10 +185,4 @@ def read_onnx(path):
         network.load_state_dict({f"convs.{n[5:]}": torch.from_numpy(w.copy()) for n, w in weights.items()})
     except RuntimeError as error:
         raise ExportError(f"{path}: the weights are not those of a chain ({str(error).splitlines()[-1].strip()})") from None
-    display = Display(
-        pitch_m=float(found["pitch_um"]) * 1e-6,
-        wavelengths_m=tuple(float(w) * 1e-9 for w in found["wavelengths_nm"].split(",")),
-        volume_depth_m=float(found["volume_depth_mm"]) * 1e-3,
-        corrected=found.get("corrected") == "true",
-    )
-    return network, display
+    return network, _display(found)

@@ -10,6 +10,7 @@ weighs little, and the last layer is fitted anew to the old output by least squa
 Told more, it begins with weights of zero for what is new: hidden layers of a layered depth image, the place in the frame.
 """
 
+import copy
 from dataclasses import replace
 
 import torch
@@ -56,6 +57,20 @@ def widen(network, kind):
             conv.weight[:, : known.in_channels] = known.weight
             conv.bias.copy_(known.bias)
     return wide
+
+
+def of_depths(network, stretch):
+    """A Chain that gives for depths stretched by this factor about the middle what `network` gives for them as they are."""
+    a = network.architecture
+    places = [k for k in range(a.input_channels) if k % 4 == 3 and k < 4 * a.ldi_layers]
+    other = copy.deepcopy(network)
+    with torch.no_grad():
+        for conv in (other.convs[0], other.convs[-1]):
+            given = conv.in_channels - (a.filters if conv is other.convs[-1] else 0)
+            behind = conv.in_channels - given
+            for pixel in range(given // a.input_channels):
+                conv.weight[:, [behind + pixel * a.input_channels + k for k in places]] /= stretch
+    return other
 
 
 def _chain(old, layers):

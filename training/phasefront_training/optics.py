@@ -42,10 +42,24 @@ class Display:
         """z in metres of a normalized depth (0 nearest, 1 farthest)."""
         return self.volume_depth_m * (0.5 - depth)
 
+    def stretches(self, trained):
+        """What depths of frames for this display are stretched by for a network for the display `trained`, a colour each.
+
+        s = (λ·V/p²) / (λ·V/p²)trained, and d' = ½ + s·(d − ½): to the paraxial order a midpoint hologram without its
+        carrier depends on λ·z/p² alone.
+        """
+        depth = self.volume_depth_m / trained.volume_depth_m * (trained.pitch_m / self.pitch_m) ** 2
+        return [depth * mine / its for mine, its in zip(self.wavelengths_m, trained.wavelengths_m)]
+
     def reach_px(self, distance_m):
         """How many pixels light of the longest wavelength spreads sideways over a distance."""
         sine = min(max(self.wavelengths_m) / (2 * self.pitch_m), 0.999)
         return math.ceil(abs(distance_m) * math.tan(math.asin(sine)) / self.pitch_m)
+
+
+def stretched(depth, stretch):
+    """Normalized depths, stretched about the middle."""
+    return depth if stretch == 1 else 0.5 + stretch * (depth - 0.5)
 
 
 def fast_length(n):

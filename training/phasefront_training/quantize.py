@@ -202,9 +202,10 @@ def rounding_error(name, low, high, end, counts):
 
 
 def examples(scenes, kind):
-    """Inputs of networks of this kind on the first scenes, for calibration."""
-    for i in range(min(len(scenes), CALIBRATION_SCENES)):
-        colour, depth, seed, _ = scene_as_seen(scenes, i, "clean")
+    """Inputs of networks of this kind on scenes from all over the set, for calibration."""
+    count = min(len(scenes), CALIBRATION_SCENES)
+    for i in range(count):
+        colour, depth, seed, _ = scene_as_seen(scenes, i * len(scenes) // count, "clean")
         yield network_input(colour, depth, kind, seed)
 
 

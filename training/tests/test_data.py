@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ import torch
 from phasefront_training import data
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes, network_input, read_pair
 from phasefront_training.degrade import degrade_depth, fill_nearest
-from phasefront_training.evaluate import visible_layers
+from phasefront_training.evaluate import scene_as_seen, served, visible_layers
+from phasefront_training.metrics import psnr
 
 
 def test_reading_follows_the_contract(data_folder):
@@ -136,13 +138,61 @@ def test_data_sets_are_joined(data_folder, tmp_path):
     assert Scenes.joined([alone]) is alone and "sets" not in alone.facts
 
 
+def for_another_display(folder, to, **changes):
+    """A data set's copy whose manifest says another display."""
+    shutil.copytree(folder, to)
+    table = json.loads((to / "manifest.json").read_text())
+    table["display"] |= changes
+    (to / "manifest.json").write_text(json.dumps(table))
+    return to
+
+
+def test_depths_of_a_shallower_volume_are_stretched_to_the_deeper_one(data_folder, tmp_path):
+    shallow = for_another_display(data_folder, tmp_path / "shallow", volume_depth_mm=3.0)
+    sets = [Scenes(Manifest.read(folder), "train") for folder in (shallow, data_folder)]
+    whole = Scenes.joined(sets)
+    assert whole.display == Manifest.read(data_folder).display
+    assert [each["volume_depth_mm"] for each in whole.facts["sets"]] == [3.0, 6.0]
+    for kind in ("clean", "degraded"):
+        own, deep = (scene_as_seen(whole, i, kind)[1] for i in (0, 5))
+        assert torch.allclose(own, 0.25 + 0.5 * deep, atol=1e-3)
+    samples = Sampler(whole, 1, 64, 0)
+    spans = [float(batch.depth.max() - batch.depth.min()) for batch in map(samples.draw, range(30))]
+    assert {min(abs(span - 0.75), abs(span - 0.375)) < 1e-2 for span in spans} == {True} and max(spans) - min(spans) > 0.3
+    assert all(torch.allclose(b.input[:, 3] + 0.5, b.depth, atol=1e-3) for b in map(samples.draw, range(30)))
+
+
+def test_a_wave_depends_on_stretched_depths_alone(data_folder):
+    """What stretching rests on: the waves of half the volume in as many planes are those of depths pressed to the middle half."""
+    scenes = Scenes(Manifest.read(data_folder), "train")
+    colour, depth, _ = scenes.scene(0)
+    depth = (depth * 16).floor().clamp(max=15).add(0.5) / 16
+    half = replace(scenes.display, volume_depth_m=scenes.display.volume_depth_m / 2)
+    finer = replace(half, pitch_m=half.pitch_m / 2, volume_depth_m=half.volume_depth_m / 4)
+    (stretch,) = {*half.stretches(scenes.display)}
+    want = visible_layers(scenes.display, 32)(colour, 0.5 + stretch * (depth - 0.5))
+    assert stretch == 0.5 and psnr(visible_layers(half, 16)(colour, depth).abs(), want.abs()) > 50
+    assert finer.stretches(scenes.display) == half.stretches(scenes.display)
+    assert psnr(visible_layers(finer, 16)(colour, depth).abs(), want.abs()) > 45  # to the paraxial order
+
+
+def test_a_network_serves_displays_of_no_more_depth(data_folder):
+    display = Manifest.read(data_folder).display
+    seen = []
+    half = replace(display, volume_depth_m=display.volume_depth_m / 2)
+    served(lambda colour, depth, seed: seen.append(depth), display, half)(None, torch.tensor([0.0, 0.5, 1.0]))
+    assert torch.allclose(seen[0], torch.tensor([0.25, 0.5, 0.75]))
+    with pytest.raises(ValueError, match="2.00 times"):
+        served(None, half, display)
+    with pytest.raises(ValueError, match="wavelengths"):
+        served(None, display, replace(half, wavelengths_m=(638e-9, 520e-9, 405e-9)))
+    with pytest.raises(ValueError, match="corrects"):
+        served(None, replace(display, corrected=True), half)
+
+
 def test_data_sets_for_other_displays_are_not_joined(data_folder, tmp_path):
-    other = tmp_path / "other"
-    shutil.copytree(data_folder, other)
-    table = json.loads((other / "manifest.json").read_text())
-    table["display"]["volume_depth_mm"] = 3.0
-    (other / "manifest.json").write_text(json.dumps(table))
-    with pytest.raises(DataError, match="display"):
+    other = for_another_display(data_folder, tmp_path / "other", pitch_um=6.4)
+    with pytest.raises(DataError, match="volume's depth"):
         Scenes.joined([Scenes(Manifest.read(folder), "train") for folder in (data_folder, other)])
 
 

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from phasefront_training.grow import grow, widen
+from phasefront_training.grow import grow, of_depths, widen
 from phasefront_training.networks import Architecture, Chain, multiplies_per_pixel, shuffle, unshuffle
 
 
@@ -59,6 +59,17 @@ def test_a_network_that_is_told_more_begins_with_what_it_knew(of, to):
 def test_a_network_is_told_nothing_less_and_nothing_else(of, to):
     with pytest.raises(ValueError, match="do not begin with"):
         widen(Chain(Architecture(5, input=of)), to)
+
+
+@pytest.mark.parametrize("architecture", [Architecture(5, 4), Architecture(5, 4, halved=True), Architecture(4, 4, "ldi3"), Architecture(4, 4, "seeded")], ids=str)
+def test_a_network_for_stretched_depths_gives_the_same(architecture):
+    torch.manual_seed(2)
+    network = Chain(architecture)
+    x = torch.rand(1, architecture.input_channels, 12, 16) - 0.5
+    stretched = x.clone()
+    stretched[:, 3 : 4 * architecture.ldi_layers : 4] *= 0.5
+    assert torch.allclose(of_depths(network, 0.5)(stretched), network(x), atol=1e-6)
+    assert not torch.allclose(network(stretched), network(x), atol=1e-3)
 
 
 def test_heads_mean_what_the_contract_says():
