@@ -1,6 +1,7 @@
 """The card of a network: what it is, how it came about and what it was measured to do, as Markdown beside its .onnx."""
 
 import json
+import math
 import shlex
 from pathlib import Path
 
@@ -51,6 +52,12 @@ def like(known):
     return " like photographs" if known.get("like") == "photographs" else ""
 
 
+def depth_of(known, last):
+    """, 3 mm deep, where the volume of these scenes is not that of the display."""
+    mm = known.get("volume_depth_mm", last.display.volume_depth_m * 1e3)
+    return "" if math.isclose(mm, last.display.volume_depth_m * 1e3) else f", {mm:g} mm deep"
+
+
 def describe(name, last, figures):
     """The card's text. figures: what `evaluate --json` or `evaluate-encoding --json` wrote, a list of them."""
     lines = [f"# {name}", ""]
@@ -65,7 +72,7 @@ def describe(name, last, figures):
     if "offset_m" in last.extra:
         lines.append(f"- Offset of the modulator: {last.extra['offset_m'] * 1e3:g} mm.")
     trained_on = " and ".join(
-        f"{each['scenes']} scenes{like(each)} of {each['size']}² pixels, {each['planes']} planes, seed {each['seed']}" for each in sets(last)
+        f"{each['scenes']} scenes{like(each)} of {each['size']}² pixels, {each['planes']} planes, seed {each['seed']}{depth_of(each, last)}" for each in sets(last)
     )
     lines.append(
         f"- Trained ({last.kind}) on {trained_on}: "
@@ -76,7 +83,8 @@ def describe(name, last, figures):
     for each in figures:
         measured = each["data"]
         depth = f", {measured['depth']} depth" if "depth" in measured else ""
-        lines += [f"On {measured['scenes']} scenes{like(measured)} of the {measured['split']} split{depth}:", ""]
+        known = measured | measured["display"]
+        lines += [f"On {measured['scenes']} scenes{like(measured)} of the {measured['split']} split{depth_of(known, last)}{depth}:", ""]
         methods = {Path(method).name: found for method, found in each["results"].items()}
         if "offset_mm" in each:
             lines.append(evaluate_encoding.table(methods))
@@ -88,6 +96,7 @@ def describe(name, last, figures):
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += " --scenes-like photographs" if like(each) else ""
+        flags += " --display …" if depth_of(each, last) else ""
         line = f"The data set: `python -m phasefront_training data -o {folder} -- {flags}`"
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"

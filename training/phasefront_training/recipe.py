@@ -9,6 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 KINDS = {"objects": 1, "photographs": 22}  # of scenes, and the data sets' seeds
+DEEP = "-deep"  # what is called so is of twice the volume's depth
+DEEP_DISPLAY = """pitch_um = 8.0
+wavelengths_nm = [638.0, 520.0, 450.0]
+volume_depth_mm = 12.0
+"""
 INT8_MINUTES = 10.0
 
 
@@ -19,6 +24,7 @@ class Network:
     share: float
     flags: tuple[str, ...]
     after: str | None = None  # the network that a pair begins with
+    wide: bool = False  # whether it learns volumes of twice the depth too
 
     @property
     def seeded(self):
@@ -34,6 +40,7 @@ NETWORKS = {
     "half-8": Network(0.15, ("--layers", "8", "--filters", "48", "--halved", "--rate", "0.0007")),
     "rgbd-15": Network(0.2, ("--layers", "15")),
     "rgbd-30": Network(0.25, ("--layers", "30")),
+    "rgbd-15-wide": Network(0.2, ("--layers", "15"), wide=True),
     "seeded-6": Network(0.1, ("--layers", "6", "--input", "seeded")),
     "ddpm-8": _pair(0),
     "ddpm-8-6mm": _pair(6),
@@ -69,8 +76,12 @@ def steps(settings: Settings) -> Iterator[Step]:
     folder = settings.output
     chosen = {name: NETWORKS[name] for name in NETWORKS if name in settings.networks}
     for kind, seed in KINDS.items():
-        scenes = ("--scenes", settings.scenes, "--size", settings.size, "--planes", settings.planes, "--seed", seed, "--scenes-like", kind)
-        yield _step(f"data {kind}", "data", "--phasefront", settings.phasefront, "-o", folder / kind, "--", *scenes)
+        scenes = ("--scenes", settings.scenes, "--size", settings.size, "--seed", seed, "--scenes-like", kind)
+        made = ("data", "--phasefront", settings.phasefront, "-o")
+        yield _step(f"data {kind}", *made, folder / kind, "--", *scenes, "--planes", settings.planes)
+        if any(network.wide for network in chosen.values()):
+            deep = ("--planes", 2 * settings.planes, "--display", folder / "deep.toml")
+            yield _step(f"data {kind}{DEEP}", *made, folder / f"{kind}{DEEP}", "--", *scenes, *deep)
         if any(network.seeded for network in chosen.values()):
             more = ("--", "--refined", 3) if settings.size % 4 == 0 else ()
             given = ("--data", folder / kind, "-o", folder / f"seeds-{kind}", "--phasefront", settings.phasefront)
@@ -82,7 +93,8 @@ def steps(settings: Settings) -> Iterator[Step]:
 def _of_network(settings, name, network):
     folder = settings.output
     checkpoint = folder / name / "checkpoint.pt"
-    sets = ("--data", *(folder / kind for kind in KINDS))
+    kinds = [*KINDS, *(f"{kind}{DEEP}" for kind in KINDS if network.wide)]
+    sets = ("--data", *(folder / kind for kind in kinds))
     if network.seeded:
         sets += ("--seeds", *(folder / f"seeds-{kind}" for kind in KINDS))
     minutes = 60 * settings.hours * network.share / sum(NETWORKS[each].share for each in settings.networks)
@@ -96,7 +108,7 @@ def _of_network(settings, name, network):
         rounded = ("quantize", checkpoint, "--network", part, *sets, "-o", folder / f"{stem}-int8.onnx")
         yield _step(f"int8 {stem}", *rounded, "--minutes", min(INT8_MINUTES, minutes), *settings.training)
     figures = []
-    for kind in KINDS:
+    for kind in kinds:
         figures.append(folder / f"{name}-{kind}.json")
         judged = ("--data", folder / kind, "--json", figures[-1])
         if network.after:
@@ -132,6 +144,7 @@ def run(settings: Settings, call: Callable[[tuple[str, ...]], int] | None = None
     known = json.loads(done.read_text()) if done.exists() else {}
     todo = [step for step in steps(settings) if known.get(step.name) != list(step.arguments)]
     settings.output.mkdir(parents=True, exist_ok=True)
+    (settings.output / "deep.toml").write_text(DEEP_DISPLAY)
     for number, step in enumerate(todo, 1):
         print(f"{time.strftime('%H:%M')} {number} of {len(todo)}: {step.name}", file=sys.stderr, flush=True)
         more = ("--resume",) if step.resumed and step.resumed.exists() and step.name not in known else ()

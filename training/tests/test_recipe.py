@@ -26,6 +26,8 @@ def test_every_network_is_trained_rounded_judged_and_described(tmp_path):
         assert order == sorted(order)
     assert names.index("train rgbd-8") < names.index("train ddpm-8-6mm")
     assert "int8 ddpm-8-12mm-prefilter" in names
+    assert names.index("data objects-deep") < names.index("train rgbd-15-wide") < names.index("judge rgbd-15-wide photographs-deep")
+    assert not any("deep" in step.name for step in recipe.steps(settings(tmp_path, networks=("rgbd-15",))))
     minutes = [float(step.arguments[step.arguments.index("--minutes") + 1]) for step in recipe.steps(settings(tmp_path)) if step.name.startswith("train")]
     assert sum(minutes) == pytest.approx(120, abs=0.1)
 
@@ -76,8 +78,9 @@ def test_what_there_is_not_is_named(tmp_path, changes, words):
 def test_all_of_it_from_nothing(tmp_path):
     if not COMMAND.exists():
         pytest.skip(f"the command is not built: {COMMAND}")
-    few = settings(tmp_path, networks=("rgbd-8",), hours=0.001, training=("--f32", "--crop", "48"))
+    few = settings(tmp_path, networks=("rgbd-8", "rgbd-15-wide"), hours=0.002, training=("--f32", "--crop", "48"))
     assert recipe.run(few, lambda arguments: main(list(arguments))) == len(list(recipe.steps(few)))
     for name in ("rgbd-8.onnx", "rgbd-8-int8.onnx", "rgbd-8.md"):
         assert (tmp_path / name).stat().st_size > 0
     assert json.loads((tmp_path / "rgbd-8-photographs.json").read_text())["data"]["like"] == "photographs"
+    assert "volume 12 mm" in (card := (tmp_path / "rgbd-15-wide.md").read_text()) and ", 6 mm deep" in card
