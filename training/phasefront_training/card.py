@@ -3,11 +3,13 @@
 import json
 import math
 import shlex
+from dataclasses import replace
 from pathlib import Path
 
 from . import evaluate, evaluate_encoding
 from .files import replacing
 from .networks import multiplies_per_pixel
+from .optics import Display
 
 SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "rate", "seed", "scenes", "f32")
 
@@ -52,10 +54,16 @@ def like(known):
     return " like photographs" if known.get("like") == "photographs" else ""
 
 
+def display_of(known, last):
+    """The display that scenes were made for; old checkpoints do not say how deep its volume was."""
+    mm = known.get("volume_depth_mm")
+    return last.display if mm is None else replace(last.display, volume_depth_m=mm * 1e-3)
+
+
 def depth_of(known, last):
-    """, 3 mm deep, where the volume of these scenes is not that of the display."""
-    mm = known.get("volume_depth_mm", last.display.volume_depth_m * 1e3)
-    return "" if math.isclose(mm, last.display.volume_depth_m * 1e3) else f", {mm:g} mm deep"
+    """, 3 mm deep, where the volume of these scenes is not that of the network's display."""
+    m = display_of(known, last).volume_depth_m
+    return "" if math.isclose(m, last.display.volume_depth_m) else f", {m * 1e3:g} mm deep"
 
 
 def describe(name, last, figures):
@@ -96,7 +104,7 @@ def describe(name, last, figures):
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += " --scenes-like photographs" if like(each) else ""
-        flags += " --display …" if depth_of(each, last) else ""
+        flags += "" if replace(display_of(each, last), corrected=False) == Display() else " --display …"
         line = f"The data set: `python -m phasefront_training data -o {folder} -- {flags}`"
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
