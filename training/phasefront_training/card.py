@@ -11,6 +11,7 @@ from .files import replacing
 from .networks import multiplies_per_pixel
 from .optics import Display
 
+USUAL = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront dataset`
 SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "rate", "seed", "scenes", "f32")
 
 
@@ -104,7 +105,7 @@ def describe(name, last, figures):
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += " --scenes-like photographs" if like(each) else ""
-        flags += "" if replace(display_of(each, last), corrected=False) == Display() else " --display …"
+        flags += "" if replace(display_of(each, last), corrected=False) == USUAL else " --display …"
         line = f"The data set: `python -m phasefront_training data -o {folder} -- {flags}`"
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
