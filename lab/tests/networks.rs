@@ -130,8 +130,8 @@ fn other_displays_are_served_by_physics() {
         let other = psnr(toml);
         assert!(other > trained - 0.5, "{toml}: {other} dB for {trained} dB");
     }
-    // A network for twice the depth serves the paper's display too, and of twice its λ·V/p² it gives more than the waves
-    // of what is visible.
+    // A network for twice the depth serves the paper's display too, and one of twice its λ·V/p² better than the
+    // visible waves do.
     let wide = Arc::new(Network::from_onnx(include_bytes!("../../models/rgbd-15-wide.onnx")).unwrap());
     assert!(psnr_of(&wide, "") > trained - 0.5);
     let twice = "pitch_um = 5.66";
