@@ -1,8 +1,10 @@
 //! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
-#![allow(unsafe_code, clippy::unwrap_used)]
+#![allow(clippy::unwrap_used)]
 
+mod counting;
 mod network_models;
 
+use counting::ALLOCATIONS;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use num_complex::Complex32;
@@ -19,30 +21,8 @@ use phasefront::unstable::wave::{
     asm::{Padding, Propagator},
 };
 use phasefront::{Display, Encoding, Method, Network, Pipeline, RgbdFrame, Sweep, Target};
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: hands every call to the system's allocator unchanged; counting has no effect on it.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's contract is passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use std::sync::atomic::Ordering;
 
 fn count(mut call: impl FnMut()) -> usize {
     // The first calls may grow the pool's queues, and later ones a network's memory where more bands than before happen
