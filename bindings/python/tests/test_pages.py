@@ -1,5 +1,6 @@
 """What the pages print runs, and holds to its types."""
 
+import os
 import pathlib
 import re
 import subprocess
@@ -9,6 +10,7 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
 GUIDE = ROOT / "docs" / "python.md"
+CONVENTIONS = ROOT / "docs" / "conventions.md"
 NOTEBOOK = ROOT / "docs" / "python.ipynb"
 
 
@@ -38,6 +40,27 @@ def test_the_guides_video_is_made(tmp_path):
     frame = numpy.full((48, 64, 3), 99, numpy.uint8), numpy.ones((24, 32), numpy.float32)
     shapes = [hologram.levels.shape for hologram in scope["video"]([frame] * 2, 30.0)]
     assert shapes == [(3, 1080, 1920)] * 2
+
+
+def test_the_conventions_reconstruct_a_hologram(tmp_path, monkeypatch):
+    import numpy
+    from PIL import Image
+
+    monkeypatch.chdir(tmp_path)
+    sample = ROOT / "samples"
+    Image.open(sample / "scene_rgb.jpg").resize((320, 180)).save("rgb.png")
+    Image.open(sample / "scene_depth.png").resize((320, 180), Image.Resampling.NEAREST).save("depth.png")
+    command = pathlib.Path(os.environ["CARGO_TARGET_DIR"]) / "release" / "phasefront"
+    for offset_mm in (0, 3):
+        hologram = ["hologram", "--rgb", "rgb.png", "--depth", "depth.png", "--offset-mm", str(offset_mm), "-o", "hologram.png"]
+        for arguments in (hologram, ["refocus", "hologram.png", "--z-mm", "2.4", "-o", "by_command.png"]):
+            subprocess.run([command, *arguments], check=True)
+        (code,) = snippets(CONVENTIONS)
+        exec(code, {"__name__": "conventions"})
+        views = [numpy.asarray(Image.open(name)).astype(int) for name in ("near.png", "by_command.png")]
+        inside = [view[40:-40, 40:-40] for view in views]
+        assert inside[0].std() > 20
+        assert abs(inside[0] - inside[1]).max() <= 2
 
 
 def test_a_type_checker_follows_the_pages(tmp_path):
