@@ -167,10 +167,11 @@ pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     SessionOptions::new(target, method)
 }
 
-/// The README's code compiles.
+/// The code of the README and of the guide compiles.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
-struct Readme;
+#[doc = include_str!("../../docs/rust.md")]
+struct Pages;
 
 #[cfg(test)]
 mod tests {
