@@ -1,12 +1,12 @@
-"""A model of phones, where none was measured: the kernels' own inner loops, through llvm-mca's processors, times what
-phones.toml says of cores and clocks. Prints tables.
+"""Estimates the speed of phones that were not measured: llvm-mca counts the cycles of the kernels' inner loops, and
+phones.toml gives cores and clocks. Prints the tables of docs/phones.md.
 
     python lab/phones/model.py
 
 Needs Python 3.11, Rust with the target aarch64-unknown-linux-gnu, and llvm-mca of LLVM 19 (Debian's llvm-19).
 
-A network's time is its multiply-adds over those of the inner loop in a cycle, times what two measured machines took
-beyond that. What is no network is the measured time, times its cycles' ratio to the f32 loop's.
+A network's time is its multiply-adds divided by the inner loop's multiply-adds a second, times the factor that two
+measured machines took beyond that. Other stages scale the time of a measured machine by the ratio of f32 lanes a second.
 """
 
 import os
@@ -19,7 +19,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "phasefront/phone-model"
-#: Of a loop: the processor family, the function, the instruction that multiplies, its multiply-adds.
+#: For each loop: the processor family, the function, the multiplying instruction, its multiply-adds.
 LOOPS = {
     "dotprod": ("aarch64", r"neon_dotprod4sums", r"sdot", 16),
     "i8mm": ("aarch64", r"neon_i8mm4sums", r"usdot", 16),
@@ -28,18 +28,18 @@ LOOPS = {
     "avx2 f32": ("x86_64", r"4avx28f32_sums", r"vfmadd\w+", 8),
     "avx512 f32": ("x86_64", r"6avx5127filters", r"vfmadd\w+", 16),
 }
-#: Machines that were measured (docs/benchmarks.md): mca's processor, cores, clock, and network times of 1920×1080.
-#: The first clock is that of a chain of additions; the second follows from the share of the peak that the run states.
+#: Measured machines (docs/benchmarks.md): llvm-mca's processor, cores, clock, and network times of 1920×1080. The first
+#: clock was measured with a chain of additions; the second follows from the share of the peak that the run states.
 MEASURED = [
     ("EPYC with AVX2", "znver3", 2, 3.24, "8 layers, int8", 8, "avx2 int8", (807.5, 862.3)),
     ("EPYC with VNNI", "znver4", 2, 3.64, "8 layers, f32", 8, "avx512 f32", (757.7, 757.7)),
     ("EPYC with VNNI", "znver4", 2, 3.64, "15 layers, f32", 15, "avx512 f32", (1598.6, 1598.6)),
 ]
-#: What is no network, on the EPYC with AVX2, two cores, 1920×1080, ms: the middle of what was measured.
+#: Stages other than networks on the EPYC with AVX2, two cores, 1920×1080, ms: the middle of the measured range.
 STAGES = {"sweep": 231.6, "encode": 40.4, "published": 13.9}
 #: The same on the EPYC with VNNI.
 ALSO = {"sweep": 207.8, "published": 8.9}
-#: Bytes of a pixel that go through memory: a frame in, a field out and in again, levels out.
+#: Bytes that each pixel moves through memory: a frame in, a field out and in again, levels out.
 BYTES = 16 + 2 * 24 + 3
 FULL, APP = 1920 * 1080, 960 * 540
 
@@ -103,7 +103,7 @@ def network_macs(layers, kernels):
 
 
 def check(model):
-    """What the measured machines took beyond the model: the least and the most."""
+    """The smallest and largest ratio of measured to modelled time."""
     ratios = []
     print("| machine | network | inner loop, multiply-adds a cycle | modelled ms | measured ms | measured / modelled |")
     print("|---|---|---|---|---|---|")
@@ -119,7 +119,7 @@ def check(model):
     _, znver4, cores4, clock4, *_ = MEASURED[1]
     lanes = model.macs_a_cycle("avx2 f32", znver3) * cores3 * clock3
     share = lanes / (model.macs_a_cycle("avx512 f32", znver4) * cores4 * clock4)
-    print("\n| stage, from the first machine to the second | modelled ms | measured ms | measured / modelled |")
+    print("\n| stage | modelled ms | measured ms | measured / modelled |")
     print("|---|---|---|---|")
     for stage, measured in ALSO.items():
         ms = STAGES[stage] * share
@@ -128,7 +128,7 @@ def check(model):
 
 
 def rates(model, cores, core):
-    """Multiply-adds of int8 and of f32, 10⁹ a second, of cores together."""
+    """Multiply-adds of all cores together in int8 and f32, 10⁹ a second."""
     totals = [0.0, 0.0]
     for count, name, clock in cores:
         for i, kernels in enumerate((core[name]["kernels"], "neon f32")):
@@ -137,14 +137,14 @@ def rates(model, cores, core):
 
 
 def times(model, phone, core, beyond):
-    """Times of 1920×1080, ms, by the large cores alone and by all of them."""
+    """Times of 1920×1080, ms, with the large cores alone and with all of them."""
     unit = 2 * 3.24 * model.macs_a_cycle("avx2 f32", "znver3")
     rows = {}
     for cores in (phone["large"], phone["large"] + phone["small"]):
         int8, f32 = rates(model, cores, core)
         found = {f"{n} layers": FULL * network_macs(n, "int8") / (int8 * 1e6) * beyond for n in (8, 15, 30)}
         found |= {name: ms * unit / f32 for name, ms in STAGES.items()}
-        found["dark and one step"] = found["encode"] - found["published"]
+        found["dark threshold and one step"] = found["encode"] - found["published"]
         found["whole frame"] = found["8 layers"] + found["encode"]
         for name, ms in found.items():
             rows.setdefault(name, []).append(ms)
@@ -157,16 +157,16 @@ def main():
     low, high = check(model)
     beyond = (low + high) / 2
     print(f"\nbeyond the inner loops: {beyond:.2f}, {low:.2f} to {high:.2f}\n")
-    print("| core | llvm-mca's | why that one | int8, multiply-adds a cycle | f32 |\n|---|---|---|---|---|")
+    print("| core | llvm-mca's model | reason | int8, multiply-adds a cycle | f32 |\n|---|---|---|---|---|")
     for name, core in told["core"].items():
         int8, f32 = (model.macs_a_cycle(kernels, core["mca"]) for kernels in (core["kernels"], "neon f32"))
         print(f"| {name} | {core['mca']} | {core['why']} | {core['kernels']} {int8:.1f} | {f32:.1f} |")
-    print("\n| phone | large cores | small cores | whose figures |\n|---|---|---|---|")
+    print("\n| phone | large cores | small cores | source |\n|---|---|---|---|")
     for phone in told["phone"]:
         large, small = (", ".join(f"{n} {core} at {clock} GHz" for n, core, clock in phone[k]) for k in ("large", "small"))
         print(f"| {phone['name']} | {large} | {small} | {phone['source']} |")
     print(f"\nthrough memory: {BYTES * FULL / 1e6:.0f} MB a frame of 1920×1080")
-    columns = ["8 layers", "15 layers", "30 layers", "sweep", "dark and one step", "whole frame"]
+    columns = ["8 layers", "15 layers", "30 layers", "sweep", "dark threshold and one step", "whole frame"]
     for title, share, text in (
         ("1920×1080, ms", 1, lambda ms: f"{ms:.0f}"),
         ("960×540, frames a second", APP / FULL, lambda ms: f"{1000 / ms:.1f}" if ms > 100 else f"{1000 / ms:.0f}"),

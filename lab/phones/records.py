@@ -1,4 +1,4 @@
-"""Tables of what the sample apps' benchmark measured on phones, in the columns of docs/phones.md.
+"""Prints tables of the records that the sample apps' benchmark makes, with the columns of docs/phones.md.
 
     python lab/phones/records.py RECORD.json...
 
@@ -9,14 +9,14 @@ import json
 import sys
 from pathlib import Path
 
-#: Runs that are about one of their own stages.
+#: Runs of which the table shows one stage.
 PLAIN = ["8 layers", "15 layers", "30 layers", "plane sweep", "whole frame"]
-#: What a run's encoder takes beyond that of the network of 8 layers, which is not corrected.
-BEYOND = {"one step": "encoder with one step", "dark and one step": "whole frame"}
+#: Runs of which the table shows the encoder's time beyond that of the uncorrected run of 8 layers.
+BEYOND = {"one step": "encoder with one step", "dark threshold and one step": "whole frame"}
 
 
 def cells(runs):
-    """The row of one phone at one size, of its runs by name."""
+    """The row of one phone at one size. runs: by name."""
     row = []
     for name in PLAIN:
         of = runs[name]["stages_ms"][runs[name]["stage"]] if "stages_ms" in runs.get(name, {}) else None
@@ -29,7 +29,7 @@ def cells(runs):
 
 
 def conditions(runs):
-    """Heat and energy from the first run to the last, as far as the system told."""
+    """Temperature and energy before the first run and after the last, as far as the system reports them."""
     first, last = runs[0]["before"], runs[-1].get("behind", runs[-1]["before"])
     return ", ".join(f"{name} {value} to {last.get(name)}" for name, value in sorted(first.items()))
 
