@@ -1,11 +1,11 @@
 //! The files of the laboratory: images in, holograms out and back. LDI folders are [`crate::ldi`]'s, data
 //! sets [`crate::dataset`]'s.
-//!
-//! What is written is whole: it is written beside its place and renamed into it.
 
 use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
 use crate::npy;
+use crate::output;
+pub use crate::output::write_atomically;
 use crate::panel_file;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
@@ -15,12 +15,10 @@ use phasefront::device::Device;
 use phasefront::target::Response;
 use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufRead, BufReader, BufWriter, Cursor, Seek, Write};
+use std::io::{BufRead, BufReader, Cursor, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::sync::Arc;
 
 /// Name of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";
@@ -124,86 +122,6 @@ pub enum Hologram {
     Complex(Array3<Complex32>, HologramInfo),
 }
 
-/// Opens the file at a temporary place beside `path`, lets `write` fill it, waits until it is on the disk, and renames
-/// it to `path`.
-///
-/// # Errors
-/// Whatever goes wrong, naming `path`; what was there is left as it was.
-pub fn write_atomically(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
-) -> Result<()> {
-    let refuse = |e: std::io::Error| Error::file(path, format!("cannot be written: {e}"));
-    let folder = check_place(path)?;
-    remove_left_over(folder);
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY);
-    #[cfg(unix)]
-    {
-        // A temporary file is its owner's alone unless it is said; the umask takes from this as from any other file.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut temporary = builder.tempfile_in(folder).map_err(refuse)?;
-    // Held as long as it is written: what nobody holds was left over. A file system without locks writes all the same.
-    let _ = temporary.as_file().try_lock();
-    let mut buffer = BufWriter::new(temporary.as_file_mut());
-    write(&mut buffer).and_then(|()| buffer.flush()).map_err(refuse)?;
-    drop(buffer);
-    temporary.as_file().sync_all().map_err(refuse)?;
-    temporary.persist(path).map_err(|e| refuse(e.error))?;
-    Ok(())
-}
-
-/// The folder in which a file at `path` would lie.
-pub(crate) fn check_place(path: &Path) -> Result<&Path> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if path.is_dir() {
-        return Err(Error::file(path, "is a folder; a file's name is needed"));
-    }
-    if !folder.is_dir() {
-        return Err(Error::file(
-            path,
-            format!("cannot be written: there is no folder {}", folder.display()),
-        ));
-    }
-    Ok(folder)
-}
-
-/// How names of temporary files and folders begin.
-pub(crate) const TEMPORARY: &str = ".phasefront-";
-/// How old a temporary file must be to be thought left over: none is unlocked that long.
-const LEFT_OVER: Duration = Duration::from_secs(60);
-
-/// Removes what killed runs left over in `folder`: temporary files and folders that no process holds. Once a folder, as
-/// far as it can be done.
-pub(crate) fn remove_left_over(folder: &Path) {
-    static DONE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-    if !DONE.lock().is_ok_and(|mut done| done.insert(folder.to_owned())) {
-        return;
-    }
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return;
-    };
-    for entry in entries.flatten() {
-        let is_ours = entry.file_name().to_string_lossy().starts_with(TEMPORARY);
-        let Some(about) = entry.metadata().ok().filter(|_| is_ours) else {
-            continue;
-        };
-        let age = about.modified().ok().and_then(|then| then.elapsed().ok());
-        if age.is_some_and(|age| age >= LEFT_OVER) && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
-        {
-            let _ = match about.is_dir() {
-                true => std::fs::remove_dir_all(entry.path()),
-                false => std::fs::remove_file(entry.path()),
-            };
-        }
-    }
-}
-
 /// Most pixels of an image that is read, 8192²: over two 8K frames.
 pub const MOST_PIXELS: u64 = 1 << 26;
 
@@ -239,6 +157,7 @@ fn decode_from<R: BufRead + Seek>(
 }
 
 pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
+    output::reading(path)?;
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     decode_from(reader).map_err(|e| Error::file(path, e))
 }
@@ -336,6 +255,7 @@ fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 
 /// The bytes of a regular file: what never ends, as a device, is not begun.
 pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
+    output::reading(path)?;
     let refuse = |e: std::io::Error| Error::file(path, format!("cannot be read: {e}"));
     if !std::fs::metadata(path).map_err(refuse)?.is_file() {
         return Err(Error::file(path, "is no regular file"));
@@ -485,10 +405,38 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
 /// # Errors
 /// A file that cannot be written.
 pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &HologramInfo) -> Result<()> {
+    let beside = beside(path)?;
     write_atomically(path, |file| field.write_npy(file).map_err(std::io::Error::other))?;
-    let beside = path.with_extension("json");
     let text = serde_json::to_string_pretty(info).map_err(|e| Error::file(&beside, e))?;
     write_atomically(&beside, |file| writeln!(file, "{text}"))
+}
+
+/// Declares the two files of a complex hologram as outputs.
+///
+/// # Errors
+/// Those of [`output::file`]; a `NAME.json` that does not belong to a hologram.
+pub fn declare_complex(path: &Path) -> Result<()> {
+    output::file(path, &["npy"])?;
+    output::file(&beside(path)?, &[])
+}
+
+/// The `NAME.json` of a complex hologram; one that is there is a hologram's, as only those are replaced.
+fn beside(path: &Path) -> Result<PathBuf> {
+    let beside = path.with_extension("json");
+    if beside.is_file() {
+        // Ours has a table of 1024 entries at most.
+        let is_small = std::fs::metadata(&beside).is_ok_and(|about| about.len() < 1 << 20);
+        let is_ours = is_small
+            && (std::fs::read(&beside)).is_ok_and(|bytes| serde_json::from_slice::<HologramInfo>(&bytes).is_ok());
+        if !is_ours {
+            let npy = path.display();
+            return Err(Error::file(
+                &beside,
+                format!("is no description of a hologram, and {npy} needs its name; give another name"),
+            ));
+        }
+    }
+    Ok(beside)
 }
 
 /// Reads a hologram: a PNG of levels that carries its [`HologramInfo`], or a `.npy` with its `.json`.
@@ -500,6 +448,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
         let field = npy::read::<Complex32, Ix3>(&read_file(path)?)
             .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (C, H, W): {e}")))?;
         let beside = path.with_extension("json");
+        output::reading(&beside)?;
         let text = std::fs::read_to_string(&beside)
             .map_err(|e| Error::file(&beside, format!("is needed beside {}: {e}", path.display())))?;
         let info: HologramInfo = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
@@ -547,6 +496,7 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
 
 /// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
 fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
+    output::reading(path)?;
     let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else {
         return Ok(None);
@@ -680,8 +630,10 @@ pub fn own_devices() -> Vec<PathBuf> {
 /// # Errors
 /// A file that is missing or says what cannot be.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
-    let read =
-        |path: &Path| std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")));
+    let read = |path: &Path| {
+        output::reading(path)?;
+        std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))
+    };
     let text = read(path)?;
     let mut table: toml::Table =
         toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;

@@ -2,8 +2,7 @@
 //! (paper, Fig. 1), and the folder that holds one: `layer_0.png, depth_0.png, layer_1.png …`.
 //! How a scene becomes an LDI is in [`crate::scene`].
 
-use std::fs::{self, File};
-use std::io::BufWriter;
+use std::fs;
 use std::path::Path;
 
 use image::codecs::png::PngEncoder;
@@ -15,7 +14,8 @@ use phasefront::{Display, RgbdFrame};
 use std::borrow::Cow;
 
 use crate::error::{Error, Result};
-use crate::files::{TEMPORARY, open_image, remove_left_over};
+use crate::files::open_image;
+use crate::output::{self, Pending};
 
 /// A layered depth image: at least one layer, front first, all of one shape.
 #[derive(Debug, Clone, PartialEq)]
@@ -129,6 +129,7 @@ impl Ldi {
     /// Reads the folder `dir`. Colour PNGs are taken as RGBA of 8 bits (no alpha channel: every pixel is a hit), depth
     /// PNGs are grey of 16 or 8 bits, d = value / 65535 or value / 255.
     pub fn read(dir: &Path) -> Result<Self> {
+        output::reading(dir)?;
         let count = count_layers(dir)?;
         let mut layers = Vec::with_capacity(count);
         for index in 0..count {
@@ -142,47 +143,46 @@ impl Ldi {
     /// takes its place. In a folder that is there already, layers of an earlier LDI are replaced or removed and other
     /// files are left alone.
     pub fn write(&self, dir: &Path) -> Result<()> {
-        let exists = dir.is_dir();
-        let parent = match dir.parent() {
-            _ if exists => dir,
-            Some(parent) if !parent.as_os_str().is_empty() => parent,
-            _ => Path::new("."),
-        };
-        remove_left_over(parent);
-        let temp = temp_dir(parent).map_err(|e| Error::file(dir, format!("cannot write here: {e}")))?;
-        // Held as long as it is written, as temporary files are.
-        let held = File::open(temp.path());
-        let _ = held.as_ref().map(File::try_lock);
+        let is_new = !dir.is_dir();
+        if is_new {
+            fs::create_dir(dir).map_err(|e| Error::file(dir, format!("cannot be made: {e}")))?;
+        }
+        let written = self.write_into(dir);
+        if is_new && written.is_err() {
+            // Only where nothing is in it.
+            let _ = fs::remove_dir(dir);
+        }
+        written
+    }
+
+    fn write_into(&self, dir: &Path) -> Result<()> {
+        let mut files = Vec::with_capacity(self.layers.len());
         for (index, layer) in self.layers.iter().enumerate() {
-            write_layer(temp.path(), index, layer).map_err(|e| Error::file(dir.join(layer_name(index)), e))?;
+            files.push(write_layer(dir, index, layer)?);
         }
-        if !exists {
-            fs::rename(temp.path(), dir).map_err(|e| Error::file(dir, e))?;
-            // The folder is in its place now: nothing is left for the guard to remove.
-            let _ = temp.keep();
-            return Ok(());
-        }
-        for index in 0..self.layers.len() {
-            for name in [depth_name(index), layer_name(index)] {
-                let place = dir.join(&name);
-                fs::rename(temp.path().join(&name), &place).map_err(|e| Error::file(place, e))?;
+        // Without its first layer a folder is no LDI: what a run that is killed here leaves is refused, not misread.
+        remove_layer(dir, 0)?;
+        for index in stored_layers(dir)? {
+            if index >= self.layers.len() {
+                remove_layer(dir, index)?;
             }
         }
-        for index in stored_layers(dir)?
-            .into_iter()
-            .filter(|&index| index >= self.layers.len())
-        {
-            for place in [dir.join(layer_name(index)), dir.join(depth_name(index))] {
-                match fs::remove_file(&place) {
-                    Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-                        return Err(Error::file(place, e));
-                    }
-                    _ => {}
-                }
-            }
+        for (colour, depth) in files.into_iter().rev() {
+            depth.place()?;
+            colour.place()?;
         }
         Ok(())
     }
+}
+
+fn remove_layer(dir: &Path, index: usize) -> Result<()> {
+    for place in [dir.join(layer_name(index)), dir.join(depth_name(index))] {
+        match fs::remove_file(&place) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(place, e)),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn layer_name(index: usize) -> String {
@@ -341,33 +341,30 @@ fn read_layer(dir: &Path, index: usize) -> Result<LdiLayer> {
     Ok(from_codes((height as usize, width as usize), colour.as_raw(), &depths))
 }
 
-fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> std::result::Result<(), String> {
+/// The layer's two files, which are not in their places yet.
+fn write_layer(dir: &Path, index: usize, layer: &LdiLayer) -> Result<(Pending, Pending)> {
     let (height, width) = layer.depth.dim();
     let (rgba, depth) = to_codes(layer);
-    let encode = |name: String, bytes: &[u8], kind| -> std::result::Result<(), String> {
-        let mut file = BufWriter::new(File::create(dir.join(name)).map_err(|e| e.to_string())?);
-        let shape = |n: usize| u32::try_from(n).map_err(|_| format!("{width}x{height} pixels are too many for a PNG"));
-        let (width, height) = (shape(width)?, shape(height)?);
-        PngEncoder::new(&mut file)
-            .write_image(bytes, width, height, kind)
-            .map_err(|e| e.to_string())?;
-        file.into_inner()
-            .map_err(|e| e.to_string())?
-            .sync_all()
-            .map_err(|e| e.to_string())
+    let encode = |name: String, bytes: &[u8], kind| {
+        let path = dir.join(name);
+        let (Ok(width), Ok(height)) = (u32::try_from(width), u32::try_from(height)) else {
+            return Err(Error::file(
+                path,
+                format!("{width}x{height} pixels are too many for a PNG"),
+            ));
+        };
+        Pending::write(&path, |file| {
+            let encoder = PngEncoder::new(file);
+            encoder
+                .write_image(bytes, width, height, kind)
+                .map_err(std::io::Error::other)
+        })
     };
-    encode(layer_name(index), &rgba, ExtendedColorType::Rgba8)?;
     let depth_bytes: Vec<u8> = depth.iter().flat_map(|code| code.to_ne_bytes()).collect();
-    encode(depth_name(index), &depth_bytes, ExtendedColorType::L16)
-}
-
-/// A temporary folder with the permissions of an ordinary new one.
-fn temp_dir(parent: &Path) -> std::io::Result<tempfile::TempDir> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(TEMPORARY);
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-    builder.tempdir_in(parent)
+    Ok((
+        encode(layer_name(index), &rgba, ExtendedColorType::Rgba8)?,
+        encode(depth_name(index), &depth_bytes, ExtendedColorType::L16)?,
+    ))
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ pub mod models;
 pub mod multiplex;
 mod npy;
 pub mod occlusion;
+pub mod output;
 pub mod packed;
 pub mod panel_file;
 pub mod photo;

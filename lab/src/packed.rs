@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::{DisplayFile, Hologram, PngShape, open_image, write_png_of};
+use crate::output;
 use image::DynamicImage;
 use ndarray::Array3;
 use phasefront::device::Packing;
@@ -269,6 +270,21 @@ pub fn write(path: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
         .zip(images)
         .try_for_each(|(path, image)| image.write(path))?;
     Ok(files)
+}
+
+/// Declares the files that a hologram for `display` is written to.
+///
+/// # Errors
+/// Those of [`output::file`].
+pub fn declare(path: &Path, display: &DisplayFile) -> Result<()> {
+    output::extension(path, &["png"])?;
+    let count = match &display.device.packing {
+        Packing::Images(layout) => layout.images(display.device.display.colours()),
+        _ => 1,
+    };
+    paths(path, count)
+        .iter()
+        .try_for_each(|path| output::file(path, &["png"]))
 }
 
 /// The files of `count` images: `path` for one, one of each colour for three.

@@ -1,7 +1,7 @@
 //! Traces: when each stage of each frame began and ended, on which thread, as files that Perfetto and Chrome show.
 
 use crate::Result;
-use crate::files::{check_place, write_atomically};
+use crate::output::{self, write_atomically};
 use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -31,7 +31,7 @@ impl Write for Kept {
 /// # Errors
 /// Those of `work`, or a place that cannot be written.
 pub fn traced<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    check_place(path)?;
+    output::file(path, &["json"])?;
     let kept = Kept::default();
     let builder = ChromeLayerBuilder::new().writer(kept.clone());
     let (layer, written) = builder.include_args(true).include_locations(false).build();
