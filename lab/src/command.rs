@@ -27,14 +27,22 @@ mod video;
 mod view;
 
 use clap::{Parser, Subcommand};
+use phasefront::unstable::error::Line;
 use phasefront_lab::{Result, trace};
 use std::io::Write;
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+
+/// The rule for what outputs replace.
+const FILES: &str = "\
+Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
+folder or a special file such as a device or a pipe. A folder that a command fills must be new or empty, and what \
+`calibrate` and `video` made is kept, unless --overwrite is given. `dataset`, `seeds` and `video --resume` complete \
+what an earlier run began. All this is checked before any work.";
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]
-#[command(name = "phasefront", version, max_term_width = 100)]
+#[command(name = "phasefront", version, max_term_width = 100, after_help = FILES)]
 pub(crate) struct Phasefront {
     #[command(subcommand)]
     command: Command,
@@ -127,12 +135,21 @@ impl Command {
     }
 }
 
-/// Prints a command's result: `json` in one line, or `text`.
+/// A file's name in a line of text: without characters that control the terminal.
+fn name(path: &Path) -> String {
+    Line(&path.display().to_string()).to_string()
+}
+
+/// Prints a command's result: `json` in one line, or `text`, whose control characters other than newlines are replaced:
+/// names of files, networks and scenes may have any.
 fn print(json: bool, value: &serde_json::Value, text: impl std::fmt::Display) {
     let mut out = std::io::stdout().lock();
     let printed = match json {
         true => writeln!(out, "{value}"),
-        false => writeln!(out, "{text}"),
+        false => {
+            let control = |c: char| c.is_control() && c != '\n';
+            writeln!(out, "{}", text.to_string().replace(control, "\u{fffd}"))
+        }
     };
     match printed.and_then(|()| out.flush()) {
         Ok(()) => {}

@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::ldi::{Ldi, LdiLayer};
 use crate::npy;
+use crate::output;
 use crate::scene::Texture;
 use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
@@ -170,6 +171,7 @@ impl Manifest {
     /// No manifest, or one that is not of this format.
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join("manifest.json");
+        output::reading(&path)?;
         let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
         let manifest: Manifest = serde_json::from_str(&text).map_err(|e| Error::file(&path, e))?;
         if manifest.format != FORMAT {

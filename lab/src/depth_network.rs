@@ -6,6 +6,7 @@
 //! [`MULTIPLE`].
 
 use crate::error::{Error, Result};
+use crate::output;
 use image::imageops::{self, FilterType};
 use image::{Rgb, Rgb32FImage};
 use ndarray::{Array2, ArrayView3};
@@ -172,6 +173,7 @@ impl DepthNetwork {
     /// # Errors
     /// A file that is no such network.
     pub fn open(path: &Path, picture: (usize, usize)) -> Result<Self> {
+        output::reading(path)?;
         let refuse = |why: String| Error::file(path, why);
         if !path.is_file() {
             return Err(refuse(

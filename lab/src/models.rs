@@ -1,6 +1,7 @@
 //! The networks of `--network`: those that come along, by name, and those of files.
 
 use crate::error::{Error, Result};
+use crate::output;
 use phasefront::Network;
 use phasefront_models::NETWORKS;
 pub use phasefront_models::Precision;
@@ -28,6 +29,7 @@ pub fn network(name: &str, precision: Precision) -> Result<Arc<Network>> {
         return Ok(network);
     }
     let path = Path::new(name);
+    output::reading(path)?;
     let bytes = std::fs::read(path).map_err(|e| {
         let names: Vec<_> = NETWORKS.iter().map(|model| model.name).chain([DEEP]).collect();
         Error::file(

@@ -14,6 +14,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::{has_extension, open_image};
+use crate::output;
 use image::DynamicImage;
 use phasefront::Target;
 use phasefront::target::{Flatness, Registration};
@@ -128,6 +129,7 @@ fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
 }
 
 fn read_csv(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
+    output::reading(path)?;
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     let mut turns = Vec::new();
     let mut width = None;

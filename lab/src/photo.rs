@@ -8,6 +8,7 @@
 //! portraits have it: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
 
 use crate::error::{Error, Result};
+use crate::output;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 use image::metadata::Orientation;
@@ -71,6 +72,7 @@ impl Photo {
 /// # Errors
 /// A file that is missing or broken, or has no depth that is understood; the reason says what can be done.
 pub fn read(path: &Path) -> Result<Photo> {
+    output::reading(path)?;
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     of_bytes(&bytes).map_err(|why| Error::file(path, why))
 }

@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::output;
 use crate::pictures;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -224,6 +225,7 @@ pub fn write(path: &Path, scenes: &[Scene]) -> Result<usize> {
 /// # Errors
 /// A file that is missing or another page.
 pub fn read(path: &Path) -> Result<Vec<Scene>> {
+    output::reading(path)?;
     let page = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     let json = page
         .split_once(SCENES_FROM)

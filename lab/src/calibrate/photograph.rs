@@ -4,6 +4,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::{has_extension, write_atomically};
+use crate::output;
 use image::{DynamicImage, ImageReader};
 use std::fs::File;
 use std::io::BufReader;
@@ -36,6 +37,7 @@ impl Photograph {
     /// # Errors
     /// A file that is missing, cut short, of another kind, or over 200 megapixels.
     pub fn read(path: &Path, colour: usize) -> Result<Self> {
+        output::reading(path)?;
         if has_extension(path, "tif") || has_extension(path, "tiff") {
             return Self::read_tiff(path, colour);
         }

@@ -20,6 +20,7 @@
 use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files::{self, open_image, write_atomically};
+use crate::output;
 use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::Display;
@@ -34,6 +35,7 @@ use std::path::Path;
 /// # Errors
 /// A file that is missing or no such table.
 pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
+    output::reading(path)?;
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     PerPixel::from_bytes(&bytes).map_err(|e| Error::file(path, e))
 }
@@ -217,6 +219,7 @@ impl AberrationFile {
 /// # Errors
 /// A file that is missing, or not of this kind.
 pub fn read_entries(path: &Path) -> Result<Vec<Entry>> {
+    output::reading(path)?;
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     let parsed: AberrationToml =
         toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;

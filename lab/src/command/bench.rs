@@ -10,7 +10,7 @@ use phasefront_lab::bench::gpu::{GpuCase, GpuRow};
 use phasefront_lab::bench::{self, Case, Machine, Row};
 use phasefront_lab::models::{self, Precision};
 use phasefront_lab::plot::{self, Bar};
-use phasefront_lab::{Error, Result, files, gpu};
+use phasefront_lab::{Error, Result, gpu, output};
 use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -64,10 +64,8 @@ enum FusionName {
 
 impl Bench {
     pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
-        if let Some(path) = &self.plot
-            && !files::has_extension(path, "svg")
-        {
-            return Err(Error::file(path, "the name must end in .svg"));
+        if let Some(path) = &self.plot {
+            output::file(path, &["svg"])?;
         }
         let target = self.display.read()?.target;
         let budget = Duration::try_from_secs_f64(self.seconds)

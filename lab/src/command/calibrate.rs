@@ -1,6 +1,6 @@
 //! `phasefront calibrate`: from photographs of a display to the files that its `--display` file refers to.
 
-use super::flags::{DisplayFlags, parse_size, progress_bar};
+use super::flags::{DisplayFlags, OverwriteFlag, parse_size, progress_bar};
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
 use phasefront::Display;
@@ -11,7 +11,7 @@ use phasefront_lab::calibrate::rehearse::{self, Rehearsal};
 use phasefront_lab::calibrate::spot::{self, Search, TRIALS};
 use phasefront_lab::calibrate::table::{self, AberrationFile, Entry};
 use phasefront_lab::calibrate::{COLOURS, laser, marks, report};
-use phasefront_lab::{Error, Result, files};
+use phasefront_lab::{Error, Result, files, output};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::io::Write;
@@ -67,13 +67,13 @@ pub(crate) struct Lut {
     report: Option<PathBuf>,
     #[command(flatten)]
     display: DisplayFlags,
-    /// Write over what is there
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Lut {
     fn run(self, json: bool) -> Result<()> {
+        self.check_outputs()?;
         let display = self.display.read_of_three()?.target.display;
         let pattern = Pattern::new(display.height(), display.width())?;
         match (&self.patterns, &self.captures, &self.output) {
@@ -86,12 +86,16 @@ impl Lut {
         }
     }
 
+    fn check_outputs(&self) -> Result<()> {
+        for folder in [&self.patterns, &self.full, &self.report].into_iter().flatten() {
+            output::folder(folder, self.overwrite.holding())?;
+        }
+        (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))
+    }
+
     fn write_patterns(&self, json: bool, pattern: &Pattern, folder: &Path) -> Result<()> {
         let path = |k: usize| folder.join(format!("pattern_{k:03}.png"));
-        for k in 0..PATTERNS {
-            keep(&path(k), self.force)?;
-        }
-        make(folder)?;
+        output::make_folder(folder)?;
         let bar = progress_bar(PATTERNS as u64, "patterns");
         for k in 0..PATTERNS {
             grey(pattern.frame(k as u8), &path(k))?;
@@ -103,26 +107,14 @@ impl Lut {
             &json!({"patterns": PATTERNS, "folder": folder.display().to_string()}),
             format!(
                 "{PATTERNS} patterns in {}; photograph each in red, green and blue light",
-                folder.display()
+                super::name(folder)
             ),
         );
         Ok(())
     }
 
-    fn measure(&self, json: bool, pattern: &Pattern, captures: &Path, output: &Path) -> Result<()> {
-        keep(output, self.force)?;
-        let full = |colour: usize| {
-            let name = format!("full_{}.npy", COLOURS[colour]);
-            self.full.as_ref().map(|folder| folder.join(name))
-        };
-        for colour in 0..3 {
-            full(colour).map_or(Ok(()), |path| keep(&path, self.force))?;
-        }
-        let drawings = ["curves.svg", "residuals.svg", "maps.svg"];
-        for (folder, name) in self.report.iter().flat_map(|f| drawings.map(|name| (f, name))) {
-            keep(&folder.join(name), self.force)?;
-        }
-        let spool = match output.parent() {
+    fn measure(&self, json: bool, pattern: &Pattern, captures: &Path, path: &Path) -> Result<()> {
+        let spool = match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
@@ -167,20 +159,21 @@ impl Lut {
             }
         }
         if let Some(folder) = &self.report {
-            make(folder)?;
+            output::make_folder(folder)?;
             report::draw(&curves, folder)?;
         }
-        for curves in &curves {
-            if let Some(path) = full(curves.colour) {
-                path.parent().map_or(Ok(()), make)?;
+        if let Some(folder) = &self.full {
+            output::make_folder(folder)?;
+            for curves in &curves {
+                let path = folder.join(format!("full_{}.npy", COLOURS[curves.colour]));
                 files::write_atomically(&path, |file| lut::write_full(curves, &per_pixel, file))?;
             }
         }
-        table::write_per_pixel(output, &per_pixel)?;
+        table::write_per_pixel(path, &per_pixel)?;
         super::print(
             json,
-            &json!({"output": output.display().to_string(), "report": report}),
-            format!("{}\n{}", report.text(), output.display()),
+            &json!({"output": path.display().to_string(), "report": report}),
+            format!("{}\n{}", report.text(), super::name(path)),
         );
         Ok(())
     }
@@ -203,17 +196,13 @@ pub(crate) struct Laser {
     /// The map: `laser` of a display file
     #[arg(short, value_name = "OUT.png")]
     output: PathBuf,
-    /// Write over what is there
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Laser {
     fn run(self, json: bool) -> Result<()> {
-        keep(&self.output, self.force)?;
-        if !files::has_extension(&self.output, "png") {
-            return Err(Error::file(&self.output, "the name must end in .png"));
-        }
+        output::new_file(&self.output, &["png"], self.overwrite.is_given())?;
         let display = self.display.read_of_three()?.target.display;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
@@ -266,7 +255,7 @@ impl Laser {
             &json!({"output": self.output.display().to_string(), "least_amplitude": least, "fit_residual": left}),
             format!(
                 "{}: least amplitude {:.2}, {:.2}, {:.2} of the most in red, green, blue",
-                self.output.display(),
+                super::name(&self.output),
                 least[0],
                 least[1],
                 least[2]
@@ -301,9 +290,8 @@ pub(crate) struct Aberration {
     /// The coefficients: `aberration` of a display file
     #[arg(short, value_name = "FILE.toml")]
     output: PathBuf,
-    /// Write over coefficients that are there
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 #[derive(Clone, Copy, PartialEq, ValueEnum, Serialize, Deserialize)]
@@ -336,6 +324,8 @@ struct SearchFile {
 
 impl Aberration {
     fn run(self, json: bool) -> Result<()> {
+        // Coefficients are added to those that the file has, which the display's file may name: it is read, too.
+        output::check_file(&self.output)?;
         let state = self.folder.join("search.json");
         let file = self.display.read_of_three()?;
         let entries = match self.output.exists() {
@@ -347,10 +337,10 @@ impl Aberration {
                 let start = self
                     .entry(&entries)
                     .map_or([0.0; 5], |mut e| *e.colour_mut(self.index()));
-                if start != [0.0; 5] && !self.force {
+                if start != [0.0; 5] && !self.overwrite.is_given() {
                     return Err(Error::file(
                         &self.output,
-                        "has coefficients of this colour at this z already; --force searches on from them",
+                        "has coefficients of this colour at this z already; --overwrite searches on from them",
                     ));
                 }
                 if self.folder.join("round_0").exists() {
@@ -359,7 +349,7 @@ impl Aberration {
                         "holds a search that is done; a search needs a folder of its own",
                     ));
                 }
-                make(&self.folder)?;
+                output::make_folder(&self.folder)?;
                 SearchFile {
                     z_mm: self.z_mm,
                     colour: self.colour,
@@ -368,6 +358,7 @@ impl Aberration {
                 }
             }
             true => {
+                output::reading(&state)?;
                 let text =
                     std::fs::read_to_string(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
                 let now: SearchFile = serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
@@ -388,7 +379,7 @@ impl Aberration {
             return self.finish(json, &now, entries, &state);
         }
         let round = self.round(&now);
-        make(&round)?;
+        output::make_folder(&round)?;
         let (place, z_m) = (self.at.unwrap_or(spot::MIDDLE), self.z_mm / 1e3);
         let target = &file.target;
         for (i, trial) in now.search.trials().iter().enumerate() {
@@ -404,7 +395,7 @@ impl Aberration {
                 now.search.round + 1,
                 spot::ROUNDS,
                 TRIALS - 1,
-                round.display()
+                super::name(&round)
             ),
         );
         Ok(())
@@ -473,7 +464,11 @@ impl Aberration {
         super::print(
             json,
             &json!({"output": self.output.display().to_string(), "coefficients_rad": now.search.best}),
-            format!("{}: coefficients {:.3?} rad", self.output.display(), now.search.best),
+            format!(
+                "{}: coefficients {:.3?} rad",
+                super::name(&self.output),
+                now.search.best
+            ),
         );
         Ok(())
     }
@@ -492,21 +487,20 @@ pub(crate) struct Pack {
     /// The file for the app
     #[arg(short, value_name = "FILE")]
     output: PathBuf,
-    /// Write over what is there
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Pack {
     fn run(self, json: bool) -> Result<()> {
-        keep(&self.output, self.force)?;
+        output::new_file(&self.output, &[], self.overwrite.is_given())?;
         let file = self.display.read()?;
         let bytes = file.corrected()?.to_bytes()?;
         files::write_atomically(&self.output, |file| file.write_all(&bytes))?;
         super::print(
             json,
             &json!({"file": self.output.display().to_string(), "bytes": bytes.len()}),
-            format!("{}: {} bytes", self.output.display(), bytes.len()),
+            format!("{}: {} bytes", super::name(&self.output), bytes.len()),
         );
         Ok(())
     }
@@ -535,9 +529,8 @@ pub(crate) struct Rehearse {
     /// Folder of what comes out
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    /// Write over what is there
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Rehearse {
@@ -550,8 +543,8 @@ impl Rehearse {
             spot_z_m: self.spot_z_mm / 1e3,
             keep_captures: self.captures,
         };
-        keep(&self.output.join("outcome.json"), self.force)?;
-        make(&self.output)?;
+        output::folder(&self.output, self.overwrite.holding())?;
+        output::make_folder(&self.output)?;
         let bar = progress_bar(0, "photographs and rows");
         let outcome = rehearse::run(&rehearsal, &self.output, &|done, of| {
             bar.set_length(of as u64);
@@ -573,24 +566,12 @@ impl Rehearse {
             line("Strehl ratio of the spot", &outcome.strehl, 3),
             String::new(),
             outcome.lut.text(),
-            format!("{} photographs; {}", outcome.photographs, self.output.display()),
+            format!("{} photographs; {}", outcome.photographs, super::name(&self.output)),
         ];
         let value = serde_json::to_value(&outcome).map_err(|e| Error::file(&self.output, e))?;
         super::print(json, &value, text.join("\n"));
         Ok(())
     }
-}
-
-/// Refuses a file that is there, unless it may be written over.
-fn keep(path: &Path, force: bool) -> Result<()> {
-    match path.exists() && !force {
-        true => Err(Error::file(path, "is there already; --force writes over it")),
-        false => Ok(()),
-    }
-}
-
-fn make(folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, format!("cannot be made: {e}")))
 }
 
 /// The photograph `stem` of `folder`, a PNG or TIFF.

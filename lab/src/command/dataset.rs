@@ -3,6 +3,7 @@
 use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use phasefront_lab::dataset::{self, Look, Manifest};
+use phasefront_lab::output::{self, Holding};
 use phasefront_lab::{Error, Result, scene};
 use serde_json::json;
 use std::path::PathBuf;
@@ -64,6 +65,7 @@ fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
 
 impl Dataset {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::folder(&self.output, Holding::RunOf("manifest.json"))?;
         let file = self.display.read()?;
         let display = file.target.display;
         if display.offset_m() != 0.0 {
@@ -93,7 +95,7 @@ impl Dataset {
         super::print(
             json,
             &json!({"folder": self.output.display().to_string(), "pairs": mine, "scenes": self.scenes}),
-            format!("{}: {mine} pairs", self.output.display()),
+            format!("{}: {mine} pairs", super::name(&self.output)),
         );
         Ok(())
     }

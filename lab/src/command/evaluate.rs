@@ -1,7 +1,6 @@
 //! `phasefront evaluate`: the paper's Table 2 on a data set.
 
-use super::flags::EncoderName;
-use super::flags::progress_bar;
+use super::flags::{EncoderName, OverwriteFlag, progress_bar};
 use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
@@ -10,7 +9,7 @@ use phasefront::unstable::wave::aperture::Opening;
 use phasefront::{Display, EncoderOptions, Sweep, Target};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};
-use phasefront_lab::{Error, Result, models};
+use phasefront_lab::{Error, Result, models, output};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -102,6 +101,8 @@ pub(crate) struct Evaluate {
     /// Pictures a row
     #[arg(long, value_name = "N", default_value_t = 3, requires = "pictures")]
     worst: usize,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -129,6 +130,9 @@ enum Split {
 
 impl Evaluate {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        if let Some(folder) = &self.pictures {
+            output::folder(folder, self.overwrite.holding())?;
+        }
         let manifest = Manifest::read(&self.data)?;
         let (split, [start, end]) = match self.split {
             Split::Train => ("train", manifest.splits.train),
@@ -138,9 +142,6 @@ impl Evaluate {
         let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
         let methods = self.methods(&manifest)?;
         let shown = self.shown(&manifest.display)?;
-        if let Some(dir) = &self.pictures {
-            std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
-        }
         let bar = progress_bar(scenes.len() as u64, "scenes");
         let sample = Sample {
             scenes,
@@ -152,6 +153,7 @@ impl Evaluate {
         let scenes = sample.scenes;
         bar.finish_and_clear();
         if let Some(dir) = &self.pictures {
+            output::make_folder(dir)?;
             for (way, row) in rows.iter().enumerate() {
                 let (method, shown) = (&methods[way / shown.len()], &shown[way % shown.len()]);
                 for (rank, index) in row.worst(self.worst).into_iter().enumerate() {

@@ -8,6 +8,7 @@ use phasefront::unstable::gpu::DeviceOptions;
 use phasefront::{Display, EncoderOptions, Encoding, Network};
 use phasefront_lab::files::{self, DisplayFile};
 use phasefront_lab::models::Precision;
+use phasefront_lab::output::Holding;
 use phasefront_lab::rgbd::DepthOptions;
 use phasefront_lab::{Error, Result, gpu, models};
 use std::sync::{Arc, LazyLock};
@@ -314,6 +315,25 @@ impl BackendFlags {
             (BackendName::Cpu, None) => Ok(None),
             (BackendName::Cpu, Some(_)) => Err(Error::Input("--gpu needs --backend gpu".into())),
         }
+    }
+}
+
+/// What becomes of files that an output's place holds already.
+#[derive(Default, Args)]
+pub(crate) struct OverwriteFlag {
+    /// Replace files that an earlier run made; without it an output folder must be new or empty
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl OverwriteFlag {
+    pub(crate) fn is_given(&self) -> bool {
+        self.overwrite
+    }
+
+    /// What an output folder may hold.
+    pub(crate) fn holding(&self) -> Holding<'static> {
+        Holding::by_flag(self.overwrite)
     }
 }
 

@@ -18,7 +18,7 @@ use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
-use phasefront_lab::{Error, Result, evaluate, gpu, models, packed, sm_lbm};
+use phasefront_lab::{Error, Result, evaluate, gpu, models, output, packed, sm_lbm};
 use phasefront_models::usual_network;
 use serde::Serialize;
 use serde_json::json;
@@ -191,19 +191,14 @@ impl Made {
 
 impl Hologram {
     pub(crate) fn run(mut self, json: bool) -> Result<()> {
-        let names = [
-            (Some(&self.output), "png"),
-            (self.packed.as_ref(), "png"),
-            (self.complex.as_ref(), "npy"),
-        ];
-        for (path, extension) in names {
-            if let Some(path) = path
-                && !files::has_extension(path, extension)
-            {
-                return Err(Error::file(path, format!("the name must end in .{extension}")));
-            }
+        output::file(&self.output, &["png"])?;
+        if let Some(path) = &self.complex {
+            files::declare_complex(path)?;
         }
         let display = self.making.display()?;
+        if let Some(path) = &self.packed {
+            packed::declare(path, &display)?;
+        }
         self.making.keeps_field = self.complex.is_some() || self.judge;
         let made = self.making.make(&display, &self.making.image(&display)?)?;
         self.write(&display, &made)?;
@@ -250,7 +245,7 @@ impl Hologram {
             }),
             format!(
                 "{}: {width}×{height} by {}; {}: {}{}",
-                self.output.display(),
+                super::name(&self.output),
                 made.method,
                 made.encoder.describe(),
                 list.join(", "),

@@ -10,10 +10,10 @@ use num_complex::Complex32;
 use phasefront::EncoderOptions;
 use phasefront::unstable::depth::sharpness;
 use phasefront_lab::evaluate::{self, Figures};
-use phasefront_lab::files::{self, DisplayFile, Hologram};
+use phasefront_lab::files::{DisplayFile, Hologram};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::viewer::{self, Depth, Scene};
-use phasefront_lab::{Error, Result, models};
+use phasefront_lab::{Error, Result, models, output};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -76,8 +76,8 @@ struct Row {
 
 impl Judge {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        if let Some(path) = self.output.as_ref().filter(|path| !files::has_extension(path, "html")) {
-            return Err(Error::file(path, "the name must end in .html"));
+        if let Some(path) = &self.output {
+            output::file(path, &["html"])?;
         }
         let file = self.display.read()?;
         let display = &file.target.display;

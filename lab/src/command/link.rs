@@ -2,7 +2,7 @@
 
 use super::flags::parse_size;
 use clap::{Args, Subcommand};
-use phasefront_lab::{Error, Result, files, link, packed};
+use phasefront_lab::{Error, Result, link, output, packed};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -54,12 +54,10 @@ fn checked((width, height): (usize, usize)) -> Result<(usize, usize)> {
 
 impl Pattern {
     fn run(self, json: bool) -> Result<()> {
-        if !files::has_extension(&self.output, "png") {
-            return Err(Error::file(&self.output, "the name must end in .png"));
-        }
+        output::file(&self.output, &["png"])?;
         let (height, width) = checked(self.size)?;
         link::pattern((height, width)).write(&self.output)?;
-        let text = format!("{}: {width}×{height}", self.output.display());
+        let text = format!("{}: {width}×{height}", super::name(&self.output));
         super::print(
             json,
             &json!({ "output": self.output, "width": width, "height": height }),

@@ -1,6 +1,6 @@
 //! `phasefront multiplex`: several phase maps of one image, for modulators that are faster than the eye.
 
-use super::flags::{DisplayFlags, EncoderFlags};
+use super::flags::{DisplayFlags, EncoderFlags, OverwriteFlag};
 use super::frame::FrameFlags;
 use super::hologram::{PrecisionName, sweep_for};
 use super::method::{CoreMethod, Parts};
@@ -11,7 +11,7 @@ use phasefront::Pipeline;
 use phasefront::device::Packing;
 use phasefront_lab::files::{self, DisplayFile, HologramInfo};
 use phasefront_lab::multiplex::{Differ, Map, Multiplex};
-use phasefront_lab::{Error, Result, packed};
+use phasefront_lab::{Error, Result, output, packed};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -51,6 +51,8 @@ pub(crate) struct MultiplexCommand {
     /// Folder of the maps: phase_000.png …
     #[arg(short, value_name = "DIR")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl MultiplexCommand {
@@ -59,6 +61,12 @@ impl MultiplexCommand {
             return Err(Error::Input(
                 "give -o, --packed or --judge: where the maps go, or whether to judge them".into(),
             ));
+        }
+        if let Some(path) = &self.packed {
+            output::file(path, &["png"])?;
+        }
+        if let Some(folder) = &self.output {
+            output::folder(folder, self.overwrite.holding())?;
         }
         let file = self.display.read()?;
         let target = file.corrected()?;
@@ -121,7 +129,8 @@ impl MultiplexCommand {
         let Some(dir) = &self.output else {
             return Ok(());
         };
-        std::fs::create_dir_all(dir).map_err(|e| Error::file(dir, e))?;
+        output::make_folder(dir)?;
+        let path = |n: usize| dir.join(format!("phase_{n:03}.png"));
         for (n, map) in maps.iter().enumerate() {
             let info = HologramInfo {
                 display: display.target.display.clone(),
@@ -131,7 +140,11 @@ impl MultiplexCommand {
                 levels_turns: display.target.panel.levels_turns.clone(),
                 calibrated: display.calibrated(true),
             };
-            files::write_phase_only(&dir.join(format!("phase_{n:03}.png")), map.levels.view(), &info)?;
+            files::write_phase_only(&path(n), map.levels.view(), &info)?;
+        }
+        // With --overwrite: maps of an earlier run that had more of them do not belong to these.
+        for left in (maps.len()..).map(path).take_while(|path| path.is_file()) {
+            std::fs::remove_file(&left).map_err(|e| Error::file(left, format!("cannot be removed: {e}")))?;
         }
         Ok(())
     }

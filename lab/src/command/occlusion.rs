@@ -1,11 +1,11 @@
 //! `phasefront occlusion`: the six settings of the occlusion study, Fig. 9, pictures and figures.
 
-use super::flags::{DisplayFlags, progress_bar};
+use super::flags::{DisplayFlags, OverwriteFlag, progress_bar};
 use clap::Args;
 use ndarray::{Array3, s};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::occlusion::{self, SETTINGS, Study};
-use phasefront_lab::{Error, Result, files};
+use phasefront_lab::{Result, files, output};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -30,10 +30,13 @@ pub(crate) struct Occlusion {
     /// each view as setting_1_front.png …
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Occlusion {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::folder(&self.output, self.overwrite.holding())?;
         let display = self.display.read_of_three()?.target.display;
         let ldi = match &self.ldi {
             Some(dir) => Ldi::read(dir)?,
@@ -44,7 +47,7 @@ impl Occlusion {
             bar.set_position(done as u64);
         })?;
         bar.finish_and_clear();
-        std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, format!("cannot be made: {e}")))?;
+        output::make_folder(&self.output)?;
         if self.ldi.is_none() {
             ldi.write(&self.output.join("two_bars"))?;
         }
@@ -72,7 +75,7 @@ impl Occlusion {
                 "picture": picture, "front_z_mm": study.front_z_m * 1e3, "rear_z_mm": study.rear_z_m * 1e3,
                 "settings": settings,
             }),
-            format!("{}\n{}", table(&study), picture.display()),
+            format!("{}\n{}", table(&study), super::name(&picture)),
         );
         Ok(())
     }

@@ -4,7 +4,7 @@ use super::flags::{DisplayFlags, parse_size};
 use clap::Args;
 use phasefront::device::Packing;
 use phasefront_lab::files::{self, DisplayFile, Hologram, HologramInfo};
-use phasefront_lab::{Error, Result, packed};
+use phasefront_lab::{Error, Result, output, packed};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -26,10 +26,8 @@ pub(crate) struct Pack {
 
 impl Pack {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        if !files::has_extension(&self.output, "png") {
-            return Err(Error::file(&self.output, "the name must end in .png"));
-        }
         let display = self.display.read()?;
+        packed::declare(&self.output, &display)?;
         let images = match (&self.holograms[..], &self.colour) {
             ([hologram], None) => packed::pack(&files::read_hologram(hologram)?, &display)?,
             (_, Some(colour)) => {
@@ -46,7 +44,8 @@ impl Pack {
         let written = packed::write(&self.output, &images)?;
         let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
         let (height, width) = images[0].shape;
-        let text = format!("{}: {width}×{height}", names.join(", "));
+        let text: Vec<_> = written.iter().map(|path| super::name(path)).collect();
+        let text = format!("{}: {width}×{height}", text.join(", "));
         super::print(
             json,
             &json!({ "output": names, "width": width, "height": height }),
@@ -107,6 +106,7 @@ pub(crate) struct Unpack {
 
 impl Unpack {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::file(&self.output, &["png"])?;
         let display = self.display.read()?;
         let modulator = &display.target.display;
         let (width, height) = self.size.unwrap_or((modulator.width(), modulator.height()));
@@ -125,7 +125,7 @@ impl Unpack {
             _ => files::Levels::Words(levels),
         };
         files::write_hologram(&self.output, &levels.hologram(info))?;
-        let text = format!("{}: {width}×{height}", self.output.display());
+        let text = format!("{}: {width}×{height}", super::name(&self.output));
         super::print(
             json,
             &json!({ "output": self.output, "width": width, "height": height }),

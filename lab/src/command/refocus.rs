@@ -1,7 +1,8 @@
 //! `phasefront refocus`: what an eye focused at z would see of a hologram file.
 
+use super::flags::OverwriteFlag;
 use clap::Args;
-use phasefront_lab::{Error, Result, files, pictures};
+use phasefront_lab::{Error, Result, files, output, pictures};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -31,10 +32,13 @@ pub(crate) struct Refocus {
     /// For one z a .png, .jpg or .webp; for a stack a folder, or a .gif or .webp that moves
     #[arg(short, value_name = "OUT")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 impl Refocus {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        self.check_output()?;
         let hologram = files::read_hologram(&self.hologram)?;
         let z_mm: Vec<f64> = match (self.z_mm, self.stack) {
             (Some(z), _) => vec![z],
@@ -63,17 +67,7 @@ impl Refocus {
             pictures::write_moving(&self.output, &views)?;
             written.push(self.output.clone());
         } else {
-            if ["png", "jpg", "jpeg"]
-                .iter()
-                .any(|e| files::has_extension(&self.output, e))
-            {
-                return Err(Error::file(
-                    &self.output,
-                    "a stack is written into a folder, or moves as .gif or .webp",
-                ));
-            }
-            std::fs::create_dir_all(&self.output)
-                .map_err(|e| Error::file(&self.output, format!("cannot be made: {e}")))?;
+            output::make_folder(&self.output)?;
             for (i, (view, z)) in views.iter().zip(&z_mm).enumerate() {
                 let path = self.output.join(format!("view_{i:03}_{z:+.3}mm.png"));
                 pictures::write(&path, view)?;
@@ -81,7 +75,25 @@ impl Refocus {
             }
         }
         let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
-        super::print(json, &json!({"z_mm": z_mm, "files": names}), names.join("\n"));
+        let text: Vec<_> = written.iter().map(|path| super::name(path)).collect();
+        super::print(json, &json!({"z_mm": z_mm, "files": names}), text.join("\n"));
         Ok(())
+    }
+
+    fn check_output(&self) -> Result<()> {
+        if self.stack.is_none() {
+            return output::file(&self.output, &["png", "jpg", "jpeg", "webp"]);
+        }
+        if pictures::moves(&self.output) {
+            return output::file(&self.output, &[]);
+        }
+        let is = |extension: &&str| files::has_extension(&self.output, extension);
+        if ["png", "jpg", "jpeg"].iter().any(is) {
+            return Err(Error::file(
+                &self.output,
+                "a stack is written into a folder, or moves as .gif or .webp",
+            ));
+        }
+        output::folder(&self.output, self.overwrite.holding())
     }
 }

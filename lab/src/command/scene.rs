@@ -1,9 +1,9 @@
 //! `phasefront scene`: a random scene, or a model from a file, as a layered depth image.
 
-use super::flags::parse_size;
+use super::flags::{OverwriteFlag, parse_size};
 use clap::Args;
 use phasefront_lab::scene::shapes::Light;
-use phasefront_lab::{Result, scene};
+use phasefront_lab::{Result, output, scene};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -29,6 +29,8 @@ pub(crate) struct Scene {
     /// Folder of the layered depth image: layer_0.png, depth_0.png, layer_1.png …
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 /// What models are lit by: from the upper left, in front.
@@ -39,6 +41,7 @@ const LIGHT: Light = Light {
 
 impl Scene {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::folder(&self.output, self.overwrite.holding())?;
         let (width, height) = self.size;
         let layers = self.layers.into();
         let scene = match &self.model {
@@ -49,6 +52,7 @@ impl Scene {
             true => scene::DepthPeeler::new()?.render(&scene, height, width, layers)?,
             false => scene::render_ldi_reference(&scene, height, width, layers)?,
         };
+        output::make_folder(&self.output)?;
         ldi.write(&self.output)?;
         let hits: Vec<usize> = (ldi.layers.iter())
             .map(|layer| layer.depth.iter().filter(|d| !d.is_nan()).count())
@@ -58,7 +62,7 @@ impl Scene {
             &json!({"folder": self.output.display().to_string(), "meshes": scene.meshes.len(), "hits": hits}),
             format!(
                 "{}: {} meshes, hits a layer {hits:?}",
-                self.output.display(),
+                super::name(&self.output),
                 scene.meshes.len()
             ),
         );

@@ -4,6 +4,7 @@ use super::flags::progress_bar;
 use super::hologram::sweep_for;
 use clap::Args;
 use phasefront_lab::dataset::Manifest;
+use phasefront_lab::output::{self, Holding};
 use phasefront_lab::{Error, Result, seeds};
 use serde_json::json;
 use std::path::PathBuf;
@@ -31,6 +32,9 @@ pub(crate) struct Seeds {
 
 impl Seeds {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::reading(&self.data)?;
+        // The training package has put the depths there.
+        output::folder(&self.output, Holding::Anything)?;
         let manifest = Manifest::read(&self.data)?;
         if manifest.display.colours() != 3 {
             return Err(Error::Input(
@@ -47,7 +51,7 @@ impl Seeds {
             &json!({"folder": self.output.display().to_string(), "planes": sweep.planes, "taps": sweep.taps}),
             format!(
                 "{}: seeds by {} planes of {} taps",
-                self.output.display(),
+                super::name(&self.output),
                 sweep.planes,
                 sweep.taps
             ),

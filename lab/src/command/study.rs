@@ -1,7 +1,7 @@
 //! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
 //! video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
 
-use super::flags::{DisplayFlags, progress_bar};
+use super::flags::{DisplayFlags, OverwriteFlag, progress_bar};
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
@@ -9,7 +9,7 @@ use phasefront_lab::models::Precision;
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
 use phasefront_lab::sweep_study::{self, DisplayRow};
-use phasefront_lab::{Error, Result, files, flicker, models};
+use phasefront_lab::{Result, files, flicker, models, output};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -41,6 +41,8 @@ pub(crate) struct Study {
     /// Folder of what comes out: NAME.json, and NAME.svg of layers, planes and sweep
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
 }
 
 /// Planes of the truth in the studies of the sweep.
@@ -64,7 +66,7 @@ enum What {
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, e))?;
+        output::folder(&self.output, self.overwrite.holding())?;
         match self.what {
             What::Layers | What::Planes => {}
             What::Depth => return self.depth(json),
@@ -222,6 +224,7 @@ impl Study {
     }
 
     fn write_json(&self, name: &str, result: &serde_json::Value) -> Result<()> {
+        output::make_folder(&self.output)?;
         files::write_atomically(&self.output.join(format!("{name}.json")), |file| {
             serde_json::to_writer_pretty(&mut *file, result)?;
             std::io::Write::write_all(file, b"\n")

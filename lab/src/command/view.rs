@@ -9,7 +9,7 @@ use ndarray::Array2;
 use phasefront::Display;
 use phasefront_lab::files::{self, DisplayFile, Hologram, HologramInfo};
 use phasefront_lab::viewer::{self, Depth, Phase, Scene};
-use phasefront_lab::{Error, Result};
+use phasefront_lab::{Error, Result, output};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -63,8 +63,9 @@ struct Parts {
 
 impl View {
     pub(crate) fn run(mut self, json: bool) -> Result<()> {
-        if !files::has_extension(&self.output, "html") {
-            return Err(Error::file(&self.output, "the name must end in .html"));
+        output::file(&self.output, &["html"])?;
+        for path in &self.inputs {
+            output::reading(path)?;
         }
         let budget = self.max_mb * 1e6 / self.inputs.len().max(1) as f64;
         if !(budget.is_finite() && budget > BESIDE_VIEWS as f64) {
@@ -93,7 +94,11 @@ impl View {
         super::print(
             json,
             &json!({"output": self.output.display().to_string(), "scenes": scenes.len(), "views": views, "bytes": bytes}),
-            format!("{}: {views} views, {:.1} MB", self.output.display(), bytes as f64 / 1e6),
+            format!(
+                "{}: {views} views, {:.1} MB",
+                super::name(&self.output),
+                bytes as f64 / 1e6
+            ),
         );
         Ok(())
     }

@@ -7,6 +7,7 @@ use image::DynamicImage;
 
 use super::model::MAX_MODEL_BYTES;
 use crate::files;
+use crate::output;
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -50,6 +51,7 @@ impl Beside {
         if !about.is_file() {
             return Err(format!("{name} is no regular file"));
         }
+        output::reading(&path).map_err(|e| e.to_string())?;
         self.left = (self.left.checked_sub(about.len()))
             .ok_or_else(|| format!("with {name} it names files of over {MAX_MODEL_BYTES} bytes in all"))?;
         std::fs::read(&path).map(Some).map_err(|e| format!("{name}: {e}"))

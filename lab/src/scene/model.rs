@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::shapes::Light;
 use super::{Mesh, Scene, Texture, gltf_file, obj_file};
 use crate::error::{Error, Result};
+use crate::output;
 
 /// Most triangles that a model file may hold.
 pub const MAX_MODEL_TRIANGLES: usize = 10_000_000;
@@ -46,6 +47,7 @@ pub(super) struct Part {
 /// The error names the file: absent, not such a model, without triangles, not finite, without height and width,
 /// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
+    output::reading(path)?;
     let fail = |reason: String| Error::file(path, reason);
     let about = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?;
     if !about.is_file() {
