@@ -71,7 +71,7 @@ fn a_rehearsal_leaves_all_that_a_calibrated_display_needs() {
         assert!(folder.path("out").join(name).is_file(), "{name}");
     }
     // Nothing is written over.
-    assert!(folder.fails(&rehearse, 1).contains("--force"));
+    assert!(folder.fails(&rehearse, 1).contains("--overwrite"));
 
     the_same_by_hand(&folder);
     bad_captures_are_named(&folder);
@@ -93,7 +93,7 @@ fn the_same_by_hand(folder: &Folder) {
     let full: ndarray::Array3<u8> = ndarray_npy::read_npy(folder.path("full/full_green.npy")).unwrap();
     assert_eq!(full.dim(), (64, 144, 256));
     assert!(full[(32, 72, 255)] > 150 && full[(32, 72, 0)] == 0);
-    assert!(folder.fails(&LUT, 1).contains("--force"));
+    assert!(folder.fails(&LUT, 1).contains("--overwrite"));
     folder.succeeds(&[
         "calibrate",
         "laser",
@@ -118,7 +118,7 @@ fn bad_captures_are_named(folder: &Folder) {
     )
     .unwrap();
     fs::write(captures.join("blue/capture_001.png"), b"no picture").unwrap();
-    let forced: Vec<_> = LUT.iter().copied().chain(["--force"]).collect();
+    let forced: Vec<_> = LUT.iter().copied().chain(["--overwrite"]).collect();
     let said = folder.fails(&forced, 1);
     for words in [
         "green/capture_007: is missing",
@@ -224,7 +224,7 @@ fn patterns_are_written_once() {
     assert_eq!(pattern.dimensions(), (144, 64));
     assert_eq!((pattern.get_pixel(80, 40)[0], pattern.get_pixel(81, 40)[0]), (200, 0));
     assert_eq!(fs::read_dir(folder.path("patterns")).unwrap().count(), 256);
-    assert!(folder.fails(&write, 1).contains("--force"));
+    assert!(folder.fails(&write, 1).contains("--overwrite"));
     folder.fails(&["calibrate", "lut"], 2);
     folder.fails(&["calibrate", "lut", "--captures", "x"], 2);
     fs::write(folder.path("small.toml"), "width = 64\nheight = 64").unwrap();
@@ -286,5 +286,5 @@ fn an_aberration_is_searched_round_by_round() {
         spot::strehl(&left)
     );
     assert_eq!(entries[0].red, [0.0; 5]);
-    assert!(folder.fails(&search, 1).contains("--force"));
+    assert!(folder.fails(&search, 1).contains("--overwrite"));
 }

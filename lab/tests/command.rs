@@ -206,8 +206,8 @@ fn pictures_are_what_their_names_say() {
     let view = ["refocus", "h.png", "--z-mm", "0", "-o"];
     let stack = ["refocus", "h.png", "--stack", "3", "-o"];
     for (call, name, word) in [
-        (&view, "v.gif", ".png, .jpg or .webp"),
-        (&view, "v.tif", ".png, .jpg or .webp"),
+        (&view, "v.gif", ".png, .jpg, .jpeg or .webp"),
+        (&view, "v.tif", ".png, .jpg, .jpeg or .webp"),
         (&stack, "v2.png", "a folder"),
         (&stack, "v2.jpg", ".gif or .webp"),
     ] {
@@ -488,25 +488,6 @@ fn it_lives_with_the_system_around_it() {
 }
 
 #[test]
-fn what_a_killed_run_left_is_removed_and_what_is_being_written_is_not() {
-    let folder = Folder::new().with_frame();
-    let old = |name: &str| {
-        let file = File::create(folder.path(name)).unwrap();
-        let then = std::time::SystemTime::now() - std::time::Duration::from_secs(3600);
-        file.set_modified(then).unwrap();
-        file
-    };
-    drop(old(".phasefront-left"));
-    drop(old(".other-left"));
-    let held = old(".phasefront-held");
-    held.lock().unwrap();
-    File::create(folder.path(".phasefront-new")).unwrap();
-    folder.succeeds(&with(&["-o", "out.png"]));
-    let there = [".phasefront-left", ".other-left", ".phasefront-held", ".phasefront-new"];
-    assert_eq!(there.map(|name| folder.path(name).exists()), [false, true, true, true]);
-}
-
-#[test]
 fn depth_that_means_nothing_is_named() {
     let folder = Folder::new().with_frame();
     let mut depth = Array2::from_elem((32, 48), 0.5f32);
@@ -713,7 +694,7 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
             assert_eq!(files::read_rgb(&view).unwrap().dim(), (3, 40, 48));
         }
     }
-    let text = folder.succeeds(&study);
+    let text = folder.succeeds(&[&study[..], &["--overwrite"]].concat());
     assert!(
         text.contains("waves (computation)") && text.contains("study/comparison.png"),
         "{text}"
@@ -1009,8 +990,8 @@ fn a_calibrated_display_is_packed_for_an_app() {
         phasefront::target::Response::lut(lut.try_into().unwrap())
     );
     assert_eq!(packed.correction.unwrap().coefficients()[1][1], 0.5);
-    folder.refuses(&[&pack[..], &["display.toml"]].concat(), 1, &["--force"]);
-    let deep = ["--force", "deep.toml"];
+    folder.refuses(&[&pack[..], &["display.toml"]].concat(), 1, &["--overwrite"]);
+    let deep = ["--overwrite", "deep.toml"];
     let deep = [&pack[..4], &deep[..1], &pack[4..], &deep[1..]].concat();
     folder.refuses(&deep, 1, &["changes over depth"]);
 }
