@@ -4,8 +4,8 @@
 use crate::calibrate::table::{self, AberrationFile};
 use crate::error::{Error, Result};
 use crate::npy;
-use crate::output;
 pub use crate::output::write_atomically;
+use crate::output::{self, Pending};
 use crate::panel_file;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
 use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
@@ -343,12 +343,17 @@ pub(crate) fn png_color(colours: usize) -> png::ColorType {
 }
 
 /// Writes a PNG of rows of `pixels`, words big-endian, that carries `info`.
-pub(crate) fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<()> {
+fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<()> {
+    pending_png(path, shape, pixels, info)?.place()
+}
+
+/// As [`write_png_of`], not in its place yet.
+pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<Pending> {
     let text = info
         .map(serde_json::to_string)
         .transpose()
         .map_err(|e| Error::file(path, e))?;
-    write_atomically(path, |file| {
+    Pending::write(path, |file| {
         let mut encoder = png::Encoder::new(file, shape.width as u32, shape.height as u32);
         encoder.set_color(shape.color);
         encoder.set_depth(shape.depth);
@@ -406,9 +411,11 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
 /// A file that cannot be written.
 pub fn write_complex(path: &Path, field: ArrayView3<'_, Complex32>, info: &HologramInfo) -> Result<()> {
     let beside = beside(path)?;
-    write_atomically(path, |file| field.write_npy(file).map_err(std::io::Error::other))?;
     let text = serde_json::to_string_pretty(info).map_err(|e| Error::file(&beside, e))?;
-    write_atomically(&beside, |file| writeln!(file, "{text}"))
+    let field = Pending::write(path, |file| field.write_npy(file).map_err(std::io::Error::other))?;
+    let info = Pending::write(&beside, |file| writeln!(file, "{text}"))?;
+    field.place()?;
+    info.place()
 }
 
 /// Declares the two files of a complex hologram as outputs.

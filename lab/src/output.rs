@@ -6,7 +6,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::has_extension;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, Metadata};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -336,21 +336,21 @@ impl Place {
 #[derive(Default)]
 struct Places {
     outputs: Vec<Place>,
-    inputs: BTreeSet<Identity>,
+    inputs: BTreeMap<Identity, PathBuf>,
 }
 
 fn places() -> std::sync::MutexGuard<'static, Places> {
     static PLACES: Mutex<Places> = Mutex::new(Places {
         outputs: Vec::new(),
-        inputs: BTreeSet::new(),
+        inputs: BTreeMap::new(),
     });
     PLACES.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Places {
     fn add_output(&mut self, place: Place) -> Result<()> {
-        if place.identity.as_ref().is_some_and(|id| self.inputs.contains(id)) {
-            return Err(both(&place.path));
+        if let Some(input) = place.identity.as_ref().and_then(|identity| self.inputs.get(identity)) {
+            return Err(both(&place.path, input));
         }
         // Several outputs may share a folder.
         let other = self.outputs.iter().find(|other| other.is_same(&place));
@@ -371,22 +371,21 @@ impl Places {
         let Some(identity) = identity(path) else {
             return Ok(());
         };
-        if self
-            .outputs
-            .iter()
-            .any(|place| place.identity.as_ref() == Some(&identity))
-        {
-            return Err(both(path));
+        if let Some(place) = (self.outputs.iter()).find(|place| place.identity.as_ref() == Some(&identity)) {
+            return Err(both(&place.path, path));
         }
-        self.inputs.insert(identity);
+        self.inputs.entry(identity).or_insert_with(|| path.to_owned());
         Ok(())
     }
 }
 
-fn both(path: &Path) -> Error {
+fn both(output: &Path, input: &Path) -> Error {
     Error::file(
-        path,
-        "is an input and an output; an input is never replaced, give the output another name",
+        output,
+        format!(
+            "is the input {}, which is never replaced; give the output another name",
+            input.display()
+        ),
     )
 }
 

@@ -4,8 +4,8 @@
 //! `NAME-red.png`, `NAME-green.png` and `NAME-blue.png`.
 
 use crate::error::{Error, Result};
-use crate::files::{DisplayFile, Hologram, PngShape, open_image, write_png_of};
-use crate::output;
+use crate::files::{DisplayFile, Hologram, PngShape, open_image, pending_png};
+use crate::output::{self, Pending};
 use image::DynamicImage;
 use ndarray::Array3;
 use phasefront::device::Packing;
@@ -56,6 +56,10 @@ impl Image {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
+        self.pending(path)?.place()
+    }
+
+    fn pending(&self, path: &Path) -> Result<Pending> {
         let (color, depth) = match self.kind {
             Kind::Rgb => (png::ColorType::Rgb, png::BitDepth::Eight),
             Kind::Grey => (png::ColorType::Grayscale, png::BitDepth::Eight),
@@ -67,7 +71,7 @@ impl Image {
             color,
             depth,
         };
-        write_png_of(path, shape, &self.bytes, None)
+        pending_png(path, shape, &self.bytes, None)
     }
 
     /// Reads a PNG or BMP.
@@ -265,10 +269,12 @@ pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) ->
 /// A file that cannot be written.
 pub fn write(path: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
     let files = paths(path, images.len());
-    files
-        .iter()
-        .zip(images)
-        .try_for_each(|(path, image)| image.write(path))?;
+    let pending = files.iter().zip(images).map(|(path, image)| image.pending(path));
+    // None takes its place before all are on the disk.
+    pending
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .try_for_each(Pending::place)?;
     Ok(files)
 }
 

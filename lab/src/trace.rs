@@ -26,7 +26,7 @@ impl Write for Kept {
 
 /// Does `work`, and writes to `path` the trace of its stages in Chrome's format: about 3 kB a frame, which stay in
 /// memory till the end. Spans are those of the core; each has its name, its thread and microseconds since the start.
-/// The trace of work that fails is written too.
+/// Work that fails leaves no trace.
 ///
 /// # Errors
 /// Those of `work`, or a place that cannot be written.
@@ -38,9 +38,9 @@ pub fn traced<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
     let layer = layer.with_filter(filter_fn(|span| span.target() == "phasefront"));
     // Of all threads: stages run on those of sessions and pools. One process traces once.
     let _ = tracing::subscriber::set_global_default(tracing_subscriber::registry().with(layer));
-    let result = work();
+    let result = work()?;
     drop(written);
     let trace = std::mem::take(&mut *kept.0.lock().unwrap_or_else(PoisonError::into_inner));
     write_atomically(path, |out| out.write_all(&trace))?;
-    result
+    Ok(result)
 }

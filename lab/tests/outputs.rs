@@ -159,17 +159,6 @@ fn an_input_is_never_an_output() {
         &["refocus", "h.png", "--z-mm", "0", "-o", "h.png"],
         &["refocus", "h.npy", "--z-mm", "0", "-o", "v.png", "--trace", "h.json"],
         &["view", "page.html", "h.png", "-o", "page.html"],
-        &[
-            "judge",
-            "--rgb",
-            "rgb.png",
-            "--depth",
-            "depth.png",
-            "-o",
-            "new.html",
-            "--trace",
-            "new.html",
-        ],
         &["pack", "h.png", "-o", "h.png"],
         &["unpack", "frame.png", "--size", "48x32", "-o", "frame.png"],
         &[
@@ -192,13 +181,8 @@ fn an_input_is_never_an_output() {
         ],
         &["occlusion", "--ldi", "ldi", "--planes", "8", "--overwrite", "-o", "ldi"],
     ];
-    for call in &calls[..calls.len()] {
-        let word = if call[0] == "judge" {
-            ".json"
-        } else {
-            "is an input and an output"
-        };
-        refuses(&folder, call, &[word]);
+    for call in calls {
+        refuses(&folder, call, &["is the input "]);
     }
 }
 
@@ -210,7 +194,7 @@ fn a_link_stays_and_the_file_that_it_points_to_is_replaced() {
     refuses(
         &folder,
         &with(&SMALL, &["-o", "to_input.png"]),
-        &["to_input.png", "is an input and an output"],
+        &["to_input.png", "is the input "],
     );
     std::os::unix::fs::symlink("nowhere.png", folder.path("to_nothing.png")).unwrap();
     refuses(
@@ -325,7 +309,6 @@ fn outputs_are_checked_before_any_work() {
             "there is no folder missing",
         ),
         (&with(&frame, &["h.png", "--complex", "h.png"]), ".npy"),
-        (&with(&frame, &[""]), "no name of a file"),
         (&["refocus", "none.png", "--z-mm", "0", "-o", "v.tif"], ".webp"),
         (
             &["refocus", "none.png", "--z-mm", "0", "-o", "missing/v.png"],
@@ -524,8 +507,8 @@ fn names_that_begin_with_a_dash_or_hold_control_characters_are_names() {
     );
     let said = folder.succeeds(&["refocus", name, "--z-mm", "0", "-o", "v\n\u{1b}.png"]);
     assert_eq!(said, "v\u{fffd}\u{fffd}.png\n");
-    let said = folder.succeeds(&["pack", name, "-o", name]);
-    assert!(said.starts_with(shown), "{said:?}");
+    let said = folder.succeeds(&["pack", name, "-o", "f\u{1b}.png"]);
+    assert!(said.starts_with("f\u{fffd}.png: "), "{said:?}");
 }
 
 #[test]

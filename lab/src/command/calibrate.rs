@@ -11,7 +11,8 @@ use phasefront_lab::calibrate::rehearse::{self, Rehearsal};
 use phasefront_lab::calibrate::spot::{self, Search, TRIALS};
 use phasefront_lab::calibrate::table::{self, AberrationFile, Entry};
 use phasefront_lab::calibrate::{COLOURS, laser, marks, report};
-use phasefront_lab::{Error, Result, files, output};
+use phasefront_lab::output::{self, Holding};
+use phasefront_lab::{Error, Result, files};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use std::io::Write;
@@ -343,12 +344,8 @@ impl Aberration {
                         "has coefficients of this colour at this z already; --overwrite searches on from them",
                     ));
                 }
-                if self.folder.join("round_0").exists() {
-                    return Err(Error::file(
-                        &self.folder,
-                        "holds a search that is done; a search needs a folder of its own",
-                    ));
-                }
+                // Photographs of another search would be taken for this one's.
+                output::folder(&self.folder, Holding::RunOf("search.json"))?;
                 output::make_folder(&self.folder)?;
                 SearchFile {
                     z_mm: self.z_mm,
