@@ -3,6 +3,7 @@
 mod command;
 
 use clap::Parser;
+use phasefront::unstable::error::Line;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -12,7 +13,10 @@ fn main() -> ExitCode {
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
         .parse_default_env()
-        .format(|out, record| writeln!(out, "{}: {}", record.level().as_str().to_lowercase(), record.args()))
+        .format(|out, record| {
+            let level = record.level().as_str().to_lowercase();
+            writeln!(out, "{level}: {}", Line(&record.args().to_string()))
+        })
         .init();
     match command.run() {
         Ok(()) => ExitCode::SUCCESS,

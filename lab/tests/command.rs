@@ -694,7 +694,7 @@ fn the_occlusion_study_writes_its_pictures_and_figures() {
             assert_eq!(files::read_rgb(&view).unwrap().dim(), (3, 40, 48));
         }
     }
-    let text = folder.succeeds(&[&study[..], &["--overwrite"]].concat());
+    let text = folder.succeeds(&study);
     assert!(
         text.contains("waves (computation)") && text.contains("study/comparison.png"),
         "{text}"

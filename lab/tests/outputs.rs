@@ -179,7 +179,7 @@ fn an_input_is_never_an_output() {
             "-o",
             "lut.toml",
         ],
-        &["occlusion", "--ldi", "ldi", "--planes", "8", "--overwrite", "-o", "ldi"],
+        &["occlusion", "--ldi", "ldi", "--planes", "8", "-o", "ldi"],
     ];
     for call in calls {
         refuses(&folder, call, &["is the input "]);
@@ -347,14 +347,14 @@ fn outputs_are_checked_before_any_work() {
             &["bench", "--network", "none.onnx", "--plot", "missing/b.svg"],
             "there is no folder missing",
         ),
-        (&["occlusion", "--ldi", "none", "-o", "full"], "--overwrite"),
+        (&["occlusion", "--ldi", "none", "-o", "full/mine.txt"], "is a file"),
         (
             &["evaluate", "none", "--method", "rgb", "--pictures", "full"],
             "--overwrite",
         ),
         (
-            &["study", "layers", "--display", "none.toml", "-o", "full"],
-            "--overwrite",
+            &["study", "layers", "--display", "none.toml", "-o", "full/mine.txt"],
+            "is a file",
         ),
         (
             &["multiplex", "--rgb", "none.png", "--depth", "none.png", "-o", "full"],

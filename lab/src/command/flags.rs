@@ -321,7 +321,7 @@ impl BackendFlags {
 /// What becomes of files that an output's place holds already.
 #[derive(Default, Args)]
 pub(crate) struct OverwriteFlag {
-    /// Replace files that an earlier run made; without it an output folder must be new or empty
+    /// Replace what an earlier run made; without it an output folder must be new or empty, a calibration's file absent
     #[arg(long)]
     overwrite: bool,
 }

@@ -1,11 +1,12 @@
 //! `phasefront occlusion`: the six settings of the occlusion study, Fig. 9, pictures and figures.
 
-use super::flags::{DisplayFlags, OverwriteFlag, progress_bar};
+use super::flags::{DisplayFlags, progress_bar};
 use clap::Args;
 use ndarray::{Array3, s};
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::occlusion::{self, SETTINGS, Study};
-use phasefront_lab::{Result, files, output};
+use phasefront_lab::output::{self, Holding};
+use phasefront_lab::{Result, files};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -30,13 +31,11 @@ pub(crate) struct Occlusion {
     /// each view as setting_1_front.png …
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    #[command(flatten)]
-    overwrite: OverwriteFlag,
 }
 
 impl Occlusion {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        output::folder(&self.output, self.overwrite.holding())?;
+        output::folder(&self.output, Holding::Anything)?;
         let display = self.display.read_of_three()?.target.display;
         let ldi = match &self.ldi {
             Some(dir) => Ldi::read(dir)?,

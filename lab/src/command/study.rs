@@ -1,15 +1,16 @@
 //! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
 //! video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
 
-use super::flags::{DisplayFlags, OverwriteFlag, progress_bar};
+use super::flags::{DisplayFlags, progress_bar};
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
 use phasefront_lab::models::Precision;
+use phasefront_lab::output::{self, Holding};
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
 use phasefront_lab::sweep_study::{self, DisplayRow};
-use phasefront_lab::{Result, files, flicker, models, output};
+use phasefront_lab::{Result, files, flicker, models};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -41,8 +42,6 @@ pub(crate) struct Study {
     /// Folder of what comes out: NAME.json, and NAME.svg of layers, planes and sweep
     #[arg(short, value_name = "DIR")]
     output: PathBuf,
-    #[command(flatten)]
-    overwrite: OverwriteFlag,
 }
 
 /// Planes of the truth in the studies of the sweep.
@@ -66,7 +65,7 @@ enum What {
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
-        output::folder(&self.output, self.overwrite.holding())?;
+        output::folder(&self.output, Holding::Anything)?;
         match self.what {
             What::Layers | What::Planes => {}
             What::Depth => return self.depth(json),
