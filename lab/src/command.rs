@@ -36,9 +36,9 @@ use std::path::{Path, PathBuf};
 /// The rule for what outputs replace.
 const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
-folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new or empty, and what \
-`calibrate` and `video` made is kept, unless --overwrite is given. `dataset`, `seeds` and `video --resume` complete \
-what an earlier run began. All this is checked before any work.";
+folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
+or empty, and what `calibrate` and `video` made is kept, unless --overwrite is given. `dataset`, `seeds` and \
+`video --resume` complete what an earlier run began. All this is checked before any work.";
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]
