@@ -6,7 +6,7 @@ phones.toml gives cores and clocks. Prints the tables of docs/phones.md.
 Needs Python 3.11, Rust with the target aarch64-unknown-linux-gnu, and llvm-mca of LLVM 19 (Debian's llvm-19).
 
 A network's time is its multiply-adds divided by the inner loop's multiply-adds a second, times the factor that two
-measured machines took beyond that. Other stages scale the time of a measured machine by the ratio of f32 lanes a second.
+measured machines took beyond that. Other stages scale a measured time by the ratio of f32 lanes a second.
 """
 
 import os
