@@ -1,28 +1,28 @@
-# What saves typing. `just` lists them; https://just.systems
+# Shortcuts. `just` lists them; see https://just.systems
 
 export CARGO_TARGET_DIR := env("CARGO_TARGET_DIR", cache_directory() / "phasefront/target")
 
 _default:
     @just --list
 
-# All tests, or those of Rust whose names hold FILTER
+# Run all tests, or the Rust tests whose names contain FILTER
 test FILTER="":
     {{ if FILTER == "" { "tests/run" } else { "cargo test --release --workspace " + quote(FILTER) } }}
 
-# The main job on the sample, into out/
+# Make the sample's hologram and views in out/
 sample:
     samples/run
 
-# How fast a frame is here, stage by stage
+# Time each stage of a frame on this machine
 bench *FLAGS:
     cargo run --release -- bench {{ FLAGS }}
 
-# Write the conformance suite's levels and the generated Swift anew
+# Regenerate the conformance suite's levels and the Swift and Python bindings
 bless:
     PHASEFRONT_BLESS=1 cargo test --release --workspace --test conformance
     cargo build --release --workspace
     bindings/generate "$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
 
-# The documentation of all crates
+# Build and open the documentation of all crates
 docs:
     cargo doc --release --workspace --no-deps --open
