@@ -1,17 +1,20 @@
 //! Sequences of colour and depth files, as people and data sets lay them in folders.
 
 use crate::error::{Error, Result};
+use crate::files;
 use crate::video;
 use phasefront::unstable::depth::DepthUnit;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Seconds that a depth image may lie from its colour image where both have times, as TUM's own tool pairs them.
 const TUM_APART_S: f64 = 0.02;
 /// Units in a metre of the TUM RGB-D benchmark's depth.
 const TUM_UNITS_PER_M: f64 = 5000.0;
-/// Names of Redwood's folders of colour.
-const REDWOOD_COLOUR: [&str; 3] = ["rgb", "color", "image"];
+/// Names of folders of colour beside a folder `depth`.
+const COLOUR_FOLDERS: [&str; 3] = ["rgb", "color", "image"];
+/// Endings of the files of colour and depth. Others may lie beside them, as notes do.
+const IMAGES: [&str; 9] = ["png", "jpg", "jpeg", "bmp", "webp", "tif", "tiff", "exr", "npy"];
 
 /// Frames in their order.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,8 +25,8 @@ pub struct Sequence {
     pub unit: Option<DepthUnit>,
 }
 
-/// The frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), one of Redwood (folders `rgb`
-/// and `depth`), or numbered files ([`video::frames_of_folder`]).
+/// The frames of `dir`: a sequence of the TUM RGB-D benchmark (`rgb.txt`, `depth.txt`), folders `rgb` and `depth` with
+/// the numbers of a scan of Redwood or with equal names, or numbered files ([`video::frames_of_folder`]).
 ///
 /// # Errors
 /// A folder that is none of these.
@@ -31,14 +34,14 @@ pub fn of_folder(dir: &Path) -> Result<Sequence> {
     if dir.join("rgb.txt").is_file() && dir.join("depth.txt").is_file() {
         return tum(dir);
     }
-    let colour = REDWOOD_COLOUR
+    let colour = COLOUR_FOLDERS
         .iter()
         .map(|name| dir.join(name))
         .find(|path| path.is_dir());
     if let Some(colour) = colour
         && dir.join("depth").is_dir()
     {
-        return redwood(&colour, &dir.join("depth"));
+        return two_folders(&colour, &dir.join("depth"));
     }
     Ok(Sequence {
         frames: video::frames_of_folder(dir)?,
@@ -47,13 +50,21 @@ pub fn of_folder(dir: &Path) -> Result<Sequence> {
 }
 
 /// The frames of `dir` whose names are `colour` and `depth`, patterns with one `*` each that stands for the same in
-/// both, as `left_*_rgb.png` and `left_*_z.png`. Numbers are ordered as numbers.
+/// both, as `left_*.png` and `left_*_z.png`. Numbers are ordered as numbers. A file that both patterns match belongs to
+/// the longer one.
 ///
 /// # Errors
 /// A pattern that is none, files without a partner, or no files.
 pub fn by_pattern(dir: &Path, colour: &str, depth: &str) -> Result<Sequence> {
     let mut colours = matching(dir, colour)?;
     let mut depths = matching(dir, depth)?;
+    let (longer, shorter) = if colour.len() > depth.len() {
+        (&colours, &mut depths)
+    } else {
+        (&depths, &mut colours)
+    };
+    let taken: BTreeSet<_> = longer.values().cloned().collect();
+    shorter.retain(|_, path| !taken.contains(path));
     let alone = |a: &BTreeMap<Key, PathBuf>, b: &BTreeMap<Key, PathBuf>| {
         a.iter()
             .find(|(key, _)| !b.contains_key(*key))
@@ -103,6 +114,126 @@ fn files_of(dir: &Path) -> Result<Vec<PathBuf>> {
     let refuse = |e: std::io::Error| Error::file(dir, format!("cannot be read: {e}"));
     let entries = std::fs::read_dir(dir).map_err(refuse)?;
     entries.map(|entry| entry.map(|e| e.path()).map_err(refuse)).collect()
+}
+
+/// Pictures of two folders that have equal names but for what follows the last dot, in the order of their names with
+/// numbers as numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Named {
+    /// The name, and the files of colour and depth.
+    pub pairs: Vec<(String, PathBuf, PathBuf)>,
+    /// Files without a partner.
+    pub alone: Vec<PathBuf>,
+}
+
+/// The pictures of the folders `colour` and `depth`, as `rgb/cat.jpg` and `depth/cat.png`.
+///
+/// # Errors
+/// A folder that cannot be read; two files of one name.
+pub fn by_name(colour: &Path, depth: &Path) -> Result<Named> {
+    let colours = images(colour)?;
+    let mut depths = images(depth)?;
+    let (mut pairs, mut alone) = (Vec::new(), Vec::new());
+    for (name, colour) in colours {
+        match depths.remove(&name) {
+            Some(depth) => pairs.push((name.text, colour, depth)),
+            None => alone.push(colour),
+        }
+    }
+    alone.extend(depths.into_values());
+    Ok(Named { pairs, alone })
+}
+
+/// The pictures of a folder by their names without what follows the last dot, in the order of these names.
+///
+/// # Errors
+/// A folder that cannot be read; two files of one name.
+pub fn images(dir: &Path) -> Result<BTreeMap<Name, PathBuf>> {
+    let mut found = BTreeMap::new();
+    for path in files_of(dir)? {
+        let is_image = IMAGES.iter().any(|ending| files::has_extension(&path, ending));
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        if !is_image || stem.starts_with('.') {
+            continue;
+        }
+        if let Some(other) = found.insert(Name::new(stem), path.clone()) {
+            let other = other.file_name().unwrap_or_default().display().to_string();
+            return Err(Error::file(
+                path,
+                format!("has the name of {other} but for the ending; each picture needs a name of its own"),
+            ));
+        }
+    }
+    Ok(found)
+}
+
+/// A name whose numbers are ordered as numbers: `a2` before `a10`.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Name {
+    parts: Vec<Part>,
+    /// The name itself.
+    pub text: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+enum Part {
+    /// Digits without leading zeros: the longer they are, the larger the number.
+    Number(usize, String),
+    Text(String),
+}
+
+impl Name {
+    fn new(text: String) -> Self {
+        let bytes = text.as_bytes();
+        let runs = bytes.chunk_by(|a, b| a.is_ascii_digit() == b.is_ascii_digit());
+        let parts = runs.map(|run| {
+            let part = String::from_utf8_lossy(run);
+            if run[0].is_ascii_digit() {
+                let digits = part.trim_start_matches('0').to_owned();
+                Part::Number(digits.len(), digits)
+            } else {
+                Part::Text(part.into_owned())
+            }
+        });
+        Name {
+            parts: parts.collect(),
+            text,
+        }
+    }
+
+    /// Whether it is a number, or a number and a time, as Redwood's are.
+    fn is_of_redwood(&self) -> bool {
+        let (number, time) = self.text.split_once('-').unwrap_or((&self.text, "0"));
+        let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+        digits(number) && digits(time)
+    }
+}
+
+/// The frames of a folder of colour and one of depth.
+fn two_folders(colour: &Path, depth: &Path) -> Result<Sequence> {
+    let names = [images(colour)?, images(depth)?];
+    if names.iter().flat_map(BTreeMap::keys).all(Name::is_of_redwood) {
+        return redwood(colour, depth);
+    }
+    let found = by_name(colour, depth)?;
+    if let Some(path) = found.alone.first() {
+        return Err(Error::file(
+            path,
+            format!(
+                "has no partner of the same name; {} and {} need equal names",
+                colour.display(),
+                depth.display()
+            ),
+        ));
+    }
+    Ok(Sequence {
+        frames: found
+            .pairs
+            .into_iter()
+            .map(|(_, colour, depth)| (colour, depth))
+            .collect(),
+        unit: None,
+    })
 }
 
 /// A sequence of the TUM RGB-D benchmark: each colour image with the depth image that is nearest in time.
@@ -262,10 +393,47 @@ mod tests {
         let found = by_pattern(dir.path(), "left_*_rgb.png", "z/left_*.png").unwrap();
         let expected = [("left_9_rgb.png", "left_9.png"), ("left_10_rgb.png", "left_10.png")];
         assert_eq!(names(&found), pairs(&expected));
-        let refused = |a, b| by_pattern(dir.path(), a, b).unwrap_err().to_string();
+        let refused = |a: &str, b: &str| by_pattern(dir.path(), a, b).unwrap_err().to_string();
         assert!(refused("left_rgb.png", "z/left_*.png").contains("one *"));
         assert!(refused("no_*", "not_*").contains("no files"));
         std::fs::write(dir.path().join("left_11_rgb.png"), "").unwrap();
         assert!(refused("left_*_rgb.png", "z/left_*.png").contains("left_11_rgb.png"));
+    }
+
+    #[test]
+    fn a_file_that_both_patterns_match_belongs_to_the_longer_one() {
+        let dir = folder(&[
+            ("left_1.png", ""),
+            ("left_1_z.png", ""),
+            ("left_2.png", ""),
+            ("left_2_z.png", ""),
+        ]);
+        let expected = [("left_1.png", "left_1_z.png"), ("left_2.png", "left_2_z.png")];
+        let found = by_pattern(dir.path(), "left_*.png", "left_*_z.png").unwrap();
+        assert_eq!(names(&found), pairs(&expected));
+        let turned = by_pattern(dir.path(), "left_*_z.png", "left_*.png").unwrap();
+        assert_eq!(names(&turned), pairs(&expected.map(|(a, b)| (b, a))));
+        std::fs::remove_file(dir.path().join("left_2_z.png")).unwrap();
+        let refused = by_pattern(dir.path(), "left_*.png", "left_*_z.png").unwrap_err();
+        assert!(refused.to_string().contains("left_2.png"));
+    }
+
+    #[test]
+    fn folders_of_equal_names_are_paired_by_them() {
+        let dir = folder(&[
+            ("rgb/cat 10.jpg", ""),
+            ("rgb/cat 9.png", ""),
+            ("rgb/notes.txt", ""),
+            ("depth/cat 10.png", ""),
+            ("depth/cat 9.npy", ""),
+        ]);
+        let found = of_folder(dir.path()).unwrap();
+        let expected = [("cat 9.png", "cat 9.npy"), ("cat 10.jpg", "cat 10.png")];
+        assert_eq!((names(&found), found.unit), (pairs(&expected), None));
+        std::fs::write(dir.path().join("depth/dog.png"), "").unwrap();
+        let refused = || of_folder(dir.path()).unwrap_err().to_string();
+        assert!(refused().contains("dog.png") && refused().contains("no partner"));
+        std::fs::write(dir.path().join("rgb/cat 9.jpg"), "").unwrap();
+        assert!(refused().contains("cat 9") && refused().contains("a name of its own"));
     }
 }
