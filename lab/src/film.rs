@@ -2,12 +2,27 @@
 //! one.
 
 use crate::error::{Error, Result};
-use std::io::{BufRead, BufReader, Read};
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
+use std::thread::JoinHandle;
 
 /// Endings of films' names.
 const ENDINGS: [&str; 6] = ["mp4", "mov", "mkv", "webm", "avi", "m4v"];
+/// What ffmpeg may open: the containers of [`ENDINGS`], each in one file. A text that lists other films, whatever its
+/// name, is none of them.
+const READS: [&str; 4] = ["-protocol_whitelist", "file", "-format_whitelist", "mov,matroska,avi"];
+/// How much is kept of what ffmpeg writes to stderr, in bytes.
+const MOST_SAID: usize = 4096;
+
+/// `path` as ffmpeg takes it: the name of a file, not an option or another protocol, as `-x.mp4` and `concat:x.mp4`
+/// are.
+fn url(path: &Path) -> OsString {
+    let mut url = OsString::from("file:");
+    url.push(path);
+    url
+}
 
 /// Whether `path` is named as a film.
 pub fn is_film(path: &Path) -> bool {
@@ -47,7 +62,9 @@ pub fn about(path: &Path) -> Option<About> {
     let output = Command::new("ffprobe")
         .args(["-v", "error", "-select_streams", "v:0", "-of", "json"])
         .args(["-show_entries", "stream=avg_frame_rate,nb_frames:format=duration"])
-        .arg(path)
+        .args(READS)
+        .arg(url(path))
+        .stdin(Stdio::null())
         .output()
         .ok()?;
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).ok()?;
@@ -77,6 +94,8 @@ pub struct Film {
     path: std::path::PathBuf,
     ffmpeg: Child,
     pictures: BufReader<ChildStdout>,
+    /// The end of what ffmpeg writes to stderr. A thread reads it all the while: a full pipe stops ffmpeg.
+    said: Option<JoinHandle<String>>,
 }
 
 /// One picture.
@@ -96,13 +115,16 @@ impl Film {
         if !path.is_file() {
             return Err(Error::file(path, "there is no such file"));
         }
+        crate::output::reading(path)?;
         let (format, codec) = match pixels {
             Pixels::Rgb => ("rgb24", "ppm"),
             Pixels::Grey => ("gray16be", "pgm"),
         };
         let mut ffmpeg = Command::new("ffmpeg")
-            .args(["-v", "error", "-nostdin", "-i"])
-            .arg(path)
+            .args(["-v", "error", "-nostdin"])
+            .args(READS)
+            .arg("-i")
+            .arg(url(path))
             .args([
                 "-map",
                 "0:v:0",
@@ -118,12 +140,14 @@ impl Film {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
             .spawn()
-            .map_err(|e| Error::file(path, format!("ffmpeg cannot be started: {e}")))?;
+            .map_err(|e| not_started(path, &e))?;
         let pictures = BufReader::new(ffmpeg.stdout.take().expect("piped"));
+        let errors = ffmpeg.stderr.take().expect("piped");
         Ok(Film {
             path: path.into(),
             ffmpeg,
             pictures,
+            said: Some(std::thread::spawn(move || last_said(errors))),
         })
     }
 
@@ -173,17 +197,40 @@ impl Film {
         }
     }
 
+    /// Ends as ffmpeg does. It may go on over damaged parts, of which nobody else would say a word.
     fn end(&mut self) -> Result<()> {
-        let refuse = |why: String| Error::file(&self.path, format!("ffmpeg cannot read it: {why}"));
-        let mut said = String::new();
-        if let Some(mut errors) = self.ffmpeg.stderr.take() {
-            errors.read_to_string(&mut said).map_err(|e| refuse(e.to_string()))?;
-        }
+        let said = self.said.take().and_then(|thread| thread.join().ok());
+        let Some(said) = said else { return Ok(()) };
         match self.ffmpeg.wait() {
-            Ok(status) if status.success() => Ok(()),
-            _ => Err(refuse(last_line(&said))),
+            Ok(status) if status.success() => {
+                if let Some(line) = last_line(&said) {
+                    log::warn!("{}: may be damaged: ffmpeg says: {line}", self.path.display());
+                }
+                Ok(())
+            }
+            _ => Err(Error::file(
+                &self.path,
+                format!("ffmpeg cannot read it: {}", why(&said)),
+            )),
         }
     }
+}
+
+/// The last of all that `errors` gives, [`MOST_SAID`] bytes.
+fn last_said(mut errors: impl Read) -> String {
+    let (mut said, mut chunk) = (Vec::new(), [0; MOST_SAID]);
+    loop {
+        match errors.read(&mut chunk) {
+            Ok(0) => break,
+            Ok(n) => {
+                said.extend_from_slice(&chunk[..n]);
+                said.drain(..said.len().saturating_sub(MOST_SAID));
+            }
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(_) => break,
+        }
+    }
+    String::from_utf8_lossy(&said).into_owned()
 }
 
 impl Drop for Film {
@@ -203,58 +250,67 @@ pub enum Quality {
     Lossless,
 }
 
-/// Makes the film at `path` of pictures whose names are `pattern`, as `out/preview_%06d.png`.
+/// Makes the film at `path` of the pictures in `folder` whose names are `pattern`, as `preview_%06d.png`.
 ///
 /// # Errors
 /// No ffmpeg, or what it refuses.
-pub fn write(path: &Path, pattern: &Path, rate_hz: f64, quality: Quality) -> Result<()> {
+pub fn write(path: &Path, folder: &Path, pattern: &str, rate_hz: f64, quality: Quality) -> Result<()> {
     check(path)?;
-    let half = path.with_extension("half.mp4");
-    let mut command = Command::new("ffmpeg");
-    command
-        .args([
-            "-v",
-            "error",
-            "-nostdin",
-            "-y",
-            "-framerate",
-            &rate_hz.to_string(),
-            "-i",
-        ])
-        .arg(pattern);
-    match quality {
-        // Sides must be even for the colours of usual players.
-        Quality::Seen => command.args([
-            "-vf",
-            "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-            "-c:v",
-            "libx264",
-            "-crf",
-            "18",
-            "-pix_fmt",
-            "yuv420p",
-            "-movflags",
-            "+faststart",
-        ]),
-        Quality::Lossless => command.args(["-c:v", "libx264rgb", "-qp", "0", "-pix_fmt", "rgb24"]),
-    };
-    command.args(["-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"]);
-    let output = command
-        .arg(&half)
-        .output()
-        .map_err(|e| Error::file(path, format!("ffmpeg cannot be started: {e}")))?;
-    if !output.status.success() {
-        let _ = std::fs::remove_file(&half);
-        let why = last_line(&String::from_utf8_lossy(&output.stderr));
-        return Err(Error::file(path, format!("ffmpeg cannot write it: {why}")));
-    }
-    std::fs::rename(&half, path).map_err(|e| Error::file(path, format!("cannot be written: {e}")))
+    crate::output::replace(path, |half| {
+        let half = std::path::absolute(half).map_err(|e| Error::file(path, e))?;
+        let mut command = Command::new("ffmpeg");
+        command
+            // In the folder, whose own name is then no part of the pattern.
+            .current_dir(folder)
+            .args([
+                "-v",
+                "error",
+                "-nostdin",
+                "-y",
+                "-f",
+                "image2",
+                "-pattern_type",
+                "sequence",
+            ])
+            .args(["-framerate", &rate_hz.to_string(), "-start_number", "0", "-i"])
+            .arg(url(Path::new(pattern)));
+        match quality {
+            // Sides must be even for the colours of usual players.
+            Quality::Seen => command
+                .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18"])
+                .args(["-pix_fmt", "yuv420p", "-movflags", "+faststart"]),
+            Quality::Lossless => command.args(["-c:v", "libx264rgb", "-qp", "0", "-pix_fmt", "rgb24"]),
+        };
+        let output = command
+            .args([
+                "-map_metadata",
+                "-1",
+                "-fflags",
+                "+bitexact",
+                "-flags:v",
+                "+bitexact",
+                "-f",
+                "mp4",
+            ])
+            .arg(url(&half))
+            .output()
+            .map_err(|e| not_started(path, &e))?;
+        if output.status.success() {
+            return Ok(());
+        }
+        let said = String::from_utf8_lossy(&output.stderr);
+        Err(Error::file(path, format!("ffmpeg cannot write it: {}", why(&said))))
+    })
 }
 
-fn last_line(text: &str) -> String {
-    text.lines()
-        .map(str::trim)
-        .rfind(|line| !line.is_empty())
-        .unwrap_or("it does not say why")
-        .to_owned()
+fn not_started(path: &Path, why: &std::io::Error) -> Error {
+    Error::file(path, format!("ffmpeg cannot be started: {why}"))
+}
+
+fn why(said: &str) -> &str {
+    last_line(said).unwrap_or("it does not say why")
+}
+
+fn last_line(text: &str) -> Option<&str> {
+    text.lines().map(str::trim).rfind(|line| !line.is_empty())
 }
