@@ -22,6 +22,8 @@ use std::sync::Arc;
 
 /// Name of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";
+/// Name of the PNG text chunk by which it is known what a hologram was made of ([`read_made_of`]).
+const MADE_OF_CHUNK: &str = "phasefront-made-of";
 
 /// What is needed to look at a hologram again; it travels with the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -46,6 +48,12 @@ pub struct HologramInfo {
 }
 
 impl HologramInfo {
+    /// The text chunk that a PNG carries of it.
+    fn chunk(&self, path: &Path) -> Result<(&'static str, String)> {
+        let text = serde_json::to_string(self).map_err(|e| Error::file(path, e))?;
+        Ok((PNG_CHUNK, text))
+    }
+
     /// The display as far as this says it.
     ///
     /// # Errors
@@ -254,7 +262,7 @@ fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
 }
 
 /// The bytes of a regular file: what never ends, as a device, is not begun.
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
+pub fn read_file(path: &Path) -> Result<Vec<u8>> {
     output::reading(path)?;
     let refuse = |e: std::io::Error| Error::file(path, format!("cannot be read: {e}"));
     if !std::fs::metadata(path).map_err(refuse)?.is_file() {
@@ -270,7 +278,7 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>> {
 pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
     let bytes = amplitude_bytes(amplitude);
     let (_, height, width) = amplitude.dim();
-    write_png_of(path, PngShape::of_levels(3, height, width), &bytes, None)
+    write_png_of(path, PngShape::of_levels(3, height, width), &bytes, &[])
 }
 
 /// Amplitudes, (C, H, W), as rows of RGB bytes; one laser's are grey.
@@ -296,7 +304,7 @@ fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec
 pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
     let (width, height) = picture.dimensions();
     let shape = PngShape::of_levels(3, height as usize, width as usize);
-    write_png_of(path, shape, picture.as_raw(), None)
+    write_png_of(path, shape, picture.as_raw(), &[])
 }
 
 /// Writes an 8-bit RGBA PNG of rows of `rgba`.
@@ -310,7 +318,7 @@ pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Resu
         color: png::ColorType::Rgba,
         depth: png::BitDepth::Eight,
     };
-    write_png_of(path, shape, rgba, None)
+    write_png_of(path, shape, rgba, &[])
 }
 
 /// Size and kind of a PNG's pixels.
@@ -342,24 +350,20 @@ pub(crate) fn png_color(colours: usize) -> png::ColorType {
     }
 }
 
-/// Writes a PNG of rows of `pixels`, words big-endian, that carries `info`.
-fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<()> {
-    pending_png(path, shape, pixels, info)?.place()
+/// Writes a PNG of rows of `pixels`, words big-endian, with text chunks of these names.
+fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<()> {
+    pending_png(path, shape, pixels, texts)?.place()
 }
 
 /// As [`write_png_of`], not in its place yet.
-pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], info: Option<&HologramInfo>) -> Result<Pending> {
-    let text = info
-        .map(serde_json::to_string)
-        .transpose()
-        .map_err(|e| Error::file(path, e))?;
+pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<Pending> {
     Pending::write(path, |file| {
         let mut encoder = png::Encoder::new(file, shape.width as u32, shape.height as u32);
         encoder.set_color(shape.color);
         encoder.set_depth(shape.depth);
         let other = std::io::Error::other;
-        if let Some(text) = text {
-            encoder.add_text_chunk(PNG_CHUNK.into(), text).map_err(other)?;
+        for (name, text) in texts {
+            encoder.add_text_chunk((*name).into(), text.clone()).map_err(other)?;
         }
         let mut writer = encoder.write_header().map_err(other)?;
         writer.write_image_data(pixels).map_err(other)?;
@@ -372,9 +376,13 @@ pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], info: Opt
 /// # Errors
 /// A file that cannot be written.
 pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &HologramInfo) -> Result<()> {
+    write_bytes(path, levels, &[info.chunk(path)?])
+}
+
+fn write_bytes(path: &Path, levels: ArrayView3<'_, u8>, texts: &[(&str, String)]) -> Result<()> {
     let (colours, height, width) = levels.dim();
     let shape = PngShape::of_levels(colours, height, width);
-    write_png_of(path, shape, &interleaved(levels, |v| v), Some(info))
+    write_png_of(path, shape, &interleaved(levels, |v| v), texts)
 }
 
 /// Writes a phase-only hologram of over 8 bits, (C, H, W), as a 16-bit PNG of levels that carries `info`: RGB, or grey
@@ -383,6 +391,10 @@ pub fn write_phase_only(path: &Path, levels: ArrayView3<'_, u8>, info: &Hologram
 /// # Errors
 /// A file that cannot be written.
 pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo) -> Result<()> {
+    write_words_of(path, levels, &[info.chunk(path)?])
+}
+
+fn write_words_of(path: &Path, levels: ArrayView3<'_, u16>, texts: &[(&str, String)]) -> Result<()> {
     let (colours, height, width) = levels.dim();
     let words = levels.permuted_axes([1, 2, 0]);
     let bytes: Vec<u8> = words.iter().flat_map(|level| level.to_be_bytes()).collect();
@@ -390,7 +402,7 @@ pub fn write_words(path: &Path, levels: ArrayView3<'_, u16>, info: &HologramInfo
         depth: png::BitDepth::Sixteen,
         ..PngShape::of_levels(colours, height, width)
     };
-    write_png_of(path, shape, &bytes, Some(info))
+    write_png_of(path, shape, &bytes, texts)
 }
 
 /// Writes `hologram` to the file of its kind.
@@ -402,6 +414,19 @@ pub fn write_hologram(path: &Path, hologram: &Hologram) -> Result<()> {
         Hologram::PhaseOnly(levels, info) => write_phase_only(path, levels.view(), info),
         Hologram::Words(levels, info) => write_words(path, levels.view(), info),
         Hologram::Complex(field, info) => write_complex(path, field.view(), info),
+    }
+}
+
+/// Writes the levels of `hologram`, and what they were made of, which [`read_made_of`] gives back.
+///
+/// # Errors
+/// A file that cannot be written; a complex field.
+pub fn write_made_of(path: &Path, hologram: &Hologram, made_of: &str) -> Result<()> {
+    let texts = [hologram.info().chunk(path)?, (MADE_OF_CHUNK, made_of.to_owned())];
+    match hologram {
+        Hologram::PhaseOnly(levels, _) => write_bytes(path, levels.view(), &texts),
+        Hologram::Words(levels, _) => write_words_of(path, levels.view(), &texts),
+        Hologram::Complex(..) => Err(Error::file(path, "a complex field is no PNG")),
     }
 }
 
@@ -503,18 +528,33 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
 
 /// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
 fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
+    let Some(text) = read_text(path, PNG_CHUNK)? else {
+        return Ok(None);
+    };
+    serde_json::from_str(&text)
+        .map(Some)
+        .map_err(|e| Error::file(path, format!("its `{PNG_CHUNK}` text chunk is broken: {e}")))
+}
+
+/// What [`write_made_of`] noted in a PNG, and the hologram's scale; `None` where it noted nothing.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn read_made_of(path: &Path) -> Result<Option<(String, Option<f32>)>> {
+    let made_of = read_text(path, MADE_OF_CHUNK)?;
+    let scale = read_info(path)?.and_then(|info| info.scale);
+    Ok(made_of.map(|made_of| (made_of, scale)))
+}
+
+/// The text chunk called `name` of a PNG, `None` where it has none or is no PNG.
+fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
     output::reading(path)?;
     let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
     let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else {
         return Ok(None);
     };
     let chunks = &reader.info().uncompressed_latin1_text;
-    match chunks.iter().find(|chunk| chunk.keyword == PNG_CHUNK) {
-        None => Ok(None),
-        Some(chunk) => serde_json::from_str(&chunk.text)
-            .map(Some)
-            .map_err(|e| Error::file(path, format!("its `phasefront` text chunk is broken: {e}"))),
-    }
+    Ok((chunks.iter().find(|chunk| chunk.keyword == name)).map(|chunk| chunk.text.clone()))
 }
 
 /// Whether `path` holds a hologram of ours rather than a picture.
@@ -593,15 +633,8 @@ impl DisplayFile {
 /// # Errors
 /// As [`read_display`]; neither a file nor a name.
 pub fn find_display(name: &str) -> Result<DisplayFile> {
-    let path = Path::new(name);
-    if path.exists() || has_extension(path, "toml") {
-        return read_display(path);
-    }
-    if let Some(own) = own_devices()
-        .into_iter()
-        .find(|own| own.file_stem() == Some(name.as_ref()))
-    {
-        return read_display(&own);
+    if let Some(path) = display_path(name) {
+        return read_display(&path);
     }
     let device = Device::shipped(name)
         .map_err(|e| Error::Input(format!("--display {name}: no such file, and {}", one_line_of(&e))))?;
@@ -611,6 +644,17 @@ pub fn find_display(name: &str) -> Result<DisplayFile> {
         lut: None,
         aberration: None,
     })
+}
+
+/// The file that --display `name` reads, `None` where it is the name of a device that is no file.
+pub fn display_path(name: &str) -> Option<PathBuf> {
+    let path = Path::new(name);
+    if path.exists() || has_extension(path, "toml") {
+        return Some(path.to_owned());
+    }
+    own_devices()
+        .into_iter()
+        .find(|own| own.file_stem() == Some(name.as_ref()))
 }
 
 fn one_line_of(error: &phasefront::Error) -> String {

@@ -2,6 +2,7 @@
 //! one.
 
 use crate::error::{Error, Result};
+use crate::output;
 use std::ffi::OsString;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::Path;
@@ -115,7 +116,7 @@ impl Film {
         if !path.is_file() {
             return Err(Error::file(path, "there is no such file"));
         }
-        crate::output::reading(path)?;
+        output::reading(path)?;
         let (format, codec) = match pixels {
             Pixels::Rgb => ("rgb24", "ppm"),
             Pixels::Grey => ("gray16be", "pgm"),
@@ -256,7 +257,7 @@ pub enum Quality {
 /// No ffmpeg, or what it refuses.
 pub fn write(path: &Path, folder: &Path, pattern: &str, rate_hz: f64, quality: Quality) -> Result<()> {
     check(path)?;
-    crate::output::replace(path, |half| {
+    output::write_by_name(path, |half| {
         let half = std::path::absolute(half).map_err(|e| Error::file(path, e))?;
         let mut command = Command::new("ffmpeg");
         command

@@ -12,6 +12,7 @@ pub mod error;
 pub mod evaluate;
 pub mod files;
 pub mod film;
+pub mod fingerprint;
 pub mod fit;
 pub mod flicker;
 pub mod gpu;

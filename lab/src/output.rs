@@ -139,6 +139,16 @@ pub fn write_atomically(
     Pending::write(path, write)?.place()
 }
 
+/// As [`write_atomically`], where `write` is another program, which fills a file by its name.
+///
+/// # Errors
+/// Whatever goes wrong; what was there is left as it was.
+pub(crate) fn write_by_name(path: &Path, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
+    let pending = Pending::begin(path)?;
+    write(pending.file.path())?;
+    pending.synced()?.place()
+}
+
 /// A file that is written, but not in its place yet. Dropped, it goes.
 pub(crate) struct Pending {
     path: PathBuf,
@@ -152,22 +162,34 @@ impl Pending {
         path: &Path,
         write: impl FnOnce(&mut BufWriter<&mut File>) -> std::io::Result<()>,
     ) -> Result<Self> {
-        let refuse = |e: std::io::Error| cannot_write(path, &e);
+        let mut pending = Self::begin(path)?;
+        let mut buffer = BufWriter::new(pending.file.as_file_mut());
+        write(&mut buffer)
+            .and_then(|()| buffer.flush())
+            .map_err(|e| cannot_write(path, &e))?;
+        drop(buffer);
+        pending.synced()
+    }
+
+    /// An empty file.
+    fn begin(path: &Path) -> Result<Self> {
         let real = Place::of_file(path)?.real;
         let parent = real.parent().unwrap_or(Path::new("."));
         remove_left_over(parent);
-        let mut file = temporary_in(parent).map_err(refuse)?;
+        let file = temporary_in(parent).map_err(|e| cannot_write(path, &e))?;
         // The lock tells other runs that the file is in use. A file system without locks writes all the same.
         let _ = file.as_file().try_lock();
-        let mut buffer = BufWriter::new(file.as_file_mut());
-        write(&mut buffer).and_then(|()| buffer.flush()).map_err(refuse)?;
-        drop(buffer);
-        file.as_file().sync_all().map_err(refuse)?;
         Ok(Self {
             path: path.to_owned(),
             real,
             file,
         })
+    }
+
+    /// Waits until the file is on the disk.
+    fn synced(self) -> Result<Self> {
+        let synced = self.file.as_file().sync_all();
+        synced.map_err(|e| cannot_write(&self.path, &e)).map(|()| self)
     }
 
     /// Puts the file into its place.

@@ -71,7 +71,7 @@ impl Image {
             color,
             depth,
         };
-        pending_png(path, shape, &self.bytes, None)
+        pending_png(path, shape, &self.bytes, &[])
     }
 
     /// Reads a PNG or BMP.

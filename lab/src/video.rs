@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::fingerprint::Fingerprint;
 use ndarray::Array2;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::unstable::depth::DepthUnit;
@@ -23,6 +24,20 @@ impl VideoFrame {
     /// (H, W) of its colour.
     pub fn shape(&self) -> (usize, usize) {
         self.colour_shape
+    }
+
+    /// (h, w) of its depth.
+    pub fn depth_shape(&self) -> (usize, usize) {
+        self.depth_shape
+    }
+
+    /// Adds the frame to what `hasher` is of.
+    pub fn fingerprint(&self, hasher: &mut Fingerprint) {
+        let (colour, depth) = (self.colour_shape, self.depth_shape);
+        hasher.numbers(&[colour.0, colour.1, depth.0, depth.1]);
+        hasher.bytes(format!("{:?}", self.format).as_bytes());
+        hasher.bytes(&self.colour);
+        hasher.bytes(&self.depth);
     }
 
     /// Rows of RGB bytes, (H, W) = `colour_shape`, and of big-endian 16-bit numbers of `unit`, (h, w) = `depth_shape`.

@@ -171,17 +171,20 @@ fn raw_frames_come_through_a_pipe_and_equal_those_of_files() {
 fn wrong_input_is_named() {
     let (dir, input) = folder(2);
     let name = input.to_str().unwrap();
-    assert!(refusal(&["video", "-"]).contains("--raw"));
-    assert!(refusal(&["video", "-", "--raw", "64x48"]).contains("no frame"));
-    assert!(refusal(&["video", name, "--raw", "64x48"]).contains("give - as input"));
-    assert!(refusal(&["video", name, "--near", "1"]).contains("--far"));
-    assert!(refusal(&["video", name, "--rate", "0"]).contains("--rate"));
+    let out = dir.path().join("out");
+    let refusal = |arguments: &[&str]| refusal(&[&["video"], arguments, &["-o", out.to_str().unwrap()]].concat());
+    assert!(refusal(&["-"]).contains("--raw"));
+    assert!(refusal(&["-", "--raw", "64x48"]).contains("no frame"));
+    assert!(refusal(&[name, "--raw", "64x48"]).contains("give - as input"));
+    assert!(refusal(&[name, "--near", "1"]).contains("--far"));
+    assert!(refusal(&[name, "--rate", "0"]).contains("--rate"));
     // Millimetres are no normalized depth.
     std::fs::remove_file(input.join("depth_1.png")).unwrap();
-    assert!(refusal(&["video", name]).contains("no partner"));
+    assert!(refusal(&[name]).contains("no partner"));
     let empty = dir.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
-    assert!(refusal(&["video", empty.to_str().unwrap()]).contains("no frames"));
+    assert!(refusal(&[empty.to_str().unwrap()]).contains("no frames"));
+    assert!(!out.exists());
 }
 
 /// A real sensor's holes, noise and misaligned colour, as video and as a live stream.
@@ -222,6 +225,15 @@ fn contents(dir: &Path) -> Vec<(String, Vec<u8>)> {
     files
 }
 
+/// The holograms of a folder, whatever they were made of.
+fn holograms(dir: &Path) -> Vec<(String, Hologram)> {
+    let read = |(name, _)| {
+        let hologram = files::read_hologram(&dir.join(&name)).unwrap();
+        (name, hologram)
+    };
+    contents(dir).into_iter().map(read).collect()
+}
+
 #[test]
 fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
     let (dir, input) = folder(9);
@@ -255,21 +267,22 @@ fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
             let _ = std::fs::remove_file(cut.join(format!("phase_{index:06}.png")));
         }
         assert!(refusal(&call).contains("--resume"), "nothing is overwritten in silence");
-        let other = [&call[..], &["--resume", "--offset-mm", "2"]].concat();
-        assert!(refusal(&other).contains("another display"));
+        for (name, _) in contents(&cut) {
+            image::open(cut.join(&name)).expect("a killed run leaves whole files alone");
+        }
         let before = std::fs::metadata(cut.join("phase_000001.png"))
             .unwrap()
             .modified()
             .unwrap();
         json(&[&call[..], &["--resume"]].concat());
-        assert_eq!(contents(&whole), contents(&cut), "{method}");
+        assert!(contents(&whole) == contents(&cut), "{method}");
         let after = std::fs::metadata(cut.join("phase_000001.png"))
             .unwrap()
             .modified()
             .unwrap();
         assert_eq!(before, after, "what is there is not made again");
         json(&[&call[..], &["--overwrite"]].concat());
-        assert_eq!(contents(&whole), contents(&cut), "{method}");
+        assert!(contents(&whole) == contents(&cut), "{method}");
     }
 }
 
@@ -335,7 +348,7 @@ fn films_go_in_and_come_out() {
         "-o",
         &files,
     ]);
-    assert_eq!(contents(&at("films")), contents(&at("files")));
+    assert!(holograms(&at("films")) == holograms(&at("files")));
     // Out: as it is seen, and its phases without loss.
     let out = text(&at("out.mp4"));
     json(&[&call[..], &[&out]].concat());
@@ -372,9 +385,9 @@ fn films_go_in_and_come_out() {
     assert_eq!(report["processed"], 5);
     let first = files::read_hologram(&at("b").join("phase_000000.png")).unwrap();
     assert_eq!(first.shape(), (HEIGHT as usize, WIDTH as usize));
-    assert!(refusal(&["video", &colour]).contains("--depth-network"));
+    assert!(refusal(&["video", &colour, "-o", &text(&at("c"))]).contains("--depth-network"));
     std::fs::write(at("no.mp4"), "no film").unwrap();
-    let no = refusal(&["video", &text(&at("no.mp4")), "--depth-beside"]);
+    let no = refusal(&["video", &text(&at("no.mp4")), "--depth-beside", "-o", &text(&at("c"))]);
     assert!(no.contains("no.mp4") && no.contains("ffmpeg"), "{no}");
 }
 
@@ -414,12 +427,12 @@ fn folders_are_read_as_data_sets_lay_them() {
     let made = |input: &Path, name: &str, more: &[&str]| {
         let out = at(name);
         json(&[&["video", input.to_str().unwrap(), "-o", out.to_str().unwrap()], more].concat());
-        contents(&out)
+        holograms(&out)
     };
     let plain = made(&input, "a", &["--depth-unit", "mm"]);
     assert_eq!(plain.len(), 3);
-    assert_eq!(made(&at("redwood"), "b", &[]), plain);
-    assert_eq!(made(&at("tum"), "c", &[]), plain);
+    assert!(made(&at("redwood"), "b", &[]) == plain);
+    assert!(made(&at("tum"), "c", &[]) == plain);
     let pairs = [
         "--pairs",
         "rgb/*.png,depth/*.png",
@@ -428,6 +441,312 @@ fn folders_are_read_as_data_sets_lay_them() {
         "--depth-scale",
         "5000",
     ];
-    assert_eq!(made(&at("tum"), "d", &pairs), plain);
-    assert!(refusal(&["video", input.to_str().unwrap(), "--pairs", "rgb_*"]).contains("comma"));
+    assert!(made(&at("tum"), "d", &pairs) == plain);
+    let out = at("e").to_str().unwrap().to_owned();
+    assert!(refusal(&["video", input.to_str().unwrap(), "--pairs", "rgb_*", "-o", &out]).contains("comma"));
+    // Folders of equal names, and the names that the documentation of --pairs has.
+    for name in ["plain/rgb", "plain/depth", "left"] {
+        std::fs::create_dir_all(at(name)).unwrap();
+    }
+    for (index, name) in ["cat", "dog", "eel"].iter().enumerate() {
+        let (colour, depth) = (
+            input.join(format!("color_{index}.png")),
+            input.join(format!("depth_{index}.png")),
+        );
+        std::fs::copy(&colour, at(&format!("plain/rgb/{name}.png"))).unwrap();
+        std::fs::copy(&depth, at(&format!("plain/depth/{name}.png"))).unwrap();
+        std::fs::copy(&colour, at(&format!("left/left_{index}.png"))).unwrap();
+        std::fs::copy(&depth, at(&format!("left/left_{index}_z.png"))).unwrap();
+    }
+    assert!(made(&at("plain"), "f", &["--depth-unit", "mm"]) == plain);
+    let pairs = ["--pairs", "left_*.png,left_*_z.png", "--depth-unit", "mm"];
+    assert!(made(&at("left"), "g", &pairs) == plain);
+}
+
+#[test]
+fn a_run_without_output_is_refused_unless_it_reports() {
+    let (_dir, input) = folder(1);
+    let input = input.to_str().unwrap();
+    assert!(refusal(&["video", input, "--depth-unit", "mm"]).contains("-o"));
+    assert_eq!(json(&["video", input, "--depth-unit", "mm"])["processed"], 1);
+    let live = phasefront(&["video", input, "--depth-unit", "mm", "--live"])
+        .output()
+        .unwrap();
+    assert!(live.status.success() && !live.stdout.is_empty());
+}
+
+#[test]
+fn a_bad_frame_is_named() {
+    let (dir, input) = folder(3);
+    let out = dir.path().join("out");
+    let call = [
+        "video",
+        input.to_str().unwrap(),
+        "--depth-unit",
+        "mm",
+        "-o",
+        out.to_str().unwrap(),
+    ];
+    let empty = image::ImageBuffer::<image::Luma<u16>, Vec<u16>>::new(WIDTH, HEIGHT);
+    empty.save(input.join("depth_1.png")).unwrap();
+    let error = refusal(&call);
+    assert!(
+        error.contains("color_1.png") && error.contains("no usable reading"),
+        "{error}"
+    );
+    // A frame of another size would be stretched to that of the first.
+    let (colour, depth) = frame(1);
+    depth.save(input.join("depth_1.png")).unwrap();
+    image::imageops::thumbnail(&colour, WIDTH / 2, HEIGHT / 2)
+        .save(input.join("color_1.png"))
+        .unwrap();
+    let call = [&call[..], &["--overwrite"]].concat();
+    let error = refusal(&call);
+    assert!(error.contains("color_1.png") && error.contains("32×24"), "{error}");
+    assert!(error.contains("64×48") && error.contains("hologram"), "{error}");
+    assert!(out.join("phase_000000.png").exists() && !out.join("phase_000001.png").exists());
+    // The error is all that a folder of it knows: when it is mended, the run goes on.
+    colour.save(input.join("color_1.png")).unwrap();
+    let mended = [&call[..call.len() - 1], &["--resume"]].concat();
+    assert_eq!(json(&mended)["processed"], 3);
+}
+
+#[test]
+fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
+    let (dir, input) = folder(3);
+    let out = dir.path().join("out");
+    let call = [
+        "video",
+        input.to_str().unwrap(),
+        "--depth-unit",
+        "mm",
+        "-o",
+        out.to_str().unwrap(),
+    ];
+    json(&call);
+    std::fs::remove_file(out.join("phase_000002.png")).unwrap();
+    let before = contents(&out);
+    let refused = |more: &[&str]| refusal(&[&call[..], &["--resume"], more].concat());
+    for (more, earlier, now) in [
+        (&["--method", "sweep"][..], "--method network", "--method sweep"),
+        (&["--dark", "0.2"], "no --dark", "--dark 0.2"),
+        (&["--local-steps", "3"], "no --local-steps", "--local-steps 3"),
+        (&["--network", "15"], "no --network", "--network 15"),
+        (&["--precision", "f32"], "--precision int8", "--precision f32"),
+        (&["--brightness", "max"], "--brightness steady", "--brightness max"),
+        (&["--rate", "24"], "--rate 30", "--rate 24"),
+        (&["--offset-mm", "2"], "display offset_mm 0", "display offset_mm 2"),
+        (&["--preview-mm", "1"], "no --preview-mm", "--preview-mm 1"),
+        (&["--near", "1", "--far", "2"], "no --far", "--far 2"),
+    ] {
+        let error = refused(more);
+        assert!(
+            error.contains(earlier) && error.contains(now) && error.contains("--overwrite"),
+            "{error}"
+        );
+    }
+    // Another picture in the place of one that was there.
+    let second = std::fs::read(input.join("color_1.png")).unwrap();
+    std::fs::copy(input.join("color_0.png"), input.join("color_1.png")).unwrap();
+    let error = refused(&[]);
+    assert!(
+        error.contains("phase_000001.png") && error.contains("another frame"),
+        "{error}"
+    );
+    std::fs::write(input.join("color_1.png"), second).unwrap();
+    assert!(contents(&out) == before, "nothing was written");
+    // A folder of unknown flags is not resumed either.
+    let request = std::fs::read(out.join("request.json")).unwrap();
+    std::fs::remove_file(out.join("request.json")).unwrap();
+    assert!(refused(&[]).contains("request.json"));
+    std::fs::write(out.join("request.json"), request).unwrap();
+    json(&[&call[..], &["--resume"]].concat());
+    assert_eq!(contents(&out).len(), 3);
+}
+
+#[test]
+fn depth_that_goes_the_other_way_is_not_resumed() {
+    let (dir, input) = folder(2);
+    let out = dir.path().join("out");
+    for index in 0..2 {
+        let depth = image::GrayImage::from_fn(WIDTH, HEIGHT, |x, y| image::Luma([(2 * x + y) as u8 + index]));
+        depth.save(input.join(format!("depth_{index}.png"))).unwrap();
+    }
+    let call = ["video", input.to_str().unwrap(), "-o", out.to_str().unwrap()];
+    json(&call);
+    let error = refusal(&[&call[..], &["--resume", "--invert"]].concat());
+    assert!(error.contains("no --invert, this run has --invert"), "{error}");
+}
+
+#[test]
+fn one_run_at_a_time_writes_into_a_folder() {
+    let (dir, input) = folder(1);
+    let out = dir.path().join("out");
+    let mut first = phasefront(&["video", "-", "--raw", "64x48", "--depth-unit", "mm", "-o"])
+        .arg(&out)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut stdin = first.stdin.take().unwrap();
+    let (colour, depth) = frame(0);
+    stdin.write_all(colour.as_raw()).unwrap();
+    let bytes: Vec<u8> = depth.as_raw().iter().flat_map(|v| v.to_le_bytes()).collect();
+    stdin.write_all(&bytes).unwrap();
+    while !out.join("phase_000000.png").exists() && first.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    let before = std::fs::read(out.join("phase_000000.png")).unwrap();
+    let (input, out_name) = (input.to_str().unwrap(), out.to_str().unwrap());
+    for more in [&[][..], &["--resume"], &["--overwrite"]] {
+        let error = refusal(&[&["video", input, "--depth-unit", "mm", "-o", out_name], more].concat());
+        assert!(error.contains("another run"), "{error}");
+    }
+    assert_eq!(std::fs::read(out.join("phase_000000.png")).unwrap(), before);
+    drop(stdin);
+    assert!(first.wait().unwrap().success());
+}
+
+/// A film that ffmpeg complains about at length: more than a pipe holds.
+#[cfg(unix)]
+#[test]
+fn what_ffmpeg_complains_about_stops_nothing() {
+    use std::os::unix::fs::PermissionsExt;
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let script = |code: u8| {
+        format!(
+            "#!/bin/sh\n[ \"$1\" = -version ] && exit 0\n\
+             i=0; while [ $i -lt 3000 ]; do echo \"complaint number $i of a film that is damaged\" >&2; i=$((i+1)); done\n\
+             printf 'P6\\n64 48\\n255\\n'; head -c 9216 /dev/zero; exit {code}\n"
+        )
+    };
+    let path = std::env::join_paths(
+        [dir.path()]
+            .into_iter()
+            .map(Path::to_owned)
+            .chain(std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default())),
+    );
+    let path = path.unwrap();
+    std::fs::write(at("film.mp4"), "any").unwrap();
+    let run = |code: u8| {
+        std::fs::write(at("ffmpeg"), script(code)).unwrap();
+        std::fs::set_permissions(at("ffmpeg"), std::fs::Permissions::from_mode(0o755)).unwrap();
+        let mut child = phasefront(&["video", "--depth-beside", "--json"])
+            .arg(at("film.mp4"))
+            .env("PATH", &path)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        // A run that waits for ffmpeg, which waits for it, would never end.
+        let waits = std::time::Duration::from_millis(20);
+        let ended = (0..3000).any(|_| {
+            std::thread::sleep(waits);
+            child.try_wait().unwrap().is_some()
+        });
+        if !ended {
+            child.kill().unwrap();
+        }
+        let output = child.wait_with_output().unwrap();
+        assert!(ended, "the run hangs");
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (code, errors) = run(0);
+    assert_eq!(code, Some(0), "{errors}");
+    assert!(
+        errors.starts_with("warn: ") && errors.contains("complaint number 2999"),
+        "{errors}"
+    );
+    let (code, errors) = run(1);
+    assert_eq!((code, errors.lines().count()), (Some(1), 1), "{errors}");
+    assert!(
+        errors.contains("film.mp4") && errors.contains("complaint number 2999"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn films_have_any_names_and_are_films_alone() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let (dir, input) = folder(2);
+    let at = |name: &str| dir.path().join(name);
+    film(
+        &["-framerate", "10"],
+        &input.join("color_%d.png"),
+        &at("a.mp4"),
+        &["-c:v", "libx264rgb", "-qp", "0"],
+    );
+    let run = |arguments: &[&str]| {
+        let output = phasefront(arguments).current_dir(dir.path()).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), errors)
+    };
+    let done = (Some(0), String::new());
+    for (index, name) in ["a.mp4", "x:b.mp4", "concat:a.mp4", "file:c.mp4", "100%d.mp4"]
+        .iter()
+        .enumerate()
+    {
+        if index > 0 {
+            std::fs::copy(at("a.mp4"), at(name)).unwrap();
+        }
+        let out = format!("out{index}");
+        assert_eq!(run(&["video", name, "--depth-beside", "-o", &out]), done, "{name}");
+        assert!(contents(&at("out0")) == contents(&at(&out)), "{name}");
+    }
+    // A text that names another film.
+    std::fs::write(at("list.mp4"), "ffconcat version 1.0\nfile a.mp4\n").unwrap();
+    let (code, errors) = run(&["video", "list.mp4", "--depth-beside", "-o", "no"]);
+    assert!(code == Some(1) && errors.contains("list.mp4"), "{errors}");
+    assert!(phasefront_lab::film::about(&at("list.mp4")).is_none());
+    // Places that ffmpeg takes for patterns, options and protocols.
+    for folder in ["p%d", "%%"] {
+        std::fs::create_dir(at(folder)).unwrap();
+    }
+    for name in ["p%d/x.mp4", "%%/x.mp4", "-x.mp4", "concat:x.mp4"] {
+        let output = format!("-o={name}");
+        assert_eq!(run(&["video", "a.mp4", "--depth-beside", &output]), done, "{name}");
+        assert_eq!(
+            phasefront_lab::film::about(&at(name)).map(|about| about.frames),
+            Some(2),
+            "{name}"
+        );
+    }
+    let (code, errors) = run(&["video", "a.mp4", "--depth-beside", "-o", "nowhere/x.mp4"]);
+    assert!(code == Some(1) && errors.contains("nowhere"), "{errors}");
+    assert!(!at("nowhere").exists());
+}
+
+#[test]
+fn films_replace_no_file_unasked() {
+    if !has_ffmpeg() {
+        return;
+    }
+    let (dir, input) = folder(2);
+    let at = |name: &str| dir.path().join(name);
+    let out = at("x.mp4").to_str().unwrap().to_owned();
+    let call = ["video", input.to_str().unwrap(), "--depth-unit", "mm", "-o", &out];
+    std::fs::write(at("x.half.mp4"), "mine").unwrap();
+    std::fs::write(at("x-phases.mp4"), "mine").unwrap();
+    for more in [&[][..], &["--resume"]] {
+        assert!(refusal(&[&call[..], more].concat()).contains("x-phases.mp4"));
+        assert_eq!(std::fs::read(at("x-phases.mp4")).unwrap(), b"mine");
+    }
+    std::fs::remove_file(at("x-phases.mp4")).unwrap();
+    json(&call);
+    assert_eq!(std::fs::read(at("x.half.mp4")).unwrap(), b"mine");
+    // Those of an earlier run are made again when it is resumed.
+    std::fs::remove_file(at("x/phase_000001.png")).unwrap();
+    json(&[&call[..], &["--resume"]].concat());
+    std::fs::write(at("x-phases.mp4"), "old").unwrap();
+    json(&[&call[..], &["--overwrite"]].concat());
+    assert_ne!(std::fs::read(at("x-phases.mp4")).unwrap(), b"old");
+    // The film that is read is not replaced.
+    let film = std::fs::read(at("x.mp4")).unwrap();
+    let error = refusal(&["video", &out, "--depth-beside", "--overwrite", "-o", &out]);
+    assert!(error.contains("input"), "{error}");
+    assert_eq!(std::fs::read(at("x.mp4")).unwrap(), film);
 }

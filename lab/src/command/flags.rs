@@ -1,5 +1,6 @@
 //! Flags that several commands share.
 
+use super::request::Request;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -11,6 +12,7 @@ use phasefront_lab::models::Precision;
 use phasefront_lab::output::Holding;
 use phasefront_lab::rgbd::DepthOptions;
 use phasefront_lab::{Error, Result, gpu, models};
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 /// The display that a hologram is for.
@@ -29,6 +31,15 @@ impl DisplayFlags {
     /// Whether a display is asked for.
     pub(crate) fn is_given(&self) -> bool {
         self.display.is_some()
+    }
+
+    /// Notes the display, which [`Self::read`] gives.
+    pub(crate) fn record(&self, display: &Display, request: &mut Request) -> Result<()> {
+        let DisplayFlags {
+            display: name,
+            offset_mm: _, // It is part of `display`.
+        } = self;
+        request.display(name.as_deref(), display)
     }
 
     /// Of a command that knows red, green and blue alone.
@@ -124,6 +135,22 @@ impl EncoderFlags {
             local_steps: Some(local_steps),
             midpoint_steps,
         }
+    }
+
+    pub(crate) fn record(&self, request: &mut Request) -> Result<()> {
+        let EncoderFlags {
+            encoder,
+            prefilter,
+            dark,
+            local_steps,
+            midpoint_steps,
+        } = self;
+        request.choice("--encoder", encoder.as_ref());
+        request.file("--prefilter", prefilter.as_ref().map(Path::new))?;
+        request.set("--dark", *dark);
+        request.set("--local-steps", *local_steps);
+        request.set("--midpoint-steps", Some(*midpoint_steps));
+        Ok(())
     }
 
     /// For fields that no network of a pair makes.
@@ -269,6 +296,19 @@ enum UnitName {
 }
 
 impl DepthFlags {
+    pub(crate) fn record(&self, request: &mut Request) {
+        let DepthFlags {
+            depth_unit,
+            depth_scale,
+            near,
+            far,
+        } = self;
+        request.choice("--depth-unit", Some(depth_unit));
+        request.set("--depth-scale", *depth_scale);
+        request.set("--near", *near);
+        request.set("--far", *far);
+    }
+
     pub(crate) fn options(&self) -> DepthOptions {
         let unit = match self.depth_unit {
             UnitName::Normalized => DepthUnit::Normalized,
@@ -308,6 +348,12 @@ enum BackendName {
 }
 
 impl BackendFlags {
+    pub(crate) fn record(&self, request: &mut Request) {
+        let BackendFlags { backend, gpu } = self;
+        request.choice("--backend", Some(backend));
+        request.set("--gpu", gpu.as_ref());
+    }
+
     /// Which GPU, if one is wanted.
     pub(crate) fn device(&self) -> Result<Option<DeviceOptions>> {
         match (self.backend, &self.gpu) {

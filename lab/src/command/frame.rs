@@ -2,25 +2,26 @@
 //! sees depth; and how it lies on the modulator.
 
 use super::flags::DepthFlags;
+use super::request::Request;
 use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3};
 use phasefront::{Display, RgbdFrame};
 use phasefront_lab::depth_network::{Colours, DepthNetwork};
 use phasefront_lab::fit::{Fit, Placement};
 use phasefront_lab::photo;
-use phasefront_lab::{Error, Result, files, rgbd};
+use phasefront_lab::{Error, Result, files, rgbd, sequence};
 use std::path::{Path, PathBuf};
 
 /// An RGB-D image, what its depth means, and how it lies on the modulator.
 #[derive(Default, Args)]
 pub(crate) struct FrameFlags {
-    /// Colour image, PNG or JPEG
+    /// Colour image, PNG or JPEG; or a folder of them
     #[arg(long, value_name = "FILE", conflicts_with = "photo")]
     rgb: Option<PathBuf>,
-    /// Depth image: grey PNG of 8 or 16 bits, or .npy
+    /// Depth image: grey PNG of 8 or 16 bits, or .npy; or a folder of them, with the names of those of --rgb
     #[arg(long, value_name = "FILE", requires = "rgb", conflicts_with = "depth_network")]
     depth: Option<PathBuf>,
-    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth)
+    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them
     #[arg(long, value_name = "FILE")]
     photo: Option<PathBuf>,
     #[command(flatten)]
@@ -47,6 +48,18 @@ pub(crate) struct SeenDepthFlags {
 }
 
 impl SeenDepthFlags {
+    pub(crate) fn record(&self, request: &mut Request) -> Result<()> {
+        let SeenDepthFlags {
+            depth_network,
+            depth_network_colours,
+            invert,
+        } = self;
+        request.file("--depth-network", depth_network.as_deref())?;
+        request.choice("--depth-network-colours", Some(depth_network_colours));
+        request.switch("--invert", *invert);
+        Ok(())
+    }
+
     pub(crate) fn network(&self) -> Option<&Path> {
         self.depth_network.as_deref()
     }
@@ -106,7 +119,91 @@ impl FitName {
     }
 }
 
+/// A picture of a folder.
+pub(crate) struct Picture {
+    /// Its file's name without what follows the last dot.
+    pub(crate) name: String,
+    /// Colour, and depth where that is a file of its own; one of them alone where the other is missing.
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) is_whole: bool,
+}
+
+fn of_one_folder(folder: &Path) -> Result<Vec<Picture>> {
+    let found = sequence::images(folder)?.into_iter().map(|(name, path)| Picture {
+        name: name.text,
+        files: vec![path],
+        is_whole: true,
+    });
+    Ok(found.collect())
+}
+
+fn of_two_folders(colour: &Path, depth: &Path) -> Result<Vec<Picture>> {
+    let found = sequence::by_name(colour, depth)?;
+    let pairs = found.pairs.into_iter().map(|(name, colour, depth)| Picture {
+        name,
+        files: vec![colour, depth],
+        is_whole: true,
+    });
+    let alone = found.alone.into_iter().map(|path| Picture {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        files: vec![path],
+        is_whole: false,
+    });
+    Ok(pairs.chain(alone).collect())
+}
+
 impl FrameFlags {
+    /// Notes all but which picture it is.
+    pub(crate) fn record(&self, request: &mut Request) -> Result<()> {
+        let FrameFlags {
+            rgb: _,
+            depth: _,
+            photo: _,
+            seen,
+            fit,
+            depth_numbers,
+        } = self;
+        seen.record(request)?;
+        request.choice("--fit", fit.as_ref());
+        depth_numbers.record(request);
+        Ok(())
+    }
+
+    /// The pictures of the folders that --rgb and --depth, or --photo, name; `None` where they name files.
+    pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
+        let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());
+        let (rgb, depth) = (is_folder(&self.rgb), is_folder(&self.depth));
+        if let Some(folder) = self.photo.as_deref().filter(|path| path.is_dir()) {
+            return of_one_folder(folder).map(Some);
+        }
+        match (&self.rgb, &self.depth) {
+            (Some(colour), Some(depths)) if rgb && depth => of_two_folders(colour, depths).map(Some),
+            (Some(colour), None) if rgb => of_one_folder(colour).map(Some),
+            (Some(_), Some(_)) if rgb || depth => Err(Error::Input(
+                "--rgb and --depth name two files, or two folders of files with equal names".into(),
+            )),
+            _ => Ok(None),
+        }
+    }
+
+    /// The folders that [`Self::pictures`] reads.
+    pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
+        [&self.rgb, &self.depth, &self.photo]
+            .into_iter()
+            .filter_map(|path| path.as_deref())
+    }
+
+    /// The same for one picture of a folder.
+    pub(crate) fn take(&mut self, picture: &Picture) {
+        let mut files = picture.files.iter().cloned();
+        if self.photo.is_some() {
+            self.photo = files.next();
+        } else {
+            self.rgb = files.next();
+            self.depth = files.next();
+        }
+    }
+
     /// The file of the picture.
     pub(crate) fn source(&self) -> Option<&Path> {
         self.photo.as_deref().or(self.rgb.as_deref())

@@ -1,8 +1,10 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
 use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, progress_bar};
-use super::frame::FrameFlags;
+use super::frame::{FrameFlags, Picture};
 use super::method::{CoreMethod, Parts};
+use super::request::{Before, Request};
+use super::stills;
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use ndarray::Array3;
@@ -40,9 +42,16 @@ pub(crate) struct Hologram {
     /// Write what the modulator's input takes there too: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
     #[arg(long, value_name = "FRAME.png")]
     packed: Option<PathBuf>,
-    /// The hologram: a PNG of modulator levels
-    #[arg(short, value_name = "OUT.png")]
+    /// The hologram: a PNG of modulator levels; for folders of pictures the folder of their holograms, NAME.png for
+    /// each picture NAME
+    #[arg(short, value_name = "OUT.png|DIR")]
     output: PathBuf,
+    /// For folders of pictures: keep the holograms that an earlier run with the same flags made
+    #[arg(long, conflicts_with = "overwrite")]
+    resume: bool,
+    /// For folders of pictures: replace holograms that are there
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// What a hologram is made of, and how.
@@ -191,6 +200,15 @@ impl Made {
 
 impl Hologram {
     pub(crate) fn run(mut self, json: bool) -> Result<()> {
+        if let Some(pictures) = self.making.pictures()? {
+            return self.stills(json, pictures);
+        }
+        if self.resume || self.overwrite {
+            return Err(Error::Input(
+                "--resume and --overwrite go with folders of pictures, as --rgb DIR --depth DIR; a file is replaced"
+                    .into(),
+            ));
+        }
         output::file(&self.output, &["png"])?;
         if let Some(path) = &self.complex {
             files::declare_complex(path)?;
@@ -205,6 +223,21 @@ impl Hologram {
         let judged = self.judge.then(|| judge(&display, &made)).transpose()?;
         self.report(json, &made, judged.as_ref());
         Ok(())
+    }
+
+    fn stills(self, json: bool, pictures: Vec<Picture>) -> Result<()> {
+        let one = [
+            (self.complex.is_some(), "--complex"),
+            (self.packed.is_some(), "--packed"),
+            (self.judge, "--judge"),
+        ];
+        if let Some((_, flag)) = one.iter().find(|(is_given, _)| *is_given) {
+            return Err(Error::Input(format!(
+                "{flag} goes with one picture, not with a folder of them"
+            )));
+        }
+        let before = Before::of_flags(self.resume, self.overwrite);
+        stills::run(self.making, pictures, &self.output, before, json)
     }
 
     fn write(&self, display: &DisplayFile, made: &Made) -> Result<()> {
@@ -301,6 +334,51 @@ impl Making {
 
     pub(crate) fn display(&self) -> Result<DisplayFile> {
         self.display.read()
+    }
+
+    /// Notes all but which picture it is of.
+    pub(crate) fn record(&self, display: &phasefront::Display, request: &mut Request) -> Result<()> {
+        let Making {
+            frame,
+            ldi: _, // It is one picture.
+            method,
+            network,
+            precision,
+            planes,
+            taps,
+            occlusion,
+            encoder,
+            scale,
+            backend,
+            display: flags,
+            keeps_field: _,
+        } = self;
+        frame.record(request)?;
+        request.choice("--method", method.as_ref());
+        request.name_or_file("--network", network.as_deref())?;
+        request.choice("--precision", Some(precision));
+        request.set("--planes", *planes);
+        request.set("--taps", *taps);
+        request.choice("--occlusion", Some(occlusion));
+        encoder.record(request)?;
+        request.set("--scale", *scale);
+        backend.record(request);
+        flags.record(display, request)
+    }
+
+    /// The pictures of folders, where folders are given.
+    fn pictures(&self) -> Result<Option<Vec<Picture>>> {
+        self.frame.pictures()
+    }
+
+    /// The folders that pictures are from.
+    pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
+        self.frame.folders()
+    }
+
+    /// Turns to one picture of a folder.
+    pub(crate) fn take(&mut self, picture: &Picture) {
+        self.frame.take(picture);
     }
 
     /// The file that the image is from.

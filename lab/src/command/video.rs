@@ -7,15 +7,16 @@ use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_s
 use super::frame::SeenDepthFlags;
 use super::hologram::PrecisionName;
 use super::method::{CoreMethod, Parts};
+use super::request::{Before, Request};
 use clap::{Args, ValueEnum};
 use phasefront::input::DepthRange;
 use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
 use phasefront::target::Panel;
 use phasefront::{Brightness, Hologram, Session, SessionOptions, Sweep, Target};
-use phasefront_lab::files::{self, HologramInfo};
+use phasefront_lab::files::HologramInfo;
 use phasefront_lab::{Error, Result, film, gpu};
 use serde_json::json;
-use sink::{Before, Sink};
+use sink::Sink;
 use source::Source;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -25,8 +26,9 @@ use std::time::{Duration, Instant};
 /// Make phase maps and previews of RGB-D video
 #[derive(Args)]
 pub(crate) struct Video {
-    /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, or as TUM's and Redwood's data sets are
-    /// laid; a film (.mp4, by ffmpeg); or - for raw frames on stdin
+    /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, of folders rgb and depth with equal names,
+    /// or as TUM's and Redwood's data sets are laid; a film (.mp4, by ffmpeg); or - for raw frames on stdin. All frames
+    /// have one size
     input: PathBuf,
     /// Names of a folder's colour and depth files, whose * stand for the same: 'left_*.png,left_*_z.png'
     #[arg(long, value_name = "COLOUR,DEPTH")]
@@ -83,14 +85,15 @@ pub(crate) struct Video {
     /// Write a preview of each hologram too, focused at this z
     #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
     preview_mm: Option<f64>,
-    /// Go on where an earlier run with the same flags was left
+    /// Go on where an earlier run with the same flags and input was left
     #[arg(long, requires = "output", conflicts_with_all = ["live", "overwrite"])]
     resume: bool,
     /// Replace what an earlier run made
     #[arg(long, requires = "output")]
     overwrite: bool,
-    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, statistics.json; for NAME.mp4 the folder
-    /// NAME, with a film of the previews and NAME-phases.mp4, without loss, beside it
+    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, request.json, statistics.json; for NAME.mp4
+    /// the folder NAME, with a film of the previews and NAME-phases.mp4, without loss, beside it. It is needed but for
+    /// --live and --json, which report without it
     #[arg(short, value_name = "DIR|NAME.mp4")]
     output: Option<PathBuf>,
 }
@@ -121,16 +124,24 @@ fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
 
 impl Video {
     pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
+        if self.output.is_none() && !self.live && !json {
+            return Err(Error::Input(
+                "no output is asked for: -o DIR writes the holograms; --json alone reports how long they took".into(),
+            ));
+        }
         let rate = self.rate_hz()?;
-        let before = match (self.resume, self.overwrite) {
-            (true, _) => Before::Resume,
-            (_, true) => Before::Overwrite,
-            _ => Before::Refuse,
-        };
+        let before = Before::of_flags(self.resume, self.overwrite);
         let (mut source, (height, width)) = Source::open(&self)?;
         let (options, info) = self.options(height, width, threads, rate)?;
-        let preview_z_m = self.preview_mm.map(|mm| mm / 1e3);
-        let mut sink = Sink::new(self.output.as_deref(), preview_z_m, info, before)?;
+        let preview_mm = self.preview_mm();
+        let request = self.request(&info.display, rate)?;
+        let mut sink = Sink::new(
+            self.output.as_deref(),
+            preview_mm.map(|mm| mm / 1e3),
+            info,
+            before,
+            request,
+        )?;
         let bar = source.progress();
         let start = Instant::now();
         let memory = memory_mb();
@@ -142,6 +153,57 @@ impl Video {
         bar.finish_and_clear();
         sink.finish(rate)?;
         self.report(json, &statistics, seconds, &sink, [memory, memory_mb()])
+    }
+
+    /// z of the previews; a film is made of them.
+    fn preview_mm(&self) -> Option<f64> {
+        let film = self.output.as_deref().filter(|path| film::is_film(path));
+        self.preview_mm.or(film.map(|_| 0.0))
+    }
+
+    /// All flags that decide what is written, but for what frames are of: each is recognised by itself.
+    fn request(&self, display: &phasefront::Display, rate: f64) -> Result<Request> {
+        let Video {
+            input: _,
+            pairs: _,
+            depth_video: _,
+            depth_beside: _,
+            seen,
+            raw: _,
+            raw_depth: _,
+            depth,
+            method,
+            network,
+            precision,
+            encoder,
+            size: _, // It is the display's.
+            display: flags,
+            backend,
+            brightness,
+            rate: _,
+            live,
+            adaptive,
+            repeat: _,
+            preview_mm: _,
+            resume: _,
+            overwrite: _,
+            output: _,
+        } = self;
+        let mut request = Request::new("video");
+        seen.record(&mut request)?;
+        depth.record(&mut request);
+        request.choice("--method", Some(method));
+        request.name_or_file("--network", network.as_deref())?;
+        request.choice("--precision", Some(precision));
+        encoder.record(&mut request)?;
+        flags.record(display, &mut request)?;
+        backend.record(&mut request);
+        request.choice("--brightness", Some(brightness));
+        request.set("--rate", Some(rate));
+        request.switch("--live", *live);
+        request.switch("--adaptive", *adaptive);
+        request.set("--preview-mm", self.preview_mm());
+        Ok(request)
     }
 
     /// Frames a second of the input.
@@ -248,23 +310,24 @@ impl Video {
     ) -> Result<Statistics> {
         let midpoint_steps = options.encoder.midpoint_steps;
         let session = start(options, RunningMode::Video)?;
-        let mut resuming = self.resume;
+        let mut resuming = sink.resumes();
         let mut frame = 0;
-        while let Some(image) = source.next()? {
-            let image = image.camera_frame(timestamp_ns(frame, rate))?;
-            let written = if resuming { sink.written()? } else { None };
+        while let Some(read) = source.next()? {
+            let named = |e: phasefront::Error| Error::Input(format!("{}: {e}", source.name(frame)));
+            let image = read.camera_frame(timestamp_ns(frame, rate))?;
+            let written = if resuming { sink.written(&read)? } else { None };
             resuming = written.is_some();
             match written {
                 // These remember more than a replay tells them, so that their frames are made again.
                 Some(scale) if self.method == CoreMethod::Auto || midpoint_steps > 0 => {
-                    session.process(&image)?;
+                    session.process(&image).map_err(named)?;
                     sink.skip(scale);
                 }
                 Some(scale) => {
-                    session.replay(&image, scale)?;
+                    session.replay(&image, scale).map_err(named)?;
                     sink.skip(scale);
                 }
-                None => sink.take(&session.process(&image)?)?,
+                None => sink.take(&session.process(&image).map_err(named)?, Some(&read))?,
             }
             frame += 1;
             bar.inc(1);
@@ -310,7 +373,7 @@ impl Video {
                 let mut result = Ok(());
                 for hologram in results {
                     if result.is_ok() {
-                        result = sink.take(&hologram);
+                        result = sink.take(&hologram, None);
                     }
                 }
                 result
@@ -326,9 +389,11 @@ impl Video {
         written.map_err(|_| Error::Input("the writer of results panicked".into()))??;
         let statistics = submitted?;
         if let Some((timestamp_ns, error)) = failure.lock().unwrap_or_else(|e| e.into_inner()).take() {
+            let frame = (timestamp_ns as f64 * rate / 1e9).round() as usize;
             log::warn!(
-                "{} frames failed, the first at {timestamp_ns} ns: {error}",
-                statistics.failed
+                "{} frames failed, the first {}: {error}",
+                statistics.failed,
+                source.name(frame)
             );
         }
         Ok(statistics)
@@ -361,12 +426,7 @@ impl Video {
             "stage_ms": stages, "total_ms": ms(s.times.total()), "backend": s.backend.name,
             "backend_reason": s.backend.why, "rung": s.rung, "scale_change": change, "memory_mb": memory_mb,
         });
-        if let Some(dir) = sink.folder() {
-            files::write_atomically(&dir.join("statistics.json"), |file| {
-                serde_json::to_writer_pretty(&mut *file, &result)?;
-                std::io::Write::write_all(file, b"\n")
-            })?;
-        }
+        sink.write_report(&result)?;
         super::print(
             json,
             &result,
@@ -384,7 +444,7 @@ impl Video {
     }
 }
 
-fn timestamp_ns(frame: u64, rate_hz: f64) -> u64 {
+fn timestamp_ns(frame: usize, rate_hz: f64) -> u64 {
     (frame as f64 * 1e9 / rate_hz) as u64
 }
 

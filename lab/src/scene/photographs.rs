@@ -5,6 +5,7 @@ use std::path::Path;
 use super::Texture;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::fingerprint::Fingerprint;
 
 /// What the names of pictures end in.
 const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
@@ -34,16 +35,12 @@ pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
 
 /// FNV-1a over sizes and texels, by which a data set knows its photographs again.
 pub fn fingerprint(photographs: &[Texture]) -> u64 {
-    let mut hash = 0xcbf2_9ce4_8422_2325u64;
-    let mut take = |byte: u8| hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3);
+    let mut hash = Fingerprint::default();
     for photograph in photographs {
-        for size in [photograph.width(), photograph.height()] {
-            (size as u64).to_le_bytes().into_iter().for_each(&mut take);
-        }
-        let texels = photograph.texels().iter().flatten();
-        texels.copied().for_each(&mut take);
+        hash.numbers(&[photograph.width(), photograph.height()]);
+        hash.bytes(photograph.texels().as_flattened());
     }
-    hash
+    hash.value()
 }
 
 #[cfg(test)]

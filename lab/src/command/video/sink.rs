@@ -1,29 +1,27 @@
 //! Writes what comes out, and takes up where it was left.
 
-use ndarray::ArrayView3;
+use crate::command::request::{Before, Claim, Request, already, names_of};
+use ndarray::{Array3, ArrayView3};
 use phasefront::Hologram;
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::film::{self, Quality};
+use phasefront_lab::output::{self, Holding};
+use phasefront_lab::video::VideoFrame;
 use phasefront_lab::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// What becomes of frames that lie in the folder already.
-#[derive(Clone, Copy, PartialEq)]
-pub(super) enum Before {
-    /// They are told of, and nothing is done.
-    Refuse,
-    /// They stay, and what is missing is made.
-    Resume,
-    /// They go.
-    Overwrite,
-}
+/// The report of a run, in its folder.
+const STATISTICS: &str = "statistics.json";
 
 /// Writes what comes out, and keeps what the report needs.
 pub(super) struct Sink {
     folder: Option<PathBuf>,
-    film: Option<PathBuf>,
+    /// Of what is seen, and of the phases.
+    films: Option<[PathBuf; 2]>,
     preview_z_m: Option<f64>,
     info: HologramInfo,
+    request: Request,
+    claim: Option<Claim>,
     pub(super) scales: Vec<f32>,
 }
 
@@ -34,38 +32,55 @@ impl Sink {
         preview_z_m: Option<f64>,
         info: HologramInfo,
         before: Before,
+        request: Request,
     ) -> Result<Self> {
-        let film = output.filter(|path| film::is_film(path));
-        if let Some(path) = film {
-            film::check(path)?;
-            if !files::has_extension(path, "mp4") {
-                return Err(Error::file(path, "a film is written as .mp4"));
+        let films = match output.filter(|path| film::is_film(path)) {
+            Some(path) => {
+                film::check(path)?;
+                let name = format!("{}-phases.mp4", path.file_stem().unwrap_or_default().display());
+                let films = [path.to_owned(), path.with_file_name(name)];
+                for path in &films {
+                    output::file(path, &["mp4"])?;
+                }
+                Some(films)
             }
-            if path.exists() && before == Before::Refuse {
-                return Err(already(path));
-            }
-        }
-        let folder = match film {
-            Some(path) => Some(path.with_extension("")),
+            None => None,
+        };
+        let folder = match &films {
+            Some([path, _]) => Some(path.with_extension("")),
             None => output.map(Path::to_owned),
         };
-        let preview_z_m = preview_z_m.or(film.map(|_| 0.0));
-        let sink = Sink {
+        let film = films.iter().flatten().find(|path| path.exists());
+        if let (Some(path), Before::Refuse) = (film, before) {
+            return Err(already(path));
+        }
+        let mut claim = None;
+        if let Some(folder) = &folder {
+            output::folder(folder, Holding::Anything)?;
+            let new = Claim::new(folder, &request, before, |name| is_frame(name) || name == STATISTICS)?;
+            // Films beside a folder without frames are not of an earlier run.
+            if let (Some(path), Before::Resume, false) = (film, before, new.resumes) {
+                return Err(already(path));
+            }
+            if before == Before::Overwrite {
+                remove_made(folder)?;
+            }
+            claim = Some(new);
+        }
+        Ok(Sink {
             folder,
-            film: film.map(Path::to_owned),
+            films,
             preview_z_m,
             info,
+            request,
+            claim,
             scales: Vec::new(),
-        };
-        if let Some(folder) = &sink.folder {
-            std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, format!("cannot be made: {e}")))?;
-            match before {
-                Before::Refuse if sink.phase(folder, 0).exists() => return Err(already(folder)),
-                Before::Overwrite => remove_frames(folder)?,
-                _ => {}
-            }
-        }
-        Ok(sink)
+        })
+    }
+
+    /// Whether frames of an earlier run may be there.
+    pub(super) fn resumes(&self) -> bool {
+        self.claim.as_ref().is_some_and(|claim| claim.resumes)
     }
 
     fn phase(&self, folder: &Path, index: usize) -> PathBuf {
@@ -76,28 +91,28 @@ impl Sink {
         folder.join(format!("preview_{index:06}.png"))
     }
 
-    /// The scale of the next frame's hologram where it is written already.
-    pub(super) fn written(&self) -> Result<Option<f32>> {
+    /// The scale of the next frame's hologram where it is written already, of `frame`.
+    pub(super) fn written(&self, frame: &VideoFrame) -> Result<Option<f32>> {
         let Some(folder) = &self.folder else { return Ok(None) };
         let path = self.phase(folder, self.scales.len());
         let seen = self.preview_z_m.is_none() || self.preview(folder, self.scales.len()).exists();
         if !path.exists() || !seen {
             return Ok(None);
         }
-        let files::Hologram::PhaseOnly(_, info) = files::read_hologram(&path)? else {
-            return Err(Error::file(path, "holds no phases"));
-        };
-        let same = HologramInfo {
-            scale: None,
-            ..info.clone()
-        } == self.info;
-        match (same, info.scale) {
-            (true, Some(scale)) => Ok(Some(scale)),
+        match files::read_made_of(&path)? {
+            Some((made_of, Some(scale))) if made_of == self.made_of(frame) => Ok(Some(scale)),
             _ => Err(Error::file(
                 path,
-                "was made for another display or by another encoder; --resume needs the same flags, --overwrite begins anew",
+                "was made of another frame than this run has there; --resume needs the same input, --overwrite begins anew",
             )),
         }
+    }
+
+    /// By what the hologram of `frame` is recognised.
+    fn made_of(&self, frame: &VideoFrame) -> String {
+        let mut all = self.request.fingerprint();
+        frame.fingerprint(&mut all);
+        all.to_string()
     }
 
     /// Counts a frame that was written before.
@@ -105,7 +120,8 @@ impl Sink {
         self.scales.push(scale);
     }
 
-    pub(super) fn take(&mut self, hologram: &Hologram) -> Result<()> {
+    /// Writes the next hologram, made of `frame`, which a live stream does not know any more: it is not resumed.
+    pub(super) fn take(&mut self, hologram: &Hologram, frame: Option<&VideoFrame>) -> Result<()> {
         let index = self.scales.len();
         self.scales.push(hologram.scale());
         let Some(folder) = &self.folder else {
@@ -117,47 +133,57 @@ impl Sink {
             hologram.preview(z_m, height, width, &mut rgba)?;
             files::write_rgba(&self.preview(folder, index), width, height, &rgba)?;
         }
-        let levels = ArrayView3::from_shape((hologram.colours(), height, width), hologram.levels())
-            .map_err(|e| Error::Input(e.to_string()))?;
+        let shape = (hologram.colours(), height, width);
         let info = HologramInfo {
             scale: Some(hologram.scale()),
             ..self.info.clone()
         };
-        files::write_phase_only(&self.phase(folder, index), levels, &info)
+        let path = self.phase(folder, index);
+        match frame {
+            None => {
+                let levels = ArrayView3::from_shape(shape, hologram.levels());
+                files::write_phase_only(&path, levels.map_err(|e| Error::Input(e.to_string()))?, &info)
+            }
+            Some(frame) => {
+                let levels = Array3::from_shape_vec(shape, hologram.levels().to_vec());
+                let levels = levels.map_err(|e| Error::Input(e.to_string()))?;
+                let made_of = self.made_of(frame);
+                files::write_made_of(&path, &files::Hologram::PhaseOnly(levels, info), &made_of)
+            }
+        }
     }
 
     /// Makes the films, where they are asked for: what is seen, and without loss the phases.
     pub(super) fn finish(&self, rate_hz: f64) -> Result<()> {
-        let (Some(path), Some(folder)) = (&self.film, &self.folder) else {
+        let (Some([seen, phases]), Some(folder)) = (&self.films, &self.folder) else {
             return Ok(());
         };
-        film::write(path, &folder.join("preview_%06d.png"), rate_hz, Quality::Seen)?;
-        let phases = path.with_file_name(format!("{}-phases.mp4", path.file_stem().unwrap_or_default().display()));
-        film::write(&phases, &folder.join("phase_%06d.png"), rate_hz, Quality::Lossless)
+        film::write(seen, folder, "preview_%06d.png", rate_hz, Quality::Seen)?;
+        film::write(phases, folder, "phase_%06d.png", rate_hz, Quality::Lossless)
     }
 
-    pub(super) fn folder(&self) -> Option<&Path> {
-        self.folder.as_deref()
+    /// Writes the report.
+    pub(super) fn write_report(&self, report: &serde_json::Value) -> Result<()> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        files::write_atomically(&folder.join(STATISTICS), |file| {
+            serde_json::to_writer_pretty(&mut *file, report)?;
+            std::io::Write::write_all(file, b"\n")
+        })
     }
 }
 
-fn already(path: &Path) -> Error {
-    Error::file(
-        path,
-        "holds what an earlier run made; --resume goes on with it, --overwrite makes it anew",
-    )
+fn is_frame(name: &str) -> bool {
+    let number = name.strip_prefix("phase_").or(name.strip_prefix("preview_"));
+    let digits = number.and_then(|rest| rest.strip_suffix(".png"));
+    digits.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()))
 }
 
-/// Removes the frames of an earlier run, and nothing else.
-fn remove_frames(folder: &Path) -> Result<()> {
-    let refuse = |e: std::io::Error| Error::file(folder, format!("cannot be cleared: {e}"));
-    for entry in std::fs::read_dir(folder).map_err(refuse)? {
-        let path = entry.map_err(refuse)?.path();
-        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let number = name.strip_prefix("phase_").or(name.strip_prefix("preview_"));
-        let is_frame = number.is_some_and(|n| n.len() == 6 && n.bytes().all(|b| b.is_ascii_digit()));
-        if is_frame && files::has_extension(&path, "png") {
-            std::fs::remove_file(&path).map_err(refuse)?;
+/// Removes what an earlier run made, and nothing else.
+fn remove_made(folder: &Path) -> Result<()> {
+    for name in names_of(folder)? {
+        if is_frame(&name) || name == STATISTICS {
+            let path = folder.join(name);
+            std::fs::remove_file(&path).map_err(|e| Error::file(path, format!("cannot be removed: {e}")))?;
         }
     }
     Ok(())

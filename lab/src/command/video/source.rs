@@ -9,18 +9,28 @@ use phasefront_lab::depth_network::DepthNetwork;
 use phasefront_lab::film::{self, Film, Pixels};
 use phasefront_lab::sequence::{self, Sequence};
 use phasefront_lab::video::{self, RawVideo, VideoFrame};
-use phasefront_lab::{Error, Result, rgbd};
+use phasefront_lab::{Error, Result, output, rgbd};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Frames from where they come.
-pub(super) enum Source {
+/// Frames from where they come, all of one size.
+pub(super) struct Source {
+    input: Input,
+    /// How the frames' input is called.
+    path: PathBuf,
+    /// (H, W) of colour and of depth of the first frame that was given.
+    shapes: Option<[(usize, usize); 2]>,
+    given: usize,
+}
+
+enum Input {
     Folder(Folder),
     Film(Box<FilmSource>),
     Pipe { raw: RawVideo, first: Option<VideoFrame> },
 }
 
-pub(super) struct Folder {
+struct Folder {
     paths: Vec<(PathBuf, PathBuf)>,
     unit: DepthUnit,
     invert: bool,
@@ -30,7 +40,7 @@ pub(super) struct Folder {
     total: usize,
 }
 
-pub(super) struct FilmSource {
+struct FilmSource {
     colour: Film,
     depth: FilmDepth,
     unit: DepthUnit,
@@ -56,6 +66,70 @@ enum FilmDepth {
 impl Source {
     /// The source that `flags` name, and the (H, W) of its first frame.
     pub(super) fn open(flags: &Video) -> Result<(Source, (usize, usize))> {
+        let (input, shape) = Input::open(flags)?;
+        let source = Source {
+            input,
+            path: flags.input.clone(),
+            shapes: None,
+            given: 0,
+        };
+        Ok((source, shape))
+    }
+
+    /// The next frame; None at the end.
+    ///
+    /// # Errors
+    /// A frame that cannot be read, or of another size than those before it.
+    pub(super) fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+        let Some(frame) = self.input.next()? else {
+            return Ok(None);
+        };
+        let shapes = [frame.shape(), frame.depth_shape()];
+        let first = *self.shapes.get_or_insert(shapes);
+        if shapes != first {
+            let said = |[(h, w), (dh, dw)]: [(usize, usize); 2]| format!("{w}×{h} with depth of {dw}×{dh}");
+            return Err(Error::Input(format!(
+                "{}: is {}, the first frame {}; frames of a video have one size, and pictures of any size go to `phasefront hologram` with folders for --rgb and --depth",
+                self.name(self.given),
+                said(shapes),
+                said(first)
+            )));
+        }
+        self.given += 1;
+        Ok(Some(frame))
+    }
+
+    /// What a frame is called in messages.
+    pub(super) fn name(&self, frame: usize) -> String {
+        match &self.input {
+            Input::Folder(folder) => {
+                let (colour, depth) = &folder.paths[frame % folder.paths.len()];
+                format!("{} with {}", colour.display(), depth.display())
+            }
+            _ => format!("{}, frame {frame}", self.path.display()),
+        }
+    }
+
+    /// Whether frames are there before they are due.
+    pub(super) fn is_stored(&self) -> bool {
+        !matches!(self.input, Input::Pipe { .. })
+    }
+
+    pub(super) fn progress(&self) -> ProgressBar {
+        let frames = match &self.input {
+            Input::Folder(folder) => Some(folder.total as u64),
+            Input::Film(film) => film.frames,
+            Input::Pipe { .. } => None,
+        };
+        match frames {
+            Some(frames) => progress_bar(frames, "frames"),
+            None => progress_count("frames"),
+        }
+    }
+}
+
+impl Input {
+    fn open(flags: &Video) -> Result<(Input, (usize, usize))> {
         let unit = flags.depth.options().unit;
         if flags.input.as_os_str() == "-" {
             return open_pipe(flags, unit);
@@ -85,6 +159,13 @@ impl Source {
         };
         // The layouts that say their unit never hold normalized depth.
         let unit = said.filter(|_| unit == DepthUnit::Normalized).unwrap_or(unit);
+        let folders: BTreeSet<_> = (paths.iter())
+            .flat_map(|(colour, depth)| [colour.parent(), depth.parent()])
+            .flatten()
+            .collect();
+        for folder in folders {
+            output::reading(folder)?;
+        }
         let shape = video::read_frame(&paths[0].0, &paths[0].1, unit)?.shape();
         let total = paths.len() * flags.repeat as usize;
         let folder = Folder {
@@ -95,34 +176,17 @@ impl Source {
             next: 0,
             total,
         };
-        Ok((Source::Folder(folder), shape))
+        Ok((Input::Folder(folder), shape))
     }
 
-    pub(super) fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
+    fn next(&mut self) -> Result<Option<Arc<VideoFrame>>> {
         match self {
-            Source::Pipe { raw, first } => match first.take() {
+            Input::Pipe { raw, first } => match first.take() {
                 Some(frame) => Ok(Some(Arc::new(frame))),
                 None => Ok(raw.read(&mut std::io::stdin().lock())?.map(Arc::new)),
             },
-            Source::Film(film) => Ok(film.next()?.map(Arc::new)),
-            Source::Folder(folder) => folder.next(),
-        }
-    }
-
-    /// Whether frames are there before they are due.
-    pub(super) fn is_stored(&self) -> bool {
-        !matches!(self, Source::Pipe { .. })
-    }
-
-    pub(super) fn progress(&self) -> ProgressBar {
-        let frames = match self {
-            Source::Folder(folder) => Some(folder.total as u64),
-            Source::Film(film) => film.frames,
-            Source::Pipe { .. } => None,
-        };
-        match frames {
-            Some(frames) => progress_bar(frames, "frames"),
-            None => progress_count("frames"),
+            Input::Film(film) => Ok(film.next()?.map(Arc::new)),
+            Input::Folder(folder) => folder.next(),
         }
     }
 }
@@ -150,7 +214,7 @@ impl Folder {
     }
 }
 
-fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
+fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
     let Some((width, height)) = flags.raw else {
         return Err(Error::Input(
             "raw frames on stdin need --raw WxH, the size of their colour".into(),
@@ -166,10 +230,10 @@ fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))>
     if first.is_none() {
         return Err(Error::Input("stdin holds no frame".into()));
     }
-    Ok((Source::Pipe { raw, first }, (height, width)))
+    Ok((Input::Pipe { raw, first }, (height, width)))
 }
 
-fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))> {
+fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
     let path = &flags.input;
     let depth = match (&flags.depth_video, flags.depth_beside, flags.seen.network()) {
         (Some(depth), false, None) => FilmDepth::Film(Film::open(depth, Pixels::Grey)?),
@@ -200,7 +264,7 @@ fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Source, (usize, usize))>
         .as_ref()
         .ok_or_else(|| Error::file(path, "holds no picture"))?;
     let shape = first.shape();
-    Ok((Source::Film(Box::new(film)), shape))
+    Ok((Input::Film(Box::new(film)), shape))
 }
 
 impl FilmSource {
