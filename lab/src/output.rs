@@ -65,8 +65,7 @@ pub fn check_file(path: &Path) -> Result<()> {
     Place::of_file(path)?.check_writable()
 }
 
-/// Declares `path` an output file of this command that an earlier one does not lose its place to: it is absent, or
-/// `overwrite` is set.
+/// Declares `path` an output file of this command that must not exist yet, unless `overwrite` is set.
 ///
 /// # Errors
 /// Those of [`file`]; a file that is there.
@@ -118,6 +117,16 @@ pub fn folder(path: &Path, holding: Holding) -> Result<()> {
 /// An output of this command.
 pub fn reading(path: &Path) -> Result<()> {
     places().add_input(path)
+}
+
+/// Notes that this command reads the files of the folder at `path`; some may not be read before much work is done.
+///
+/// # Errors
+/// Those of [`reading`]. A folder that cannot be read is left to whoever reads it.
+pub fn reading_folder(path: &Path) -> Result<()> {
+    reading(path)?;
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    entries.map(|entry| entry.path()).try_for_each(|path| reading(&path))
 }
 
 /// Makes the folder at `path` and those that it lies in, where they are not there.

@@ -149,7 +149,20 @@ fn an_input_is_never_an_output() {
     folder.succeeds(&["pack", "h.png", "-o", "frame.png"]);
     folder.succeeds(&["scene", "--seed", "1", "--size", "48x32", "--layers", "2", "-o", "ldi"]);
     fs::write(folder.path("model.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    fs::create_dir_all(folder.path("captures/blue")).unwrap();
+    fs::copy(folder.path("rgb.png"), folder.path("captures/blue/diffuser.png")).unwrap();
+    let capture = "captures/blue/diffuser.png";
     let calls: &[&[&str]] = &[
+        &[
+            "calibrate",
+            "lut",
+            "--captures",
+            "captures",
+            "--overwrite",
+            "-o",
+            capture,
+        ],
+        &["calibrate", "laser", "captures", "--overwrite", "-o", capture],
         &with(&SMALL, &["-o", "rgb.png"]),
         &with(&SMALL, &["-o", "depth.png"]),
         &with(&SMALL, &["-o", "./sub/../rgb.png"]),
@@ -266,6 +279,10 @@ fn folders_and_special_files_are_never_replaced() {
     }
     let null = fs::metadata("/dev/null").unwrap();
     assert!(null.file_type().is_char_device());
+    // The three files of a packed hologram.
+    fs::create_dir(folder.path("frame-blue.png")).unwrap();
+    let pack = ["pack", "h.png", "--display", "holoeye-pluto", "-o", "frame.png"];
+    refuses(&folder, &pack, &["frame-blue.png", "is a folder"]);
     fs::write(folder.path("file"), "mine").unwrap();
     refuses(&folder, &["scene", "--seed", "1", "-o", "file"], &["file", "is a file"]);
     refuses(

@@ -91,7 +91,8 @@ impl Lut {
         for folder in [&self.patterns, &self.full, &self.report].into_iter().flatten() {
             output::folder(folder, self.overwrite.holding())?;
         }
-        (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))
+        (self.output.iter()).try_for_each(|path| output::new_file(path, &[], self.overwrite.is_given()))?;
+        self.captures.iter().try_for_each(|captures| reading_captures(captures))
     }
 
     fn write_patterns(&self, json: bool, pattern: &Pattern, folder: &Path) -> Result<()> {
@@ -204,6 +205,7 @@ pub(crate) struct Laser {
 impl Laser {
     fn run(self, json: bool) -> Result<()> {
         output::new_file(&self.output, &["png"], self.overwrite.is_given())?;
+        reading_captures(&self.captures)?;
         let display = self.display.read_of_three()?.target.display;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
@@ -569,6 +571,13 @@ impl Rehearse {
         super::print(json, &value, text.join("\n"));
         Ok(())
     }
+}
+
+/// Notes that the photographs of all colours are inputs.
+fn reading_captures(captures: &Path) -> Result<()> {
+    COLOURS
+        .iter()
+        .try_for_each(|colour| output::reading_folder(&captures.join(colour)))
 }
 
 /// The photograph `stem` of `folder`, a PNG or TIFF.
