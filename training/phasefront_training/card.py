@@ -1,4 +1,4 @@
-"""The card of a network: what it is, how it came about and what it was measured to do, as Markdown beside its .onnx."""
+"""The card of a network: its architecture, training, quality and the commands that reproduce it, as Markdown."""
 
 import json
 import math
@@ -16,18 +16,18 @@ SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed",
 
 
 def sets(last):
-    """What is known of each data set that was trained on."""
+    """The description of each data set that the network was trained on."""
     return last.extra["data"].get("sets") or [last.extra["data"]]
 
 
 def names(name, last):
-    """A folder's name for each data set: DATA, or DATA1 and DATA2."""
+    """The folder name of each data set: DATA, or DATA1 and DATA2."""
     count = len(sets(last))
     return [name] if count == 1 else [f"{name}{k + 1}" for k in range(count)]
 
 
 def command(last, init):
-    """The command that makes a checkpoint like `last` again."""
+    """The command that reproduces the checkpoint `last`."""
     architecture, _ = last.networks["hologram"]
     parts = ["python", "-m", "phasefront_training", last.kind, "--data", *names("DATA", last), "-o", "OUT"]
     if last.kind == "stage1":
@@ -51,18 +51,22 @@ def command(last, init):
 
 
 def like(known):
-    """ like photographs, where they are."""
+    """Says that scenes are like photographs, if they are."""
     return " like photographs" if known.get("like") == "photographs" else ""
 
 
+def counted(count, noun):
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def display_of(known, last):
-    """The display that scenes were made for; old checkpoints do not say how deep its volume was."""
+    """The display that scenes were made for. Old checkpoints do not record its volume."""
     mm = known.get("volume_depth_mm")
     return last.display if mm is None else replace(last.display, volume_depth_m=mm * 1e-3)
 
 
 def depth_of(known, last):
-    """, 3 mm deep, where the volume of these scenes is not that of the network's display."""
+    """Says how deep scenes are, if their volume is not that of the network's display."""
     m = display_of(known, last).volume_depth_m
     return "" if math.isclose(m, last.display.volume_depth_m) else f", {m * 1e3:g} mm deep"
 
@@ -73,50 +77,50 @@ def describe(name, last, figures):
     for part, (a, _) in last.networks.items():
         lines.append(
             f"- {part}: {a.layers} layers of {a.filters} filters 3x3{' at half the resolution' if a.halved else ''}, input `{a.input}`, head `{a.head}`; "
-            f"{multiplies_per_pixel(a):,} multiply-accumulates a pixel."
+            f"{multiplies_per_pixel(a):,} multiply-accumulates for each pixel."
         )
     d, data = last.display, last.extra["data"]
     wavelengths = ", ".join(f"{w * 1e9:g}" for w in d.wavelengths_m)
     lines.append(f"- Display: pitch {d.pitch_m * 1e6:g} µm, {wavelengths} nm, volume {d.volume_depth_m * 1e3:g} mm.")
     if "offset_m" in last.extra:
-        lines.append(f"- Offset of the modulator: {last.extra['offset_m'] * 1e3:g} mm.")
-    trained_on = " and ".join(
+        lines.append(f"- Modulator offset: {last.extra['offset_m'] * 1e3:g} mm.")
+    lines.append(
+        f"- Training ({last.kind}): "
+        f"{last.step:,} steps of {counted(last.options['batch'], 'crop')} of {last.options['crop']}² pixels in {last.elapsed_s / 60:.0f} minutes"
+        f" on {last.options['device']} with {counted(last.options['threads'], 'thread')}; {last.options['degraded']:.0%} of the samples had degraded depth."
+    )
+    trained_on = "; ".join(
         f"{each['scenes']} scenes{like(each)} of {each['size']}² pixels, {each['planes']} planes, seed {each['seed']}{depth_of(each, last)}" for each in sets(last)
     )
-    lines.append(
-        f"- Trained ({last.kind}) on {trained_on}: "
-        f"{last.step:,} steps of {last.options['batch']} crops of {last.options['crop']}² pixels in {last.elapsed_s / 60:.0f} minutes"
-        f" on {last.options['device']} with {last.options['threads']} threads; {last.options['degraded']:.0%} of the samples with degraded depth."
-    )
-    lines += ["", "## Figures", ""]
+    lines.append(f"- Training data: {trained_on}.")
+    lines += ["", "## Quality", ""]
     for each in figures:
         measured = each["data"]
         depth = f", {measured['depth']} depth" if "depth" in measured else ""
         known = measured | measured["display"]
-        lines += [f"On {measured['scenes']} scenes{like(measured)} of the {measured['split']} split{depth_of(known, last)}{depth}:", ""]
+        lines += [f"{counted(measured['scenes'], measured['split'] + ' scene')}{like(measured)}{depth_of(known, last)}{depth}:", ""]
         methods = {Path(method).name: found for method, found in each["results"].items()}
         if "offset_mm" in each:
             lines.append(evaluate_encoding.table(methods))
         else:
             lines.append(evaluate.table(methods))
         lines.append("")
-    lines += ["## To make it again", ""]
+    lines += ["## Reproduce", ""]
     seeded = any(a.input == "seeded" for a, _ in last.networks.values())
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += " --scenes-like photographs" if like(each) else ""
         flags += "" if replace(display_of(each, last), corrected=False) == USUAL else " --display …"
-        line = f"The data set: `python -m phasefront_training data -o {folder} -- {flags}`"
+        lines.append(f"    python -m phasefront_training data -o {folder} -- {flags}")
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
-            line += f" and its seeds: `python -m phasefront_training seeds --data {folder} -o {seeds} -- {refined}`"
-        lines.append(f"{line}.")
-    lines += ["", "Then", "", f"    {command(last, last.options.get('init'))}", ""]
+            lines.append(f"    python -m phasefront_training seeds --data {folder} -o {seeds} -- {refined}")
+    lines += [f"    {command(last, last.options.get('init'))}", ""]
     return "\n".join(lines)
 
 
 def write(path, last, figure_files):
-    """Writes the card of `path` (NAME.md) from a checkpoint and files of figures."""
+    """Writes the card `path` (NAME.md) for a checkpoint and files of figures."""
     figures = [json.loads(Path(file).read_text()) for file in figure_files]
     text = describe(Path(path).stem, last, figures)
     with replacing(path) as temporary:

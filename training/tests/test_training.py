@@ -127,9 +127,9 @@ def test_a_training_on_two_data_sets_says_so(data_folder, tmp_path, capsys):
     assert Checkpoint.load(out / "checkpoint.pt").extra["data"]["scenes"] == 10
     assert main(["card", str(out / "checkpoint.pt"), "-o", str(text), *figures_of(other, out, tmp_path)]) == 0
     told = text.read_text()
-    assert "on 5 scenes of 64² pixels, 3 planes, seed 3 and 5 scenes like photographs of 64² pixels, 3 planes, seed 9:" in told
+    assert "Training data: 5 scenes of 64² pixels, 3 planes, seed 3; 5 scenes like photographs of 64² pixels, 3 planes, seed 9." in told
     assert "--scenes-like photographs" in told and "--data DATA1 DATA2" in told and "--dimmed 0.5" in told
-    assert "On 1 scenes like photographs of the test split" in told
+    assert "1 test scene like photographs:" in told
     assert main([*call, "--steps", "2", "--seeds", str(tmp_path)]) == 1
     assert "2 data sets and 1 folders of seeds" in capsys.readouterr().err
 
