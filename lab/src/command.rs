@@ -39,8 +39,9 @@ use std::path::{Path, PathBuf};
 const FILES: &str = "\
 Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
 folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
-or empty, and what `calibrate` and `video` made is kept, unless --overwrite is given. `dataset`, `seeds` and \
-`video --resume` complete what an earlier run began. All this is checked before any work.";
+or empty, and what `calibrate`, `video` and `hologram` with folders made is kept, unless --overwrite is given. \
+`dataset`, `seeds`, `video --resume` and `hologram --resume` complete what an earlier run began. All this is checked \
+before any work.";
 
 /// RGB-D images to phase-only 3D holograms, and all that makes and judges them.
 #[derive(Parser)]

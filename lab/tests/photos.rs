@@ -389,3 +389,36 @@ fn any_photo_becomes_a_hologram_by_a_network() {
         assert!(errors.lines().count() == 1 && errors.contains(word), "{errors}");
     }
 }
+
+#[test]
+fn folders_of_photos_and_of_pictures_become_holograms_too() {
+    let folder = Folder::new();
+    for name in ["photos", "pictures"] {
+        fs::create_dir(folder.path(name)).unwrap();
+    }
+    fs::write(folder.path("display.toml"), "width = 64\nheight = 64").unwrap();
+    fs::write(folder.path("photos/cat.jpg"), short_gdepth()).unwrap();
+    fs::write(folder.path("photos/dog.jpg"), dynamic_depth()).unwrap();
+    colour().save(folder.path("pictures/cat.png")).unwrap();
+    fs::write(folder.path("depth.onnx"), network(Some((16, 24)), false)).unwrap();
+    let kinds = [
+        ("photos", &["--photo"][..], "cat.jpg"),
+        ("pictures", &["--depth-network", "depth.onnx", "--rgb"], "cat.png"),
+    ];
+    for (name, flags, picture) in kinds {
+        let made = |input: &str, output: &str| {
+            let call = [
+                &["hologram", "--display", "display.toml"],
+                flags,
+                &[input, "-o", output],
+            ];
+            folder.succeeds(&call.concat());
+        };
+        let out = format!("out-{name}");
+        made(name, &out);
+        made(&format!("{name}/{picture}"), "h.png");
+        let read = |name: &str| files::read_hologram(&folder.path(name)).unwrap();
+        assert!(read("h.png") == read(&format!("{out}/cat.png")));
+    }
+    assert!(folder.path("out-photos/dog.png").exists());
+}

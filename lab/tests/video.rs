@@ -559,6 +559,7 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
     let request = std::fs::read(out.join("request.json")).unwrap();
     std::fs::remove_file(out.join("request.json")).unwrap();
     assert!(refused(&[]).contains("request.json"));
+    assert!(!out.join("request.json").exists());
     std::fs::write(out.join("request.json"), request).unwrap();
     json(&[&call[..], &["--resume"]].concat());
     assert_eq!(contents(&out).len(), 3);

@@ -13,6 +13,8 @@ use std::path::{Path, PathBuf};
 
 /// The file of the request in its folder.
 pub(crate) const FILE: &str = "request.json";
+/// Most bytes of the file: flags are short.
+const MOST_BYTES: u64 = 1 << 20;
 /// The key of the version that wrote a request, by which the file is recognised.
 const VERSION: &str = "phasefront";
 
@@ -111,7 +113,7 @@ fn said(flag: &str, value: Option<&Value>) -> String {
 }
 
 fn described(path: &Path) -> Result<String> {
-    let content = Fingerprint::of(&std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?);
+    let content = Fingerprint::of(&files::read_file(path)?);
     Ok(format!(
         "{} ({content})",
         path.file_name().unwrap_or_default().display()
@@ -125,7 +127,7 @@ fn display_files(name: &str) -> Result<BTreeMap<String, String>> {
         return Ok(all);
     };
     all.insert("file".to_owned(), described(&path)?);
-    let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, format!("cannot be read: {e}")))?;
+    let text = String::from_utf8_lossy(&files::read_file(&path)?).into_owned();
     let table: toml::Table = toml::from_str(&text).unwrap_or_default();
     let mut values: Vec<(String, toml::Value)> = table.into_iter().collect();
     while let Some((key, value)) = values.pop() {
@@ -189,6 +191,14 @@ impl Claim {
                 "is no regular file; give a folder of its own to what is made",
             ));
         }
+        let holds_made = || names_of(folder).map(|names| names.iter().any(|name| is_made(name)));
+        if !path.exists() && holds_made()? {
+            match before {
+                Before::Refuse => return Err(already(folder)),
+                Before::Resume => return Err(unknown(folder)),
+                Before::Overwrite => {}
+            }
+        }
         let mut file = File::options()
             .read(true)
             .write(true)
@@ -204,7 +214,7 @@ impl Claim {
             ));
         }
         let mut text = String::new();
-        let readable = file.read_to_string(&mut text).is_ok();
+        let readable = (&file).take(MOST_BYTES).read_to_string(&mut text).is_ok();
         let earlier = Request::read(&text);
         if !(text.is_empty() || earlier.is_some()) || !readable {
             return Err(Error::file(
@@ -212,13 +222,11 @@ impl Claim {
                 "is no request of phasefront; give another folder, or remove the file",
             ));
         }
-        let made = names_of(folder)?
-            .into_iter()
-            .filter(|name| is_made(name))
-            .collect::<Vec<_>>();
-        let resumes = before == Before::Resume && !made.is_empty();
+        // Not before the lock: another run may just have ended.
+        let made = holds_made()?;
+        let resumes = before == Before::Resume && made;
         match before {
-            Before::Refuse if !made.is_empty() => return Err(already(folder)),
+            Before::Refuse if made => return Err(already(folder)),
             Before::Resume if resumes => check(folder, request, earlier.as_ref())?,
             _ => {
                 file.rewind().and_then(|()| file.set_len(0)).map_err(refuse)?;
@@ -241,12 +249,17 @@ pub(crate) fn already(path: &Path) -> Error {
     )
 }
 
+/// Files whose flags nobody knows.
+fn unknown(folder: &Path) -> Error {
+    Error::file(
+        folder,
+        format!("holds no {FILE} that says how its files were made; --overwrite makes them anew"),
+    )
+}
+
 fn check(folder: &Path, request: &Request, earlier: Option<&Request>) -> Result<()> {
     let Some(earlier) = earlier else {
-        return Err(Error::file(
-            folder,
-            format!("holds no {FILE} that says how its files were made; --overwrite makes them anew"),
-        ));
+        return Err(unknown(folder));
     };
     match request.difference(earlier) {
         None => Ok(()),
