@@ -505,6 +505,20 @@ fn a_folder_that_is_filled_is_new_or_empty_or_overwritten() {
     folder.succeeds(&with(&maps, &["2", "--overwrite"]));
     let names: Vec<_> = contents(&folder.path("maps")).into_keys().collect();
     assert_eq!(names, ["notes.txt", "phase_000.png", "phase_001.png"]);
+    for (from, to) in [
+        ("rgb.png", "frames/color_0.png"),
+        ("depth.png", "frames/depth_0.png"),
+        ("rgb.png", "colours/one.png"),
+        ("depth.png", "depths/one.png"),
+    ] {
+        fs::create_dir_all(folder.path(to).parent().unwrap()).unwrap();
+        fs::copy(folder.path(from), folder.path(to)).unwrap();
+    }
+    let video = ["video", "frames", "-o"];
+    let stills = ["hologram", "--rgb", "colours", "--depth", "depths", "-o"];
+    for call in [&video[..], &stills] {
+        refuses(&folder, &with(call, &["maps"]), &["maps", "a new or empty folder"]);
+    }
 }
 
 #[test]

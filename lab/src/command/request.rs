@@ -3,6 +3,7 @@
 
 use clap::ValueEnum;
 use phasefront_lab::fingerprint::Fingerprint;
+use phasefront_lab::output::Holding;
 use phasefront_lab::{Error, Result, files};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -159,6 +160,14 @@ impl Before {
             (true, _) => Before::Resume,
             (_, true) => Before::Overwrite,
             _ => Before::Refuse,
+        }
+    }
+
+    /// What the folder may hold that is filled.
+    pub(crate) fn holding(self) -> Holding<'static> {
+        match self {
+            Before::Overwrite => Holding::Anything,
+            _ => Holding::RunOf(FILE),
         }
     }
 }

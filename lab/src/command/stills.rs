@@ -6,8 +6,7 @@ use super::frame::Picture;
 use super::hologram::{Making, infos};
 use super::request::{Before, Claim, Request};
 use phasefront_lab::files::{self, DisplayFile};
-
-use phasefront_lab::output::{self, Holding};
+use phasefront_lab::output;
 use phasefront_lab::{Error, Result};
 use serde_json::json;
 use std::collections::BTreeSet;
@@ -28,7 +27,7 @@ pub(super) fn run(mut making: Making, pictures: Vec<Picture>, output: &Path, bef
             return Err(Error::file(folder, "holds no pictures"));
         }
     }
-    output::folder(output, Holding::Anything)?;
+    output::folder(output, before.holding())?;
     let display = making.display()?;
     let mut request = Request::new("hologram");
     making.record(&display.target.display, &mut request)?;

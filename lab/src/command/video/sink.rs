@@ -5,7 +5,7 @@ use ndarray::{Array3, ArrayView3};
 use phasefront::Hologram;
 use phasefront_lab::files::{self, HologramInfo};
 use phasefront_lab::film::{self, Quality};
-use phasefront_lab::output::{self, Holding};
+use phasefront_lab::output;
 use phasefront_lab::video::VideoFrame;
 use phasefront_lab::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -56,7 +56,7 @@ impl Sink {
         }
         let mut claim = None;
         if let Some(folder) = &folder {
-            output::folder(folder, Holding::Anything)?;
+            output::folder(folder, before.holding())?;
             let new = Claim::new(folder, &request, before, |name| is_frame(name) || name == STATISTICS)?;
             // Films beside a folder without frames are not of an earlier run.
             if let (Some(path), Before::Resume, false) = (film, before, new.resumes) {
