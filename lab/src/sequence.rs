@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::files;
 use crate::video;
+use image::{ImageDecoder, ImageReader};
 use phasefront::unstable::depth::DepthUnit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -284,7 +285,7 @@ fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
         .collect()
 }
 
-/// A scan of Redwood: files whose names begin with the frame's number, as 0000012-000000366371.png. Those that have no
+/// A scan of Redwood or one like it: files whose names begin with the frame's number, as 0000012-000000366371.png. Those that have no
 /// partner are left out, as the scans' own depth may begin later.
 fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
     let numbered = |dir: &Path| -> Result<BTreeMap<u64, PathBuf>> {
@@ -317,9 +318,20 @@ fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
             frames.len()
         );
     }
-    Ok(Sequence {
-        frames,
-        unit: Some(DepthUnit::Millimetres),
+    // Millimetres need more than 8 bits.
+    let unit = (!has_bytes(&frames[0].1)).then_some(DepthUnit::Millimetres);
+    Ok(Sequence { frames, unit })
+}
+
+/// Whether a picture's numbers have 8 bits.
+fn has_bytes(path: &Path) -> bool {
+    let decoder = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .ok()
+        .and_then(|reader| reader.into_decoder().ok());
+    decoder.is_some_and(|decoder| {
+        let color = decoder.color_type();
+        color.bytes_per_pixel() == color.channel_count()
     })
 }
 
@@ -377,6 +389,12 @@ mod tests {
         let expected = [("0000002-000000033369.jpg", "0000002-000000040000.png")];
         assert_eq!(names(&found), pairs(&expected));
         assert_eq!(found.unit, Some(DepthUnit::Millimetres));
+        // 8 bits are no millimetres.
+        let bytes = folder(&[("rgb/1.png", ""), ("depth/1.png", "")]);
+        image::GrayImage::new(2, 2)
+            .save(bytes.path().join("depth/1.png"))
+            .unwrap();
+        assert_eq!(of_folder(bytes.path()).unwrap().unit, None);
         let none = folder(&[("image/1.jpg", ""), ("depth/2.png", "")]);
         assert!(of_folder(none.path()).unwrap_err().to_string().contains("no image"));
     }
