@@ -16,7 +16,7 @@ pub mod spatial;
 
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
-use crate::sm_lbm::{Planes, Point, crop, cross, place, plane_z_m};
+use crate::sm_lbm::{Planes, Point, check_planes, crop, cross, place, plane_z_m};
 use ndarray::{Array3, Axis};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
@@ -121,13 +121,14 @@ impl Correction {
     /// most.
     ///
     /// # Errors
-    /// A volume whose reach, or light that the correction moves so far that it, cannot be padded.
+    /// No planes or too many, a volume whose reach, or light that the correction moves so far that it, cannot be padded.
     pub fn of_aberrations(
         aberrations: &Aberrations,
         (height, width): (usize, usize),
         planes: usize,
         display: &Display,
     ) -> Result<Self> {
+        check_planes(planes)?;
         let pitch_m = display.pitch_m();
         let (near, far) = (display.z_of_depth(0.0), display.z_of_depth(1.0));
         let mut z_m = vec![far];
@@ -225,11 +226,7 @@ pub fn hologram(
     correction: &Correction,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
-    if planes == 0 {
-        return Err(Error::Input(
-            "no planes to cut the scene into; at least 1 is needed".into(),
-        ));
-    }
+    check_planes(planes)?;
     let (height, width) = ldi.shape();
     let shape @ (padded_height, padded_width) = correction.shape();
     let of = correction.kernels[0].dim().0;

@@ -120,7 +120,7 @@ impl Manifest {
         for (name, value, most) in [
             ("scenes", scenes, 1_000_000),
             ("size", size, 4096),
-            ("planes", planes, 1_000_000),
+            ("planes", planes, sm_lbm::MOST_PLANES),
             ("ldi-layers", ldi_layers, 64),
             ("seed", seed as usize + 1, u32::MAX as usize + 1),
         ] {

@@ -320,7 +320,7 @@ fn ceil_div(a: i64, b: i64) -> i64 {
 /// Memory: some 100 bytes a pixel, and the tables.
 ///
 /// # Errors
-/// No planes, or sub-holograms so large that their tables do not fit.
+/// No planes or over [`sm_lbm::MOST_PLANES`], or sub-holograms so large that their tables do not fit.
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
@@ -328,7 +328,7 @@ pub fn hologram(
     occlusion: Occlusion,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
-    check_planes(planes)?;
+    sm_lbm::check_planes(planes)?;
     let points = Points::of(&ldi.for_display(display), planes, occlusion);
     let (height, width) = (points.height, points.width);
     let tables = tables(&points, display)?;
@@ -380,13 +380,6 @@ pub fn hologram(
             }
         });
     Ok(hologram)
-}
-
-fn check_planes(planes: usize) -> Result<()> {
-    if !(1..=1 << 24).contains(&planes) {
-        return Err(Error::Input(format!("{planes} planes; there must be 1 to {}", 1 << 24)));
-    }
-    Ok(())
 }
 
 /// For each plane that holds points, the table of each colour.

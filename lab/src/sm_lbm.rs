@@ -41,6 +41,21 @@ pub(crate) struct Planes {
     pub(crate) occupied: Vec<(usize, Range<usize>)>,
 }
 
+/// Most planes that a scene is cut into. Planes take memory also where they are empty.
+pub const MOST_PLANES: usize = 1_000_000;
+
+/// # Errors
+/// No planes, or more than [`MOST_PLANES`].
+pub(crate) fn check_planes(planes: usize) -> Result<()> {
+    if !(1..=MOST_PLANES).contains(&planes) {
+        return Err(phasefront::Error::Plan(format!(
+            "{planes} planes to cut the scene into; 1 to {MOST_PLANES} are right"
+        ))
+        .into());
+    }
+    Ok(())
+}
+
 /// The plane of a point of depth `d` among `planes`.
 pub fn plane_of_depth(d: f32, planes: usize) -> usize {
     ((f64::from(d) * planes as f64) as usize).min(planes - 1)
@@ -155,16 +170,14 @@ pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_
 /// transfer functions, a quarter of a buffer each: one for neighbours, one for a wider gap.
 ///
 /// # Errors
-/// No planes, or a volume whose reach cannot be padded.
+/// No planes or over [`MOST_PLANES`], or a volume whose reach cannot be padded.
 pub fn hologram(
     ldi: &Ldi,
     display: &Display,
     planes: usize,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
-    if planes == 0 {
-        return Err(phasefront::Error::Plan("no planes to cut the scene into; at least 1 is needed".into()).into());
-    }
+    check_planes(planes)?;
     let (height, width) = ldi.shape();
     let scene = Planes::of(&ldi.for_display(display), planes);
     let longest = display.longest_wavelength_m();

@@ -533,6 +533,31 @@ fn options_that_cannot_be_meant_are_named() {
             &["offset_mm"],
         ),
         ("no planes", made(&["--method", "layers", "--planes", "0"]), &["plane"]),
+        (
+            "more planes than fit in memory",
+            made(&["--method", "layers", "--planes", "4000000000"]),
+            &["4000000000 planes", "1 to 1000000"],
+        ),
+        (
+            "more planes than can be",
+            made(&["--method", "layers", "--planes", "18446744073709551615"]),
+            &["18446744073709551615 planes", "1 to 1000000"],
+        ),
+        (
+            "more depths than planes can be",
+            made(&["--method", "points", "--planes", "4000000000"]),
+            &["4000000000 planes"],
+        ),
+        (
+            "more planes than a sweep has",
+            made(&["--method", "sweep", "--planes", "18446744073709551615"]),
+            &["1 to 1024 are right"],
+        ),
+        (
+            "more planes of the two bars than fit in memory",
+            vec!["occlusion", "--planes", "4000000000", "-o", "occlusion"],
+            &["4000000000 planes"],
+        ),
         ("no light", made(&["--scale", "0"]), &["scale"]),
         (
             "near behind far",

@@ -14,7 +14,7 @@
 use super::{MAX_PROPAGATIONS, padded_shape_with};
 use crate::error::{Error, Result};
 use crate::ldi::Ldi;
-use crate::sm_lbm::{Planes, crop, cross, place, plane_z_m};
+use crate::sm_lbm::{Planes, check_planes, crop, cross, place, plane_z_m};
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
@@ -305,11 +305,7 @@ pub fn hologram(
     aberrations: &SpatialAberrations,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Array3<Complex32>> {
-    if planes == 0 {
-        return Err(Error::Input(
-            "no planes to cut the scene into; at least 1 is needed".into(),
-        ));
-    }
+    check_planes(planes)?;
     let frame @ (height, width) = ldi.shape();
     let pitch_m = display.pitch_m();
     let shape = padded_shape_with(height, width, display, aberrations.reach_m(pitch_m))?;

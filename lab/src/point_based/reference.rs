@@ -1,10 +1,10 @@
 //! The point-based method once more, as it is defined: per point and pixel, in f64, without tables and
 //! with one ray cast at a time. Slow; the oracle of [`super::hologram`].
 
-use super::{Occlusion, check_planes, radius_px, sub_hologram};
+use super::{Occlusion, radius_px, sub_hologram};
 use crate::error::Result;
 use crate::ldi::Ldi;
-use crate::sm_lbm::{plane_of_depth, plane_z_m};
+use crate::sm_lbm::{check_planes, plane_of_depth, plane_z_m};
 use ndarray::Array3;
 use num_complex::Complex64;
 use phasefront::Display;
