@@ -68,11 +68,11 @@ pub(crate) unsafe fn bytes<'a>(data: *const u8, length: usize, name: &str) -> Re
     match (data.is_null(), length) {
         (true, 0) => Ok(&[]),
         (true, _) => Err(null(name)),
-        // SAFETY: the caller's promise.
-        (false, 0..=0x7fff_ffff_ffff_ffff) => Ok(unsafe { std::slice::from_raw_parts(data, length) }),
-        _ => Err(PhasefrontError::Setting(format!(
+        (false, _) if isize::try_from(length).is_err() => Err(PhasefrontError::Setting(format!(
             "{name} has {length} bytes, more than there can be"
         ))),
+        // SAFETY: the caller's promise.
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts(data, length) }),
     }
 }
 
