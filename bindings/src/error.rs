@@ -1,6 +1,6 @@
 //! The one error of the bindings: a kind that apps can act on, and the core's message.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use phasefront::unstable::error::caught;
 
 /// Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, uniffi::Error)]
@@ -69,11 +69,7 @@ impl From<uniffi::UnexpectedUniFFICallbackError> for ListenerError {
 
 /// What `call` gives, a panic in it made an error.
 pub fn guard<T>(call: impl FnOnce() -> Result<T, PhasefrontError>) -> Result<T, PhasefrontError> {
-    catch_unwind(AssertUnwindSafe(call)).unwrap_or_else(|payload| {
-        let message = (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
-            .or_else(|| payload.downcast_ref::<String>().cloned())
-            .unwrap_or_else(|| "a panic".into());
-        let message = message.replace('\n', " ");
+    caught(call).unwrap_or_else(|message| {
         Err(PhasefrontError::Internal(format!(
             "internal error: {message}; please report it"
         )))
@@ -94,6 +90,22 @@ mod tests {
             ))
         );
         assert_eq!(guard(|| Ok(1)), Ok(1));
+    }
+
+    /// Panics as it ends.
+    struct Bomb;
+
+    impl Drop for Bomb {
+        fn drop(&mut self) {
+            std::panic::resume_unwind(Box::new(Bomb));
+        }
+    }
+
+    #[test]
+    fn a_panic_whose_payload_panics_is_an_error_too() {
+        let result: Result<(), _> = guard(|| std::panic::resume_unwind(Box::new(Bomb)));
+        let message = "internal error: a panic; please report it";
+        assert_eq!(result, Err(PhasefrontError::Internal(message.into())));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use crate::error::{ListenerError, PhasefrontError, guard};
 use log::{Level, LevelFilter, Log, Metadata, Record};
+use phasefront::unstable::error::caught;
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, PoisonError, RwLock};
 
 /// How much a message matters.
@@ -19,7 +19,9 @@ pub enum LogLevel {
     Debug,
 }
 
-/// Hears log messages, on any thread. What it throws is ignored.
+/// Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
+/// wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
+/// ignored.
 #[uniffi::export(foreign)]
 pub trait LogListener: Send + Sync {
     /// One message.
@@ -97,7 +99,7 @@ impl Log for Forward {
             };
             // There is nobody to tell that telling failed.
             let message = record.args().to_string();
-            let _ = catch_unwind(AssertUnwindSafe(|| listener.on_log(level, message)));
+            let _ = caught(|| listener.on_log(level, message));
         }
     }
 
@@ -118,8 +120,18 @@ mod tests {
             self.0.send(message.clone()).unwrap();
             match message.as_str() {
                 "panic" => std::panic::resume_unwind(Box::new("no thanks")),
+                "panic twice" => std::panic::resume_unwind(Box::new(Bomb)),
                 _ => Err(ListenerError::Threw { reason: message }),
             }
+        }
+    }
+
+    /// Panics as it ends.
+    struct Bomb;
+
+    impl Drop for Bomb {
+        fn drop(&mut self) {
+            std::panic::resume_unwind(Box::new(Bomb));
         }
     }
 
@@ -133,12 +145,12 @@ mod tests {
     #[test]
     fn a_listener_that_throws_panics_or_logs_as_it_ends_is_told_of_the_next_message() {
         let (sender, told) = channel();
-        let messages = ["panic", "error", "next"];
+        let messages = ["panic", "panic twice", "error", "next"];
         set_log_listener(LogLevel::Info, Some(Arc::new(Unruly(sender.clone())))).unwrap();
         messages.iter().for_each(|message| log::info!("{message}"));
         // A second thread, so that a deadlock is a failure and not a test without end.
         let replaced = std::thread::spawn(move || set_log_listener(LogLevel::Info, Some(Arc::new(Unruly(sender)))));
-        let told: Vec<_> = (0..4)
+        let told: Vec<_> = (0..5)
             .map(|_| told.recv_timeout(std::time::Duration::from_secs(60)).unwrap())
             .collect();
         replaced.join().unwrap().unwrap();

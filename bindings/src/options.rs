@@ -147,7 +147,7 @@ pub enum Backend {
 pub struct SessionOptions {
     /// What holograms are for.
     pub target: Arc<Target>,
-    /// Qualities, the best first; at least one.
+    /// Quality levels, the best first: 1 to 16.
     pub ladder: Vec<Rung>,
     /// Whether the session may step on the ladder by itself.
     pub quality: Quality,

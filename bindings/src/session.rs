@@ -85,6 +85,10 @@ pub trait SessionListener: Send + Sync {
 
     /// The frames after this one are made on another rung of the ladder.
     fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), ListenerError>;
+
+    /// The session is closed and its memory is given back. This is the last call, made exactly once, also where
+    /// shutting down does not wait for it.
+    fn on_closed(&self) -> Result<(), ListenerError>;
 }
 
 /// A session. Every call may come from any thread, at any moment.
@@ -252,9 +256,9 @@ impl RawSession {
         })
     }
 
-    /// Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-    /// be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
-    /// nothing.
+    /// Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
+    /// last, and will not be called again; called by a listener, of this session or another, or by a log handler while
+    /// a session computes, it does not wait for that. Closing twice does nothing.
     pub fn shut_down(&self) -> Result<(), PhasefrontError> {
         guard(|| {
             self.closed.store(true, Ordering::Relaxed);
@@ -299,6 +303,7 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerErro
             };
             listener.on_quality_changed(timestamp_ns, change)
         }
+        Event::Closed => listener.on_closed(),
         other => {
             log::debug!("an event that these bindings do not know: {other:?}");
             Ok(())

@@ -1,7 +1,7 @@
 //! When stages begin and end, to whoever listens: the packages pass it on to the platform's profiler.
 
 use crate::error::{ListenerError, PhasefrontError, guard};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use phasefront::unstable::error::caught;
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 use tracing::span::Id;
 use tracing::{Metadata, Subscriber, subscriber};
@@ -109,7 +109,7 @@ impl Forward {
     ) {
         if let (Some(stage), Some(listener)) = (context.metadata(span).and_then(Stage::of), listener()) {
             // There is nobody to tell that telling failed.
-            let _ = catch_unwind(AssertUnwindSafe(|| tell(&*listener, stage)));
+            let _ = caught(|| tell(&*listener, stage));
         }
     }
 }

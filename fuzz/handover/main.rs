@@ -6,6 +6,9 @@
 #[path = "../../sdk/src/cancel.rs"]
 mod cancel;
 
+#[path = "../../sdk/src/caught.rs"]
+mod caught;
+
 mod error {
     pub use phasefront::{Error, Result};
 }

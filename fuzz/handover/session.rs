@@ -15,6 +15,8 @@ mod event {
         Closed,
     }
 }
+#[path = "../../sdk/src/session/computing.rs"]
+mod computing;
 #[path = "../../sdk/src/session/home.rs"]
 mod home;
 #[path = "../../sdk/src/session/live.rs"]
@@ -67,12 +69,14 @@ impl Work for Fake {
 /// Two cameras, one that resets, pauses and closes, a listener that panics at times.
 fn cameras_and_a_hand() {
     let told = Arc::new(AtomicU64::new(0));
-    let heard = told.clone();
+    let closed = Arc::new(AtomicU64::new(0));
+    let (heard, end) = (told.clone(), closed.clone());
     let listener = move |report| {
-        if let Report::ListenerPanicked = report {
-            return;
-        }
-        heard.fetch_add(1, Ordering::SeqCst);
+        match report {
+            Report::ListenerPanicked => return,
+            Report::Closed => return end.store(heard.load(Ordering::SeqCst) + 1, Ordering::SeqCst),
+            _ => heard.fetch_add(1, Ordering::SeqCst),
+        };
         if thread_rng().gen_range(0..10) == 0 {
             resume_unwind(Box::new("listener"));
         }
@@ -111,6 +115,7 @@ fn cameras_and_a_hand() {
     assert_eq!((counts.pending(), counts.submitted), (0, 8));
     let known = counts.processed + counts.failed + counts.dropped.total();
     assert_eq!(told.load(Ordering::SeqCst), known);
+    assert_eq!(closed.load(Ordering::SeqCst), known + 1, "the end is told last");
 }
 
 /// Two sessions whose listeners close each other.

@@ -278,6 +278,13 @@ typedef void (*UniffiCallbackInterfaceSessionListenerMethod3)(uint64_t, uint64_t
     );
 
 #endif
+#ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_SESSION_LISTENER_METHOD4
+#define UNIFFI_FFIDEF_CALLBACK_INTERFACE_SESSION_LISTENER_METHOD4
+typedef void (*UniffiCallbackInterfaceSessionListenerMethod4)(uint64_t, void* _Nonnull, 
+        RustCallStatus *_Nonnull uniffiCallStatus
+    );
+
+#endif
 #ifndef UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
 #define UNIFFI_FFIDEF_CALLBACK_INTERFACE_STAGE_LISTENER_METHOD0
 typedef void (*UniffiCallbackInterfaceStageListenerMethod0)(uint64_t, RustBuffer, void* _Nonnull, 
@@ -310,6 +317,7 @@ typedef struct UniffiVTableCallbackInterfaceSessionListener {
     UniffiCallbackInterfaceSessionListenerMethod1 _Nonnull onDropped;
     UniffiCallbackInterfaceSessionListenerMethod2 _Nonnull onFailed;
     UniffiCallbackInterfaceSessionListenerMethod3 _Nonnull onQualityChanged;
+    UniffiCallbackInterfaceSessionListenerMethod4 _Nonnull onClosed;
 } UniffiVTableCallbackInterfaceSessionListener;
 
 #endif
@@ -606,6 +614,11 @@ void uniffi_phasefront_ffi_fn_method_sessionlistener_on_failed(uint64_t ptr, uin
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_QUALITY_CHANGED
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_QUALITY_CHANGED
 void uniffi_phasefront_ffi_fn_method_sessionlistener_on_quality_changed(uint64_t ptr, uint64_t timestamp_ns, RustBuffer change, RustCallStatus *_Nonnull out_status
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_CLOSED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_CLOSED
+void uniffi_phasefront_ffi_fn_method_sessionlistener_on_closed(uint64_t ptr, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_CLONE_TARGET
@@ -1214,6 +1227,12 @@ uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed(void
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_QUALITY_CHANGED
 #define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_QUALITY_CHANGED
 uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed(void
+    
+);
+#endif
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_CLOSED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_CLOSED
+uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed(void
     
 );
 #endif

@@ -73,6 +73,7 @@
 
 mod brightness;
 mod cancel;
+mod caught;
 mod clock;
 mod depth;
 pub mod device;

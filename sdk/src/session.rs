@@ -9,6 +9,7 @@
 //! camera's formats, is [`crate::Pipeline`]'s.
 
 mod brightness;
+mod computing;
 mod engine;
 mod event;
 mod hologram;
@@ -40,6 +41,7 @@ use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
 use crate::method::Method;
 use crate::target::Target;
+use computing::Computing;
 use home::Home;
 use live::{Live, Report, Work, guarded, lock};
 use owned_frame::OwnedFrame;
@@ -47,7 +49,7 @@ use queue::{Gate, Queue};
 use stages::{Made, Stages};
 use statistics::Recent;
 use std::num::NonZeroUsize;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 /// What a session makes, and how. [`SessionOptions::new`] has what is usual; change what is not.
 #[derive(Clone)]
@@ -55,7 +57,7 @@ use std::sync::{Arc, Mutex};
 pub struct SessionOptions {
     /// What holograms are for.
     pub target: Target,
-    /// Qualities, the best first.
+    /// Quality levels, the best first, [`MOST_QUALITY_LEVELS`] at most.
     pub ladder: Vec<Rung>,
     /// Whether the session may step on the ladder by itself.
     pub quality: Quality,
@@ -79,6 +81,9 @@ pub struct SessionOptions {
 
 /// Most threads of a session's pool. A live session has one more.
 pub const MOST_THREADS: usize = 256;
+
+/// Most quality levels of a session: each is planned once when the session is made.
+pub const MOST_QUALITY_LEVELS: usize = 16;
 
 /// [`SessionOptions::most_pixels`] unless it is set: 8192×4096, which holds 8K UHD.
 pub const MOST_PIXELS: usize = 1 << 25;
@@ -226,10 +231,13 @@ impl Work for LiveWork {
     type Output = Made;
 
     fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
-        match &mut *lock(&self.0.stages) {
-            Some(stages) => self.0.process(stages, &frame.frame()?, !fresh),
-            None => Err(queue::closed()),
+        let _computing = Computing::begin();
+        let mut stages = lock(&self.0.stages);
+        let stages = stages.as_mut().ok_or_else(queue::closed)?;
+        if fresh {
+            stages.forget();
         }
+        self.0.process(stages, &frame.frame()?, !fresh)
     }
 
     fn recover(&mut self) {
@@ -261,14 +269,25 @@ impl Shared {
     }
 
     fn recover(&self) {
+        let _computing = Computing::begin();
         if let Some(stages) = &mut *lock(&self.stages) {
             stages.recover();
         }
     }
 
-    /// Gives back all memory but the statistics'; waits for a frame that is being processed.
+    /// Gives back all memory but the statistics'; waits for a frame that is being processed, but not on a thread that
+    /// computes: whoever processes it does this when the frame is done.
     fn end(&self) {
-        let stages = lock(&self.stages).take();
+        let stages = if computing::here() {
+            match self.stages.try_lock() {
+                Ok(mut stages) => stages.take(),
+                Err(TryLockError::Poisoned(stages)) => PoisonError::into_inner(stages).take(),
+                Err(TryLockError::WouldBlock) => None,
+            }
+        } else {
+            lock(&self.stages).take()
+        };
+        // Not under the lock: what is logged meanwhile may come back here.
         drop(stages);
     }
 }
@@ -320,7 +339,8 @@ impl Session {
     ///
     /// # Errors
     /// A frame that is not usable, a late one in a video session, a session that is live, paused or closed, or reset or
-    /// closed while the frame is computed, or a panic inside. None of them harms the frames that follow.
+    /// closed while the frame is computed, a call by a handler of logs or traces while a session computes on its thread,
+    /// or a panic inside. None of them harms the frames that follow.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         let (gate, video) = match &self.mode {
             Mode::Image(gate) => (gate, false),
@@ -331,41 +351,10 @@ impl Session {
                 ));
             }
         };
-        self.shared.home.check()?;
-        let mut stages = lock(&self.shared.stages);
-        let fresh = {
-            let mut gate = lock(gate);
-            gate.admit(frame.timestamp_ns, video)?;
-            if gate.paused {
-                gate.counts.dropped.count(DropReason::Paused);
-                return Err(Error::Session("it is paused; resume it first".into()));
-            }
-            gate.begin()
-        };
-        // There are stages as long as the gate is open.
-        let stages = stages.as_mut().ok_or_else(queue::closed)?;
-        let (result, panicked) = guarded(|| {
-            frame.check()?;
-            self.shared.process(stages, frame, video && !fresh)
-        });
-        if panicked {
-            stages.recover();
-        }
-        let Gate { counts, closed, .. } = &mut *lock(gate);
-        match result {
-            Ok(made) => {
-                counts.processed += 1;
-                Ok(made.hologram)
-            }
-            Err(error) => {
-                match (self.shared.cancel.requested(), *closed) {
-                    (false, _) => counts.failed += 1,
-                    (true, true) => counts.dropped.count(DropReason::Closed),
-                    (true, false) => counts.dropped.count(DropReason::Reset),
-                }
-                Err(error)
-            }
-        }
+        self.answer(gate, frame, video, |stages, past| {
+            let made = self.shared.process(stages, frame, past)?;
+            Ok(made.hologram)
+        })
     }
 
     /// Takes up a video where it was left: does for `frame` what the frames after it need, without making its hologram,
@@ -373,30 +362,73 @@ impl Session {
     /// [`Self::process`] of it, but for what remembers more: a method chosen by sharpness, and steps at the midpoint.
     ///
     /// # Errors
-    /// As [`Self::process`]; a session that is not for video.
+    /// As [`Self::process`]; a session that is not for video, or a scale that no hologram has.
     pub fn replay(&self, frame: &CameraFrame<'_>, scale: f32) -> Result<()> {
         let Mode::Video(gate) = &self.mode else {
             return Err(Error::Session("only a video session can be taken up again".into()));
         };
-        self.shared.home.check()?;
-        let mut stages = lock(&self.shared.stages);
-        let fresh = {
-            let mut gate = lock(gate);
-            gate.admit(frame.timestamp_ns, true)?;
-            gate.begin()
-        };
-        let stages = stages.as_mut().ok_or_else(queue::closed)?;
-        let (result, panicked) = guarded(|| {
-            frame.check()?;
-            stages.replay(frame, !fresh, scale)
-        });
-        if panicked {
-            stages.recover();
+        if !(scale.is_finite() && scale > 0.0) {
+            return Err(Error::Plan(format!(
+                "a scale of {scale} is no hologram's; it must be positive and finite"
+            )));
         }
-        let counts = &mut lock(gate).counts;
-        match result {
-            Ok(()) => counts.processed += 1,
-            Err(_) => counts.failed += 1,
+        self.answer(gate, frame, true, |stages, past| stages.replay(frame, past, scale))
+    }
+
+    /// Answers one frame of an image or a video session by `work`, which hears whether the frames before count.
+    fn answer<T>(
+        &self,
+        gate: &Mutex<Gate>,
+        frame: &CameraFrame<'_>,
+        video: bool,
+        work: impl FnOnce(&mut Stages, bool) -> Result<T>,
+    ) -> Result<T> {
+        self.with_stages(|stages| {
+            let fresh = {
+                let mut gate = lock(gate);
+                gate.admit(frame.timestamp_ns, video)?;
+                if gate.paused {
+                    gate.counts.dropped.count(DropReason::Paused);
+                    return Err(Error::Session("it is paused; resume it first".into()));
+                }
+                gate.begin()
+            };
+            // There are stages as long as the gate is open.
+            let stages = stages.as_mut().ok_or_else(queue::closed)?;
+            if fresh {
+                stages.forget();
+            }
+            let (result, panicked) = guarded(|| {
+                frame.check()?;
+                work(stages, video && !fresh)
+            });
+            if panicked {
+                stages.recover();
+            }
+            let Gate { counts, closed, .. } = &mut *lock(gate);
+            match (&result, self.shared.cancel.requested(), *closed) {
+                (Ok(_), ..) => counts.processed += 1,
+                (Err(_), false, _) => counts.failed += 1,
+                (Err(_), true, true) => counts.dropped.count(DropReason::Closed),
+                (Err(_), true, false) => counts.dropped.count(DropReason::Reset),
+            }
+            result
+        })
+    }
+
+    /// Lets `work` have the stages, once nobody else has them.
+    fn with_stages<T>(&self, work: impl FnOnce(&mut Option<Stages>) -> Result<T>) -> Result<T> {
+        self.shared.home.check()?;
+        computing::check()?;
+        let result = {
+            let _computing = Computing::begin();
+            work(&mut lock(&self.shared.stages))
+        };
+        // A handler of logs that closed the session meanwhile did not wait.
+        if let Mode::Image(gate) | Mode::Video(gate) = &self.mode
+            && lock(gate).closed
+        {
+            self.shared.end();
         }
         result
     }
@@ -421,16 +453,16 @@ impl Session {
     /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
     ///
     /// # Errors
-    /// A session that is closed, or a panic inside.
+    /// A session that is closed, a call by a handler of logs while a session computes, or a panic inside.
     pub fn warm_up(&self) -> Result<()> {
-        self.shared.home.check()?;
-        let mut stages = lock(&self.shared.stages);
-        let stages = stages.as_mut().ok_or_else(queue::closed)?;
-        let (result, panicked) = guarded(|| stages.warm_up());
-        if panicked {
-            stages.recover();
-        }
-        result
+        self.with_stages(|stages| {
+            let stages = stages.as_mut().ok_or_else(queue::closed)?;
+            let (result, panicked) = guarded(|| stages.warm_up());
+            if panicked {
+                stages.recover();
+            }
+            result
+        })
     }
 
     /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
@@ -465,8 +497,9 @@ impl Session {
 
     /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up,
     /// as by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has
-    /// heard everything and will not be called again. Called by a listener, of this session or another, it does not
-    /// wait for that. Results that were handed out stay valid. Dropping a session closes it.
+    /// heard everything, [`Event::Closed`] last, and will not be called again. Called by a listener, of this session or
+    /// another, or by a handler of logs while a session computes, it does not wait for that. Results that were handed
+    /// out stay valid. Dropping a session closes it.
     pub fn close(&self) {
         match &self.mode {
             Mode::Image(gate) | Mode::Video(gate) => {
@@ -495,11 +528,13 @@ impl Session {
         Ok(())
     }
 
-    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed. Its
-    /// [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the next start, save compiling.
+    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to a
+    /// handler of logs while a session computes. Its [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the
+    /// next start, save compiling.
     #[cfg(feature = "gpu")]
     pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
-        lock(&self.shared.stages).as_ref()?.gpu()
+        let gpu = self.with_stages(|stages| Ok(stages.as_ref().and_then(Stages::gpu)));
+        gpu.ok().flatten()
     }
 
     /// What the session has done so far. Never waits for a frame.
@@ -524,5 +559,6 @@ fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) 
         Report::Dropped { timestamp_ns, reason } => listener(Event::Dropped { timestamp_ns, reason }),
         Report::Failed { timestamp_ns, error } => listener(Event::Failed { timestamp_ns, error }),
         Report::ListenerPanicked => lock(&shared.recent).listener_panics += 1,
+        Report::Closed => listener(Event::Closed),
     }
 }

@@ -11,6 +11,7 @@ pub mod encode {
 }
 /// Messages on one line.
 pub mod error {
+    pub use crate::caught::caught;
     pub use crate::error::Line;
 }
 /// Camera images to amplitudes.

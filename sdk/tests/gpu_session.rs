@@ -380,7 +380,8 @@ fn sessions_close_at_any_moment() {
         assert_eq!(statistics.pending, 0);
         assert_eq!(statistics.failed, 0);
         drop(session);
-        let told: Vec<Event> = events.iter().collect();
+        let mut told: Vec<Event> = events.iter().collect();
+        assert!(matches!(told.pop(), Some(Event::Closed)));
         assert_eq!(told.len() as u64, round);
         assert!(told.iter().all(|event| matches!(
             event,

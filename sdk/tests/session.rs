@@ -9,7 +9,7 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{DropReason, Event, Quality, Rung, RunningMode, Submission, Thermal};
+use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, Rung, RunningMode, Submission, Thermal};
 use phasefront::target::{Aberration, Response};
 use phasefront::unstable::refocus::Refocus;
 use phasefront::unstable::wave::aperture::Opening;
@@ -359,6 +359,68 @@ fn modes_pause_and_close_are_kept_to() {
     live.close();
 }
 
+/// What was before a reset does not come back, not even where the first frame after it comes to nothing.
+#[test]
+fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let far = Scene {
+        metres: scene.metres.iter().map(|m| 0.5 * m + 6.0).collect(),
+        ..Scene::new(H, W, 10)
+    };
+    let far_metres = far.depth_bytes(DepthFormat::MetresF32);
+    // Colour and depth that do not belong together.
+    let odd = |t| CameraFrame::new(t, scene.colour(), depth(&metres, DepthFormat::MetresF32, H, W));
+    let new = || Session::new(options(W, H), RunningMode::Video).unwrap();
+    let alone = new().process(&frame(30, &far, &far_metres)).unwrap();
+    let session = new();
+    session.process(&frame(10, &scene, &metres)).unwrap();
+    session.reset();
+    assert!(session.process(&odd(20)).unwrap_err().to_string().contains("aspect"));
+    let after = session.process(&frame(30, &far, &far_metres)).unwrap();
+    assert_eq!((after.range_m(), after.scale()), (alone.range_m(), alone.scale()));
+    assert!(after.levels() == alone.levels());
+}
+
+/// A frame that is replayed passes the same gate as one that is processed.
+#[test]
+fn a_replay_is_refused_where_a_frame_is() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let session = Session::new(options(W, H), RunningMode::Video).unwrap();
+    for scale in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
+        let refused = session.replay(&frame(1, &scene, &metres), scale);
+        let message = refused.unwrap_err().to_string();
+        assert!(message.contains("scale") && message.contains("positive"), "{message}");
+    }
+    session.pause();
+    let paused = session.replay(&frame(1, &scene, &metres), 1.0);
+    assert!(paused.unwrap_err().to_string().contains("paused"));
+    session.resume();
+    session.replay(&frame(2, &scene, &metres), 0.7).unwrap();
+    let s = session.statistics();
+    assert_eq!((s.submitted, s.processed, s.dropped.paused), (2, 1, 1));
+    // It is given up by a reset, as a frame is.
+    let session = Session::new(options(640, 480), RunningMode::Video).unwrap();
+    let large = Scene::new(480, 640, 10);
+    let metres = large.depth_bytes(DepthFormat::MetresF32);
+    let replaying = std::sync::atomic::AtomicBool::new(true);
+    let why = std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while replaying.load(std::sync::atomic::Ordering::Relaxed) {
+                session.reset();
+                std::thread::yield_now();
+            }
+        });
+        let why = (1..2000).find_map(|time| session.replay(&frame(time, &large, &metres), 1.0).err());
+        replaying.store(false, std::sync::atomic::Ordering::Relaxed);
+        why.map(|why| why.to_string())
+    });
+    assert!(why.as_ref().is_some_and(|why| why.contains("given up")), "{why:?}");
+    let s = session.statistics();
+    assert_eq!((s.dropped.reset, s.failed, s.pending), (1, 0, 0));
+}
+
 #[test]
 fn a_live_session_answers_or_drops_every_frame() {
     let scene = Scene::new(H, W, 10);
@@ -433,8 +495,17 @@ fn a_live_session_answers_or_drops_every_frame() {
     assert_eq!(statistics.submitted, 5 + 1 + 2 + 1 + 93 + 1);
     assert_eq!((statistics.refused, statistics.failed, statistics.pending), (2, 1, 0));
     assert_eq!(statistics.dropped.superseded, superseded);
-    let told = events.try_iter().count() as u64;
-    assert_eq!(told, 1, "the last frame is answered or dropped, once");
+    let told: Vec<_> = events.try_iter().collect();
+    assert!(
+        matches!(
+            told[..],
+            [
+                Event::Hologram(_) | Event::Dropped { timestamp_ns: 1, .. },
+                Event::Closed
+            ]
+        ),
+        "the last frame is answered or dropped, once, and the end is told last: {told:?}"
+    );
     assert_eq!(
         statistics.submitted,
         statistics.processed + statistics.failed + statistics.refused + statistics.dropped.total()
@@ -470,6 +541,74 @@ fn a_listener_may_panic_and_may_close() {
     live.close();
     assert_eq!(live.statistics().listener_panics, 1);
     assert_eq!(live.statistics().processed, 2);
+}
+
+/// Panics as it ends.
+struct Bomb;
+
+impl Drop for Bomb {
+    fn drop(&mut self) {
+        std::panic::resume_unwind(Box::new(Bomb));
+    }
+}
+
+#[test]
+fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let (sender, events) = mpsc::channel();
+    let listener = move |event| {
+        sender.send(format!("{event:?}")).unwrap();
+        // Without the hook's message on stderr.
+        std::panic::resume_unwind(Box::new(Bomb));
+    };
+    let session = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    for timestamp in 1..=3 {
+        session.submit(&frame(timestamp, &scene, &metres)).unwrap();
+        let told = events.recv_timeout(std::time::Duration::from_secs(60)).unwrap();
+        assert!(told.contains("Hologram"), "{told}");
+    }
+    session.close();
+    assert_eq!(events.try_iter().collect::<Vec<_>>(), ["Closed"]);
+    assert_eq!(session.statistics().listener_panics, 4);
+}
+
+/// Closing does not wait on the listener's thread. The end is told all the same, behind every drop.
+#[test]
+fn a_listener_that_closes_its_session_hears_the_end_last() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let (sender, events) = mpsc::channel();
+    let session = std::sync::Arc::new(std::sync::OnceLock::<Session>::new());
+    let submitted = std::sync::Arc::new(std::sync::Barrier::new(2));
+    let listener = {
+        let (session, submitted) = (session.clone(), submitted.clone());
+        move |event: Event| {
+            if let Event::Hologram(_) = event {
+                submitted.wait();
+                session.get().unwrap().close();
+            }
+            sender.send(event).unwrap();
+        }
+    };
+    let live = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let live = session.get_or_init(|| live);
+    live.submit(&frame(1, &scene, &metres)).unwrap();
+    // Wait until the first is a hologram; the others can only be dropped then.
+    while live.statistics().processed == 0 {
+        std::thread::yield_now();
+    }
+    (2..10).for_each(|t| _ = live.submit(&frame(t, &scene, &metres)).unwrap());
+    submitted.wait();
+    let long = std::time::Duration::from_secs(60);
+    let told: Vec<_> = (0..10).map(|_| events.recv_timeout(long).unwrap()).collect();
+    assert!(matches!(told[0], Event::Hologram(_)), "{told:?}");
+    assert!(
+        told[1..9].iter().all(|event| matches!(event, Event::Dropped { .. })),
+        "{told:?}"
+    );
+    assert!(matches!(told[9], Event::Closed), "{told:?}");
+    assert!(events.try_recv().is_err());
 }
 
 #[test]
@@ -575,6 +714,8 @@ fn options_that_cannot_be_meant_are_named() {
         assert!(message.contains(word), "{word}: {message}");
     };
     refuse(&|o| o.ladder.clear(), "ladder");
+    let many = |o: &mut SessionOptions| o.ladder = vec![o.ladder[0].clone(); MOST_QUALITY_LEVELS + 1];
+    refuse(&many, "17 quality levels are too many; 1 to 16 are right");
     refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
     refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");

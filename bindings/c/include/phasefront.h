@@ -304,7 +304,9 @@ typedef struct PfImageInfo {
   uint32_t pixel_bytes;
 } PfImageInfo;
 
-// Hears log messages, on any thread. The message ends with the call.
+// Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
+// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview are
+// refused there.
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
 // One quality: a method, a resolution, and how what is shown is corrected.
@@ -336,6 +338,9 @@ typedef struct PfQualityChange {
 // Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
 // order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
 // exception may leave a call.
+//
+// `context` must live until on_closed was called; that call may free it. Where pf_session_new fails, no call is made,
+// and the context is the caller's.
 typedef struct PfListener {
   // Given to each call.
   void *context;
@@ -347,6 +352,9 @@ typedef struct PfListener {
   void (*on_failed)(void *context, uint64_t timestamp_ns, const char *message);
   // The frames after this one are made on another rung of the ladder.
   void (*on_quality_changed)(void *context, uint64_t timestamp_ns, struct PfQualityChange change);
+  // The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
+  // where that does not wait.
+  void (*on_closed)(void *context);
 } PfListener;
 
 // One plane of an image.
@@ -526,7 +534,8 @@ enum PfStatus pf_image_info(const struct PfImage *image, struct PfImageInfo *inf
 // Ends an image.
 void pf_image_free(struct PfImage *image);
 
-// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence.
+// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence. A call on another thread that is
+// under way when this returns still has the `context` of before, so let each context live as long as the process.
 enum PfStatus pf_set_log_listener(uint32_t level, PfOnLog on_log, void *context);
 
 // A network in int8 that comes along, by name, as "rgbd-8".
@@ -554,7 +563,7 @@ void pf_options_free(struct PfOptions *options);
 // Takes all rungs from the ladder; at least one is to be pushed then.
 enum PfStatus pf_options_clear_ladder(struct PfOptions *options);
 
-// Adds a rung to the ladder, below those that are there.
+// Adds a rung to the ladder, below those that are there; a session takes 16 at most.
 enum PfStatus pf_options_push_rung(struct PfOptions *options, const struct PfRung *rung);
 
 // Frames a second that are aimed at; 0 takes frames as they come and never steps on the ladder.
@@ -615,8 +624,10 @@ enum PfStatus pf_session_new(const struct PfOptions *options,
                              const struct PfListener *listener,
                              struct PfSession **session);
 
-// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by its listener it
-// does not wait. Its holograms live on.
+// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by a listener, of
+// this session or another, or by a log handler while a session computes, it does not wait: on_closed says when the
+// listener has heard everything. Its holograms live on. It is the last call with this session, and never made during
+// another one with it.
 void pf_session_free(struct PfSession *session);
 
 // The hologram of a frame, in an image or a video session.

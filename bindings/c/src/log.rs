@@ -22,7 +22,9 @@ pub enum PfLogLevel {
 
 const LEVELS: [LogLevel; 4] = [LogLevel::Error, LogLevel::Warning, LogLevel::Info, LogLevel::Debug];
 
-/// Hears log messages, on any thread. The message ends with the call.
+/// Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
+/// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview are
+/// refused there.
 pub type PfOnLog = Option<unsafe extern "C" fn(context: *mut c_void, level: PfLogLevel, message: *const c_char)>;
 
 struct Listener {
@@ -50,7 +52,8 @@ impl LogListener for Listener {
     }
 }
 
-/// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence.
+/// Sends messages of `level`, a PfLogLevel, and above to `on_log`; NULL for silence. A call on another thread that is
+/// under way when this returns still has the `context` of before, so let each context live as long as the process.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_set_log_listener(level: u32, on_log: PfOnLog, context: *mut c_void) -> PfStatus {
     call(|| {

@@ -120,7 +120,7 @@ pub unsafe extern "C" fn pf_options_clear_ladder(options: *mut PfOptions) -> PfS
     unsafe { set(options, |options| options.ladder.clear()) }
 }
 
-/// Adds a rung to the ladder, below those that are there.
+/// Adds a rung to the ladder, below those that are there; a session takes 16 at most.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_push_rung(options: *mut PfOptions, rung: *const PfRung) -> PfStatus {
     // SAFETY: the rules of this border.

@@ -125,6 +125,9 @@ impl From<QualityChange> for PfQualityChange {
 /// Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
 /// order in which things happened. While it is busy no frame is processed. A call that is NULL is not made. No
 /// exception may leave a call.
+///
+/// `context` must live until on_closed was called; that call may free it. Where pf_session_new fails, no call is made,
+/// and the context is the caller's.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct PfListener {
@@ -139,6 +142,9 @@ pub struct PfListener {
     /// The frames after this one are made on another rung of the ladder.
     pub on_quality_changed:
         Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, change: PfQualityChange)>,
+    /// The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
+    /// where that does not wait.
+    pub on_closed: Option<unsafe extern "C" fn(context: *mut c_void)>,
 }
 
 struct Listener(PfListener);
@@ -178,6 +184,14 @@ impl SessionListener for Listener {
         if let Some(tell) = self.0.on_quality_changed {
             // SAFETY: as above.
             unsafe { tell(self.0.context, timestamp_ns, change.into()) };
+        }
+        Ok(())
+    }
+
+    fn on_closed(&self) -> std::result::Result<(), ListenerError> {
+        if let Some(tell) = self.0.on_closed {
+            // SAFETY: as above; the context is not used after it.
+            unsafe { tell(self.0.context) };
         }
         Ok(())
     }
@@ -278,8 +292,10 @@ pub unsafe extern "C" fn pf_session_new(
     })
 }
 
-/// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by its listener it
-/// does not wait. Its holograms live on.
+/// Takes no more frames, waits until the listener has heard everything, and ends the session. Called by a listener, of
+/// this session or another, or by a log handler while a session computes, it does not wait: on_closed says when the
+/// listener has heard everything. Its holograms live on. It is the last call with this session, and never made during
+/// another one with it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_free(session: *mut PfSession) {
     // SAFETY: the rules of this border.

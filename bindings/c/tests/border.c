@@ -3,6 +3,7 @@
 
 #include <assert.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,7 +41,7 @@ static PfFrame frame_at(uint64_t timestamp_ns) {
 }
 
 typedef struct Heard {
-    int holograms, dropped, failed;
+    int holograms, dropped, failed, closed;
 } Heard;
 
 static void on_hologram(void *context, PfHologram *hologram) {
@@ -59,6 +60,10 @@ static void on_failed(void *context, uint64_t timestamp_ns, const char *message)
     (void)timestamp_ns;
     fprintf(stderr, "%s\n", message);
     ((Heard *)context)->failed++;
+}
+
+static void on_closed(void *context) {
+    ((Heard *)context)->closed++;
 }
 
 static int logged = 0;
@@ -150,8 +155,10 @@ static void stills(const PfOptions *options) {
 
 static void live(const PfOptions *options) {
     Heard heard = {0};
-    PfListener listener = {&heard, on_hologram, on_dropped, on_failed, NULL};
+    PfListener listener = {&heard, on_hologram, on_dropped, on_failed, NULL, on_closed};
     PfSession *session = NULL;
+    refused(pf_session_new(options, PF_RUNNING_MODE_IMAGE, &listener, &session), PF_STATUS_SESSION, "listener");
+    assert(heard.closed == 0);
     ok(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, &listener, &session));
     ok(pf_session_warm_up(session));
     for (uint64_t i = 1; i <= 20; i++) {
@@ -172,7 +179,55 @@ static void live(const PfOptions *options) {
     ok(pf_session_resume(session));
     assert(statistics.submitted >= 20 && statistics.refused == 1 && statistics.backend[0] != 0);
     pf_session_free(session);
-    assert(heard.holograms >= 1 && heard.holograms + heard.dropped == 20 && heard.failed == 0);
+    assert(heard.holograms >= 1 && heard.holograms + heard.dropped == 20 && heard.failed == 0 && heard.closed == 1);
+}
+
+// A session that its listener ends: pf_session_free does not wait there, so the last call frees the context.
+typedef struct {
+    PfSession *session;
+    atomic_int *stage; // 1: the first hologram is there; 2: the other frames are submitted; 3: freed; 4: closed
+    int told;
+} Ending;
+static void end_hologram(void *context, PfHologram *hologram) {
+    Ending *ending = context;
+    pf_hologram_free(hologram);
+    atomic_store(ending->stage, 1);
+    while (atomic_load(ending->stage) != 2) {}
+    pf_session_free(ending->session);
+    atomic_store(ending->stage, 3);
+    ending->told++;
+}
+static void end_dropped(void *context, uint64_t timestamp_ns, PfDropReason reason) {
+    Ending *ending = context;
+    (void)timestamp_ns;
+    assert(atomic_load(ending->stage) == 3 && reason != PF_DROP_REASON_NOT);
+    ending->told++;
+}
+static void end_closed(void *context) {
+    Ending *ending = context;
+    atomic_int *stage = ending->stage;
+    assert(atomic_load(stage) == 3 && ending->told == 5);
+    free(ending);
+    atomic_store(stage, 4);
+}
+
+static void ended_by_its_listener(const PfOptions *options) {
+    atomic_int stage = 0;
+    Ending *ending = calloc(1, sizeof *ending);
+    assert(ending != NULL);
+    ending->stage = &stage;
+    PfListener listener = {.context = ending, .on_hologram = end_hologram, .on_dropped = end_dropped, .on_closed = end_closed};
+    PfSession *session = NULL;
+    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, &listener, &session));
+    ending->session = session;
+    for (uint64_t i = 1; i <= 5; i++) {
+        PfFrame frame = frame_at(i);
+        PfDropReason dropped;
+        ok(pf_session_submit(session, &frame, &dropped));
+        while (atomic_load(&stage) == 0) {}
+    }
+    atomic_store(&stage, 2);
+    while (atomic_load(&stage) != 4) {}
 }
 
 int main(void) {
@@ -193,6 +248,7 @@ int main(void) {
     pf_target_free(target);
     stills(options);
     live(options);
+    for (int i = 0; i < 4; i++) ended_by_its_listener(options);
     pf_options_free(options);
     assert(logged > 0);
     ok(pf_set_log_listener(PF_LOG_LEVEL_INFO, NULL, NULL));

@@ -699,7 +699,7 @@ class SessionOptions:
 
     Fields:
         target: What holograms are for.
-        ladder: Qualities, the best first; at least one.
+        ladder: Quality levels, the best first: 1 to 16.
         quality: Whether the session may step on the ladder by itself.
         target_rate_hz: Frames a second that are aimed at; none takes frames as they come and never steps.
         encoding: How the field becomes phases.
@@ -854,7 +854,10 @@ class Target:
         """The display itself."""
 
 class LogListener:
-    """Hears log messages, on any thread. What it throws is ignored."""
+    """Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
+    wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
+    ignored.
+    """
     def on_log(self, level: LogLevel, message: str) -> None:
         """One message."""
 
@@ -968,9 +971,9 @@ class RawSession:
     def set_thermal(self, thermal: Thermal) -> None:
         """Says how hot the device is."""
     def shut_down(self) -> None:
-        """Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-        be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
-        nothing.
+        """Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
+        last, and will not be called again; called by a listener, of this session or another, or by a log handler while
+        a session computes, it does not wait for that. Closing twice does nothing.
         """
     def statistics(self) -> Statistics:
         """What the session has done so far; of a closed one, what it did. Never waits for a frame."""
@@ -996,6 +999,10 @@ class SessionListener:
         """A frame could not be processed. The session goes on."""
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
         """The frames after this one are made on another rung of the ladder."""
+    def on_closed(self) -> None:
+        """The session is closed and its memory is given back. This is the last call, made exactly once, also where
+        shutting down does not wait for it.
+        """
 
 class StageListener:
     """Hears when stages begin and end, on the threads that compute them: on one thread they lie within one another. It

@@ -102,6 +102,9 @@ class _Listener(_ffi.SessionListener):
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
         self._tell(QualityChanged(timestamp_ns, change))
 
+    def on_closed(self) -> None:
+        """Nothing waits for it: Python keeps the listener as long as it is needed."""
+
 
 class Changes(TypedDict, total=False):
     """Fields of `SessionOptions`, any of them."""

@@ -97,6 +97,7 @@ namespace Phasefront
         public Native.OnDropped OnDropped;
         public Native.OnFailed OnFailed;
         public Native.OnQualityChanged OnQualityChanged;
+        public Native.OnClosed OnClosed;
     }
 
     // IL2CPP looks for an attribute of this name on what native code calls back.
@@ -119,6 +120,7 @@ namespace Phasefront
         [UnmanagedFunctionPointer(C)] public delegate void OnDropped(IntPtr context, ulong timestampNs, DropReason reason);
         [UnmanagedFunctionPointer(C)] public delegate void OnFailed(IntPtr context, ulong timestampNs, IntPtr message);
         [UnmanagedFunctionPointer(C)] public delegate void OnQualityChanged(IntPtr context, ulong timestampNs, QualityChange change);
+        [UnmanagedFunctionPointer(C)] public delegate void OnClosed(IntPtr context);
 
         [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_version();
         [DllImport(Library, CallingConvention = C)] public static extern IntPtr pf_last_error();

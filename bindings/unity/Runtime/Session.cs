@@ -128,6 +128,7 @@ namespace Phasefront
         private static readonly Native.OnDropped Dropped = OnDropped;
         private static readonly Native.OnFailed Failed = OnFailed;
         private static readonly Native.OnQualityChanged QualityChanged = OnQualityChanged;
+        private static readonly Native.OnClosed Closed = OnClosed;
 
         private sealed class Hearing
         {
@@ -136,13 +137,8 @@ namespace Phasefront
         }
 
         private readonly Hearing hearing;
-        private GCHandle context;
 
-        private Session(IntPtr handle, Hearing hearing, GCHandle context) : base(handle)
-        {
-            this.hearing = hearing;
-            this.context = context;
-        }
+        private Session(IntPtr handle, Hearing hearing) : base(handle) => this.hearing = hearing;
 
         /// <summary>An image or a video session, or with a listener a live one.</summary>
         public static Session Open(SessionOptions options, RunningMode mode, IListener listener = null)
@@ -150,9 +146,10 @@ namespace Phasefront
             if (listener == null)
             {
                 Check(Native.pf_session_new(options, mode, IntPtr.Zero, out var still));
-                return new Session(still, null, default);
+                return new Session(still, null);
             }
             var hearing = new Hearing { Listener = listener };
+            // Native code holds it until OnClosed, which may come after this session's end.
             var context = GCHandle.Alloc(hearing);
             var native = new NativeListener
             {
@@ -161,11 +158,12 @@ namespace Phasefront
                 OnDropped = Dropped,
                 OnFailed = Failed,
                 OnQualityChanged = QualityChanged,
+                OnClosed = Closed,
             };
             var status = Native.pf_session_new_live(options, mode, ref native, out var session);
             if (status != Status.Ok) context.Free();
             Check(status);
-            return new Session(session, hearing, context);
+            return new Session(session, hearing);
         }
 
         /// <summary>The hologram of a frame, in an image or a video session.</summary>
@@ -222,11 +220,13 @@ namespace Phasefront
         /// <summary>How often the listener threw.</summary>
         public int ListenerFailures => hearing == null ? 0 : System.Threading.Volatile.Read(ref hearing.Failures);
 
-        /// <summary>Takes no more frames, waits until the listener has heard everything, and ends.</summary>
+        /// <summary>
+        /// Takes no more frames, waits until the listener has heard everything, and ends. Called by a listener it does
+        /// not wait: the listener hears the rest afterwards.
+        /// </summary>
         protected override bool ReleaseHandle()
         {
             Native.pf_session_free(handle);
-            if (context.IsAllocated) context.Free();
             return true;
         }
 
@@ -265,5 +265,9 @@ namespace Phasefront
         [MonoPInvokeCallback(typeof(Native.OnQualityChanged))]
         private static void OnQualityChanged(IntPtr context, ulong timestampNs, QualityChange change) =>
             Tell(context, listener => listener.OnQualityChanged(timestampNs, change));
+
+        // The last call with this context.
+        [MonoPInvokeCallback(typeof(Native.OnClosed))]
+        private static void OnClosed(IntPtr context) => GCHandle.FromIntPtr(context).Free();
     }
 }

@@ -33,6 +33,8 @@ internal static class Tests
         Conformance(arguments[0], arguments[1], left("levels.bin"), left("seen.bin"));
         Mistakes();
         Live();
+        for (var i = 0; i < 4; i++) ClosedByItsListener();
+        Console.WriteLine("mistakes are told, live streams end");
         return 0;
     }
 
@@ -287,6 +289,45 @@ internal static class Tests
             Require(heard.Holograms > 0 && heard.Holograms + heard.Dropped == 20, "each frame is told of once");
             Require(session.ListenerFailures == heard.Holograms, "what a listener throws is counted");
         }
-        Console.WriteLine("mistakes are told, a live stream ends");
+    }
+
+    // Ends its session at the first hologram, when others wait to be told as dropped.
+    private sealed class Closing : IListener
+    {
+        public readonly ManualResetEventSlim Begun = new ManualResetEventSlim(), Submitted = new ManualResetEventSlim();
+        public readonly CountdownEvent Told = new CountdownEvent(20);
+        public Session Session;
+
+        public void OnHologram(Hologram hologram)
+        {
+            hologram.Dispose();
+            Begun.Set();
+            Submitted.Wait();
+            Session.Dispose();
+            // What is freed too early is gone then.
+            GC.Collect();
+            Told.Signal();
+        }
+
+        public void OnDropped(ulong timestampNs, DropReason reason) => Told.Signal();
+
+        public void OnFailed(ulong timestampNs, string message) => Console.Error.WriteLine(message);
+
+        public void OnQualityChanged(ulong timestampNs, QualityChange change) { }
+    }
+
+    private static void ClosedByItsListener()
+    {
+        var listener = new Closing();
+        using (var target = Target.FromToml("width = 48\nheight = 36"))
+        using (var options = SessionOptions.For(target, Method.Sweep))
+        {
+            listener.Session = Session.Open(options, RunningMode.LiveStream, listener);
+            listener.Session.Submit(Sample(1));
+            Require(listener.Begun.Wait(60000), "the first frame is a hologram");
+            for (var i = 2ul; i <= 20; i++) listener.Session.Submit(Sample(i));
+            listener.Submitted.Set();
+            Require(listener.Told.Wait(60000), "each frame is told of after the listener ended the session");
+        }
     }
 }

@@ -113,8 +113,12 @@ final class Locked<Value>: @unchecked Sendable {
 /// Passes the library's calls on.
 final class Listener: SessionListener {
     private let tell: @Sendable (SessionEvent) -> Void
+    private let end: @Sendable () -> Void
 
-    init(_ tell: @escaping @Sendable (SessionEvent) -> Void) { self.tell = tell }
+    init(_ tell: @escaping @Sendable (SessionEvent) -> Void, end: @escaping @Sendable () -> Void = {}) {
+        self.tell = tell
+        self.end = end
+    }
 
     func onHologram(hologram: RawHologram) throws { tell(.hologram(try Hologram(hologram))) }
 
@@ -129,4 +133,6 @@ final class Listener: SessionListener {
     func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws {
         tell(.qualityChanged(timestampNs: timestampNs, change: change))
     }
+
+    func onClosed() throws { end() }
 }

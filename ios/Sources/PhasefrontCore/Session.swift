@@ -25,10 +25,11 @@ public final class Session: Sendable {
         self.events = events
         switch (mode, listener) {
         case (.liveStream, nil):
-            raw = try RawSession(options: options, mode: mode, listener: Listener { events.push($0) })
+            let listener = Listener({ events.push($0) }, end: { events.finish() })
+            raw = try RawSession(options: options, mode: mode, listener: listener)
         case (_, let listener):
             events.finish()
-            raw = try RawSession(options: options, mode: mode, listener: listener.map(Listener.init))
+            raw = try RawSession(options: options, mode: mode, listener: listener.map { Listener($0) })
         }
     }
 
@@ -82,11 +83,9 @@ public final class Session: Sendable {
     public func statistics() throws -> Statistics { try raw.statistics() }
 
     /// Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all
-    /// events have been told; called by the listener, it returns at once. Closing twice does nothing.
-    public func close() throws {
-        try raw.shutDown()
-        events.finish()
-    }
+    /// events have been told; called by the listener of a session, it returns at once. ``events`` ends behind the last.
+    /// Closing twice does nothing.
+    public func close() throws { try raw.shutDown() }
 }
 
 extension SessionOptions {

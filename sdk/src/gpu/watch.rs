@@ -2,7 +2,7 @@
 
 use super::device::one_line;
 use super::{GpuError, Result};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use crate::caught::caught;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -20,8 +20,7 @@ pub(super) fn watched<T: Send + 'static>(
         .map_err(|why| GpuError::Lost(format!("no thread to open it on: {}", one_line(why))))?;
     let (send, receive) = channel();
     pool.spawn(move || {
-        let done = catch_unwind(AssertUnwindSafe(work))
-            .unwrap_or_else(|_| Err(GpuError::Lost("its driver's interface panicked".into())));
+        let done = caught(work).unwrap_or_else(|_| Err(GpuError::Lost("its driver's interface panicked".into())));
         // Nobody waits any more where it took too long.
         let _ = send.send(done);
     });

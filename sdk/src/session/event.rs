@@ -48,4 +48,7 @@ pub enum Event {
         /// From which rung to which, and why.
         change: QualityChange,
     },
+    /// The session is closed and its memory is given back. This is the last event, told exactly once, also where
+    /// [`super::Session::close`] does not wait for it.
+    Closed,
 }

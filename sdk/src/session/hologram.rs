@@ -1,5 +1,6 @@
 //! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
 
+use super::computing::{self, Computing};
 use super::home::Home;
 use super::live::lock;
 use super::statistics::FrameTimes;
@@ -217,7 +218,7 @@ impl Hologram {
     ///
     /// # Errors
     /// An empty image or one over 2²⁶ pixels or 2¹⁴ a side, a length of `rgba` other than 4·height·width, a z too far
-    /// away, or a process that was forked from the session's.
+    /// away, a process that was forked from the session's, or a call by a handler of logs while a session computes.
     pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
         if rgba.len() != Self::preview_bytes(height, width)? {
             return Err(Error::Plan(format!(
@@ -226,6 +227,8 @@ impl Hologram {
             )));
         }
         self.viewer.home.check()?;
+        computing::check()?;
+        let _computing = Computing::begin();
         // Locked before the pool is entered, whose threads may else take up another view while this one waits.
         let mut plan = lock(&self.viewer.plan);
         let fits = |plan: &&mut ViewPlan| {

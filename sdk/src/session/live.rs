@@ -1,14 +1,15 @@
 //! The thread of a live session: takes frames from the queue, processes them, tells the listener. What processing is,
 //! is not known here.
 
+use super::computing;
 use super::event::DropReason;
 use super::home::Home;
 use super::queue::{Queue, Ticket};
 use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
 use crate::cancel::Cancel;
+use crate::caught::caught;
 use crate::error::{Error, Result};
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::PoisonError;
 
 /// What a live session does with its frames.
@@ -45,33 +46,41 @@ pub(super) enum Report<O> {
     },
     /// The listener itself panicked at the report before.
     ListenerPanicked,
+    /// Nothing follows but [`Report::ListenerPanicked`] of this one.
+    Closed,
 }
 
 struct Shared<F> {
     queue: Mutex<Queue<F>>,
     wake: Condvar,
-    /// Memory for frames to come.
-    spare: Mutex<Vec<F>>,
+    /// Memory for frames to come; None when none will.
+    spare: Mutex<Option<Vec<F>>>,
 }
+
+impl<F> Shared<F> {
+    fn keep(&self, frame: Option<F>) {
+        if let Some(spare) = &mut *lock(&self.spare)
+            && spare.len() < KEPT
+        {
+            spare.extend(frame);
+        }
+    }
+}
+
+/// Most frames that are kept for their memory: as many as there are with one camera, being copied, waiting and in
+/// flight. A burst from many threads has more for a moment.
+const KEPT: usize = 3;
 
 /// Locks also after a panic: what is behind these locks is whole between any two statements.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What a panic said.
-pub(super) fn panic_message(payload: &(dyn std::any::Any + Send)) -> String {
-    (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
-        .or_else(|| payload.downcast_ref::<String>().cloned())
-        .unwrap_or_else(|| "a panic".into())
-        .replace('\n', " ")
-}
-
 /// `process`, with a panic made an error.
 pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, bool) {
-    match catch_unwind(AssertUnwindSafe(process)) {
+    match caught(process) {
         Ok(result) => (result, false),
-        Err(payload) => (Err(Error::Internal(panic_message(&*payload))), true),
+        Err(message) => (Err(Error::Internal(message)), true),
     }
 }
 
@@ -100,7 +109,7 @@ impl<W: Work> Live<W> {
         let shared = Arc::new(Shared {
             queue: Mutex::new(Queue::new(period_ns, work.cancel())),
             wake: Condvar::new(),
-            spare: Mutex::new(Vec::new()),
+            spare: Mutex::new(Some(Vec::new())),
         });
         let thread = Builder::new()
             .name("phasefront session".into())
@@ -145,7 +154,7 @@ impl<W: Work> Live<W> {
             }
         };
         let mut copying = Copying(&self.shared, Some(ticket));
-        let spare = lock(&self.shared.spare).pop();
+        let spare = lock(&self.shared.spare).as_mut().and_then(Vec::pop);
         let frame = fill(spare);
         if let Some(ticket) = copying.1.take() {
             let unneeded = lock(&self.shared.queue).put(ticket, frame);
@@ -167,13 +176,14 @@ impl<W: Work> Live<W> {
 
     /// Drops what is on its way and ends the thread; when it is back, all events have been told. Called by a listener
     /// it does not wait for that: not for its own thread, which cannot end before it returns, nor for another's, whose
-    /// listener may be waiting for this one.
+    /// listener may be waiting for this one. Nor does it wait on a thread that computes, which the session's may be
+    /// waiting for.
     pub(super) fn close(&self) {
         if !self.home.is_here() {
             return;
         }
         self.change(Queue::close);
-        if LISTENS.with(Cell::get) {
+        if LISTENS.with(Cell::get) || computing::here() {
             return;
         }
         // Held while joining, so that whoever closes too waits as well.
@@ -184,7 +194,7 @@ impl<W: Work> Live<W> {
     }
 
     fn keep(&self, frame: Option<W::Frame>) {
-        lock(&self.shared.spare).extend(frame);
+        self.shared.keep(frame);
         self.shared.wake.notify_all();
     }
 }
@@ -204,9 +214,8 @@ enum Next<F> {
 fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut(Report<W::Output>)) {
     LISTENS.with(|listens| listens.set(true));
     let mut tell = |report| {
-        let told = catch_unwind(AssertUnwindSafe(|| listener(report)));
-        if told.is_err() {
-            let _ = catch_unwind(AssertUnwindSafe(|| listener(Report::ListenerPanicked)));
+        if caught(|| listener(report)).is_err() {
+            let _ = caught(|| listener(Report::ListenerPanicked));
         }
     };
     loop {
@@ -225,15 +234,21 @@ fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut
         };
         drop(queue);
         match next {
-            Next::End => return,
+            Next::End => {
+                // The memory goes back before the last event.
+                let _ = caught(|| drop(work));
+                lock(&shared.spare).take();
+                tell(Report::Closed);
+                return;
+            }
             Next::Drop(timestamp_ns, reason) => tell(Report::Dropped { timestamp_ns, reason }),
             Next::Frame(taken) => {
                 let timestamp_ns = taken.timestamp_ns;
                 let (result, panicked) = guarded(|| work.process(&taken.frame, taken.fresh));
                 if panicked {
-                    work.recover();
+                    let _ = caught(|| work.recover());
                 }
-                lock(&shared.spare).push(taken.frame);
+                shared.keep(Some(taken.frame));
                 if lock(&shared.queue).finish(result.is_err()) {
                     tell(match result {
                         Ok(output) => Report::Done { timestamp_ns, output },
@@ -295,18 +310,20 @@ mod tests {
         for seed in 0..1500 {
             let told = Arc::new(AtomicU64::new(0));
             let panics = Arc::new(AtomicU64::new(0));
+            let closed = Arc::new(AtomicU64::new(0));
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             let fake = Fake {
                 random: ChaCha8Rng::seed_from_u64(seed + 1),
                 broken: false,
             };
             let listener = {
-                let (told, panics) = (told.clone(), panics.clone());
+                let (told, panics, closed) = (told.clone(), panics.clone(), closed.clone());
                 let mut random = ChaCha8Rng::seed_from_u64(seed + 2);
                 move |report| match report {
                     Report::ListenerPanicked => {
                         panics.fetch_add(1, Ordering::Relaxed);
                     }
+                    Report::Closed => closed.store(told.load(Ordering::Relaxed) + 1, Ordering::Relaxed),
                     report => {
                         told.fetch_add(1, Ordering::Relaxed);
                         if let Report::Done { timestamp_ns, output } = report {
@@ -357,6 +374,11 @@ mod tests {
             assert_eq!(counts.submitted, 2 * frames);
             let known = counts.processed + counts.failed + counts.dropped.total();
             assert_eq!(told.load(Ordering::Relaxed), known, "seed {seed}");
+            assert_eq!(
+                closed.load(Ordering::Relaxed),
+                known + 1,
+                "seed {seed}: the end is told last"
+            );
             assert!(panics.load(Ordering::Relaxed) <= known);
         }
     }
@@ -428,10 +450,8 @@ mod tests {
             broken: false,
         };
         let live = Live::start(fake, None, |_| {}).unwrap();
-        let copied = catch_unwind(AssertUnwindSafe(|| {
-            live.submit(1, |_| std::panic::resume_unwind(Box::new("no memory")))
-        }));
-        assert!(copied.is_err());
+        let copied = caught(|| live.submit(1, |_| std::panic::resume_unwind(Box::new("no memory"))));
+        assert_eq!(copied.err().as_deref(), Some("no memory"));
         live.close();
         assert_eq!(live.look(|queue| queue.gate.counts.dropped.total()), 1);
     }

@@ -1,6 +1,6 @@
 //! The ladder of qualities, and when a session steps on it.
 
-use super::SessionOptions;
+use super::{MOST_QUALITY_LEVELS, SessionOptions};
 use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
 use crate::method::Method;
@@ -235,12 +235,19 @@ impl Ladder {
 }
 
 /// # Errors
-/// An empty ladder, a fixed rung that is not on it, or a rung with no pixels or more than the modulator has.
+/// No quality levels or too many, a fixed one that is not among them, or one with no pixels or more than the modulator
+/// has.
 pub(super) fn check(ladder: &[Rung], quality: Quality, modulator: (usize, usize)) -> Result<()> {
     if ladder.is_empty() {
         return Err(Error::Plan(
             "the ladder of qualities is empty; at least one rung is needed".into(),
         ));
+    }
+    if ladder.len() > MOST_QUALITY_LEVELS {
+        return Err(Error::Plan(format!(
+            "{} quality levels are too many; 1 to {MOST_QUALITY_LEVELS} are right",
+            ladder.len()
+        )));
     }
     quality.check(ladder.len())?;
     for (i, rung) in ladder.iter().enumerate() {

@@ -160,7 +160,12 @@ impl Stages {
 
     /// Forgets half-done work after a panic.
     pub(super) fn recover(&mut self) {
+        self.forget();
         self.plan = None;
+    }
+
+    /// Forgets the frames so far: the next one has no past, whatever becomes of those in between.
+    pub(super) fn forget(&mut self) {
         self.last_ns = None;
     }
 
@@ -275,6 +280,7 @@ impl Stages {
             .install(|| plan.take_in(frame, elapsed, &mut FrameTimes::default()));
         self.plan = Some(plan);
         taken?;
+        given_up(&self.cancel)?;
         self.brightness.heed(scale);
         self.last_ns = Some(frame.timestamp_ns);
         Ok(())

@@ -1,6 +1,7 @@
 //! The threads that a session computes with.
 
 use super::MOST_THREADS;
+use super::computing::Computing;
 use crate::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
@@ -23,7 +24,10 @@ impl Threads {
                 ))),
             };
         }
-        let pool = rayon::ThreadPoolBuilder::new().thread_name(|i| format!("phasefront {i}"));
+        let pool = rayon::ThreadPoolBuilder::new()
+            .thread_name(|i| format!("phasefront {i}"))
+            // These threads do nothing else.
+            .start_handler(|_| std::mem::forget(Computing::begin()));
         let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let pool = match threads {
             Some(threads) => pool.num_threads(threads.get()),

@@ -640,7 +640,9 @@ fileprivate struct FfiConverterData: FfiConverterRustBuffer {
 
 
 /**
- * Hears log messages, on any thread. What it throws is ignored.
+ * Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
+ * wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
+ * ignored.
  */
 public protocol LogListener: AnyObject, Sendable {
     
@@ -651,7 +653,9 @@ public protocol LogListener: AnyObject, Sendable {
     
 }
 /**
- * Hears log messages, on any thread. What it throws is ignored.
+ * Hears log messages, on any thread. It may call the library, but where a session computes on its thread it cannot
+ * wait for a frame: `process`, `warm_up` and previews are refused there, and closing does not wait. What it throws is
+ * ignored.
  */
 open class LogListenerImpl: LogListener, @unchecked Sendable {
     fileprivate let handle: UInt64
@@ -1826,9 +1830,9 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
     func setThermal(thermal: Thermal) throws 
     
     /**
-     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-     * be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
-     * nothing.
+     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
+     * last, and will not be called again; called by a listener, of this session or another, or by a log handler while
+     * a session computes, it does not wait for that. Closing twice does nothing.
      */
     func shutDown() throws 
     
@@ -2021,9 +2025,9 @@ open func setThermal(thermal: Thermal)throws   {try rustCallWithError(FfiConvert
 }
     
     /**
-     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything and will not
-     * be called again; called by a listener, of this session or another, it does not wait for that. Closing twice does
-     * nothing.
+     * Takes no more frames and gives the memory back. When it returns, the listener has heard everything, `on_closed`
+     * last, and will not be called again; called by a listener, of this session or another, or by a log handler while
+     * a session computes, it does not wait for that. Closing twice does nothing.
      */
 open func shutDown()throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2165,6 +2169,12 @@ public protocol SessionListener: AnyObject, Sendable {
      */
     func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws 
     
+    /**
+     * The session is closed and its memory is given back. This is the last call, made exactly once, also where
+     * shutting down does not wait for it.
+     */
+    func onClosed() throws 
+    
 }
 /**
  * Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
@@ -2270,6 +2280,18 @@ open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {
             self.uniffiCloneHandle(),
         FfiConverterUInt64.lower(timestampNs),
         FfiConverterTypeQualityChange_lower(change),uniffiCallStatus
+    )
+}
+}
+    
+    /**
+     * The session is closed and its memory is given back. This is the last call, made exactly once, also where
+     * shutting down does not wait for it.
+     */
+open func onClosed()throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+        uniffiCallStatus in
+    uniffi_phasefront_ffi_fn_method_sessionlistener_on_closed(
+            self.uniffiCloneHandle(),uniffiCallStatus
     )
 }
 }
@@ -2396,6 +2418,29 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 return try uniffiObj.onQualityChanged(
                      timestampNs: try FfiConverterUInt64.lift(timestampNs),
                      change: try FfiConverterTypeQualityChange_lift(change)
+                )
+            }
+
+            
+            let writeReturn = { () }
+            uniffiTraitInterfaceCallWithError(
+                callStatus: uniffiCallStatus,
+                makeCall: makeCall,
+                writeReturn: writeReturn,
+                lowerError: FfiConverterTypeListenerError_lower
+            )
+        },
+        onClosed: { (
+            uniffiHandle: UInt64,
+            uniffiOutReturn: UnsafeMutableRawPointer,
+            uniffiCallStatus: UnsafeMutablePointer<RustCallStatus>
+        ) in
+            let makeCall = {
+                () throws -> () in
+                guard let uniffiObj = try? FfiConverterTypeSessionListener.handleMap.get(handle: uniffiHandle) else {
+                    throw UniffiInternalError.unexpectedStaleHandle
+                }
+                return try uniffiObj.onClosed(
                 )
             }
 
@@ -4689,7 +4734,7 @@ public struct SessionOptions {
      */
     public var target: Target
     /**
-     * Qualities, the best first; at least one.
+     * Quality levels, the best first: 1 to 16.
      */
     public var ladder: [Rung]
     /**
@@ -4752,7 +4797,7 @@ public struct SessionOptions {
          * What holograms are for.
          */target: Target, 
         /**
-         * Qualities, the best first; at least one.
+         * Quality levels, the best first: 1 to 16.
          */ladder: [Rung], 
         /**
          * Whether the session may step on the ladder by itself.
@@ -7623,7 +7668,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 56019) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 51292) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_shut_down() != 45629) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_statistics() != 36884) {
@@ -7645,6 +7690,9 @@ private let initializationResult: InitializationResult = {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 25946) {
+        return InitializationResult.apiChecksumMismatch
+    }
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed() != 29025) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_target_display() != 1917) {

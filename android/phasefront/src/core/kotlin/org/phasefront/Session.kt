@@ -29,7 +29,7 @@ public class Session(
     private val queue = EventQueue()
     private val raw: RawSession = when {
         listener != null -> RawSession(options, mode, Listener(listener))
-        mode == RunningMode.LIVE_STREAM -> RawSession(options, mode, Listener(queue::push))
+        mode == RunningMode.LIVE_STREAM -> RawSession(options, mode, Listener(queue::push, queue::finish))
         else -> RawSession(options, mode, null)
     }
 
@@ -102,12 +102,10 @@ public class Session(
 
     /**
      * Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all events
-     * have been told; called by the listener, it returns at once. Closing twice does nothing.
+     * have been told; called by the listener of a session, it returns at once. [events] ends behind the last. Closing twice
+     * does nothing.
      */
-    override fun close() {
-        raw.shutDown()
-        queue.finish()
-    }
+    override fun close(): Unit = raw.shutDown()
 }
 
 /** What becomes of the frames of a live stream, in the order in which it happened. */
@@ -142,7 +140,10 @@ public fun sessionOptions(display: Display = Display(), network: Network): Sessi
 public fun sessionOptions(target: Target, network: Network): SessionOptions = sessionOptions(target, Method.Trained(network))
 
 /** Passes the library's calls on. */
-private class Listener(private val tell: (SessionEvent) -> Unit) : SessionListener {
+private class Listener(
+    private val tell: (SessionEvent) -> Unit,
+    private val end: () -> Unit = {},
+) : SessionListener {
     override fun onHologram(hologram: RawHologram) = attached { tell(SessionEvent.Made(Hologram(hologram))) }
 
     override fun onDropped(timestampNs: ULong, reason: DropReason) = attached {
@@ -156,6 +157,8 @@ private class Listener(private val tell: (SessionEvent) -> Unit) : SessionListen
     override fun onQualityChanged(timestampNs: ULong, change: QualityChange) = attached {
         tell(SessionEvent.QualityChanged(timestampNs.toLong(), change))
     }
+
+    override fun onClosed() = attached(end)
 
     /** Attaching the session's thread to the virtual machine is costly; without this, JNA would do it for every call. */
     private inline fun attached(call: () -> Unit) {

@@ -1,0 +1,64 @@
+//! What a closed session keeps: its statistics, and no memory of frames.
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+mod counting;
+
+use camera::{Scene, frame, options};
+use counting::HELD;
+use phasefront::Session;
+use phasefront::input::DepthFormat;
+use phasefront::session::{Event, RunningMode};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc;
+
+const W: usize = 160;
+const H: usize = 120;
+/// Far less than one frame of the camera, which has 150 kB.
+const LITTLE: usize = 64 << 10;
+
+/// Bytes that are allocated now and were not `before`. Threads of a pool end a moment after it.
+fn more_than(before: usize) -> usize {
+    let now = || HELD.load(Ordering::Relaxed).saturating_sub(before);
+    for _ in 0..100 {
+        if now() < LITTLE {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    now()
+}
+
+/// All in one test: what another one allocates would be counted.
+#[test]
+fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    let frame = |t| frame(t, &scene, &metres);
+    let still = || {
+        let session = Session::new(options(W, H), RunningMode::Video).unwrap();
+        (1..4).for_each(|t| drop(session.process(&frame(t)).unwrap()));
+        session
+    };
+    let live = || {
+        let (sender, events) = mpsc::channel();
+        let listener = move |event| drop(sender.send(event));
+        let session = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+        // Bursts, so that frames wait while one is computed.
+        for t in 1..30 {
+            session.submit(&frame(t)).unwrap();
+        }
+        while !matches!(events.recv().unwrap(), Event::Hologram(hologram) if hologram.timestamp_ns() == 29) {}
+        session
+    };
+    // What is made once is there.
+    (still(), live());
+    let before = HELD.load(Ordering::Relaxed);
+    let sessions = [still(), live()];
+    let open = HELD.load(Ordering::Relaxed) - before;
+    assert!(open > 1 << 20, "{open} bytes of two open sessions");
+    sessions.iter().for_each(Session::close);
+    let kept = more_than(before);
+    assert!(kept < LITTLE, "{kept} bytes are kept of {open}");
+    assert!(sessions.iter().all(|session| session.statistics().processed > 0));
+}

@@ -1,0 +1,190 @@
+//! Handlers of logs and traces run on the threads that compute, while the session's locks are held. What they do to the
+//! session must not leave anybody waiting. Here a collector of traces stands for them: it is called in the same places.
+#![allow(clippy::unwrap_used)]
+
+mod camera;
+mod counting;
+
+use camera::{Scene, frame, options};
+use counting::HELD;
+use phasefront::input::DepthFormat;
+use phasefront::session::{Event, Quality, RunningMode};
+use phasefront::{Hologram, Session};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, OnceLock, mpsc};
+use std::time::Duration;
+use tracing::span::{Attributes, Id, Record};
+use tracing::{Metadata, Subscriber};
+
+const W: usize = 64;
+const H: usize = 48;
+
+type Handler = Arc<dyn Fn() + Send + Sync>;
+
+/// What is called where a stage of this name begins.
+static HANDLER: Mutex<Option<(&str, Handler)>> = Mutex::new(None);
+
+struct Collector;
+
+impl Subscriber for Collector {
+    fn enabled(&self, _: &Metadata<'_>) -> bool {
+        true
+    }
+
+    fn new_span(&self, span: &Attributes<'_>) -> Id {
+        let handler = HANDLER.lock().unwrap().clone();
+        if let Some((stage, handler)) = handler
+            && span.metadata().name() == stage
+        {
+            handler();
+        }
+        Id::from_u64(1)
+    }
+
+    fn record(&self, _: &Id, _: &Record<'_>) {}
+    fn record_follows_from(&self, _: &Id, _: &Id) {}
+    fn event(&self, _: &tracing::Event<'_>) {}
+    fn enter(&self, _: &Id) {}
+    fn exit(&self, _: &Id) {}
+}
+
+/// What `work` gives; a deadlock is a failure and not a test without end.
+fn in_time<T: Send + 'static>(what: &'static str, work: impl FnOnce() -> T + Send + 'static) -> T {
+    let (sender, done) = mpsc::channel();
+    std::thread::spawn(move || sender.send(work()));
+    let Ok(done) = done.recv_timeout(Duration::from_secs(60)) else {
+        panic!("{what}: somebody waits for ever");
+    };
+    *HANDLER.lock().unwrap() = None;
+    done
+}
+
+fn handle(stage: &'static str, handler: impl Fn() + Send + Sync + 'static) {
+    *HANDLER.lock().unwrap() = Some((stage, Arc::new(handler)));
+}
+
+/// A session of two quality levels, so that the second is planned in the midst of a frame.
+fn session(mode: RunningMode) -> Arc<Session> {
+    let mut options = options(W, H);
+    options.ladder.push(options.ladder[0].clone());
+    options.quality = Quality::Fixed(0);
+    Arc::new(Session::new(options, mode).unwrap())
+}
+
+fn process(session: &Session, time: u64) -> phasefront::Result<Hologram> {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    session.process(&frame(time, &scene, &metres))
+}
+
+fn submit(session: &Session, time: u64) {
+    let scene = Scene::new(H, W, 10);
+    let metres = scene.depth_bytes(DepthFormat::MetresF32);
+    session.submit(&frame(time, &scene, &metres)).unwrap();
+}
+
+/// The frame's handler closes its session: on a thread of the pool, and on the caller's.
+fn closing_a_video() {
+    for stage in ["method", "plan"] {
+        let before = HELD.load(Ordering::Relaxed);
+        let result = in_time("closing within process", move || {
+            let session = session(RunningMode::Video);
+            process(&session, 1).unwrap();
+            session.set_quality(Quality::Fixed(1)).unwrap();
+            let closing = session.clone();
+            handle(stage, move || closing.close());
+            let result = process(&session, 2);
+            *HANDLER.lock().unwrap() = None;
+            let refused = process(&session, 3).unwrap_err().to_string();
+            assert!(refused.contains("closed"), "{refused}");
+            let s = session.statistics();
+            assert_eq!((s.submitted, s.refused, s.pending), (3, 1, 0));
+            (result.map(|_| ()), session)
+        });
+        // It was given up, or done already.
+        if let (Err(why), _) = &result {
+            assert!(why.to_string().contains("given up"), "{why}");
+        }
+        // The memory is back, though the close did not wait. Threads end a moment after their pool.
+        let held = || HELD.load(Ordering::Relaxed).saturating_sub(before);
+        for _ in 0..100 {
+            if held() < 64 << 10 {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        assert!(held() < 64 << 10, "{} bytes", held());
+    }
+}
+
+/// What would wait for a frame is refused, of this session and of another; what does not wait is done.
+fn calling_back() {
+    for stage in ["method", "plan"] {
+        let told = in_time("calling back within process", move || {
+            let (this, other) = (session(RunningMode::Video), session(RunningMode::Image));
+            let view = Arc::new(process(&other, 1).unwrap());
+            process(&this, 1).unwrap();
+            this.set_quality(Quality::Fixed(1)).unwrap();
+            let told = Arc::new(Mutex::new(Vec::new()));
+            let (calling, telling) = (this.clone(), told.clone());
+            handle(stage, move || {
+                let mut rgba = [0; 4 * 8 * 8];
+                let refusals = [
+                    process(&calling, 9).map(|_| ()),
+                    process(&other, 9).map(|_| ()),
+                    calling.warm_up(),
+                    view.preview(0.0, 8, 8, &mut rgba),
+                ];
+                calling.set_quality(Quality::Fixed(0)).unwrap();
+                (calling.pause(), calling.resume());
+                assert_eq!(calling.statistics().submitted, 2);
+                telling.lock().unwrap().extend(refusals);
+            });
+            process(&this, 2).unwrap();
+            told
+        });
+        let told = std::mem::take(&mut *told.lock().unwrap());
+        assert!(told.len() >= 4, "the handler was called");
+        for refusal in told {
+            let why = refusal.unwrap_err().to_string();
+            assert!(why.contains("handler of logs"), "{why}");
+        }
+    }
+}
+
+/// A live session is closed and dropped by the handler; its listener hears the end.
+fn closing_a_live_stream() {
+    let told = in_time("closing a live stream", || {
+        let (sender, events) = mpsc::channel();
+        let slot = Arc::new(OnceLock::<Mutex<Option<Arc<Session>>>>::new());
+        let closing = slot.clone();
+        let session = session(RunningMode::Live(Box::new(move |event| drop(sender.send(event)))));
+        slot.get_or_init(|| Mutex::new(Some(session.clone())));
+        handle("method", move || {
+            let session = closing.get().unwrap().lock().unwrap().take();
+            if let Some(session) = session {
+                session.close();
+            }
+        });
+        submit(&session, 1);
+        let first = events.recv().unwrap();
+        let last = events.recv().unwrap();
+        session.close();
+        (first, last, events.try_recv().is_err())
+    });
+    assert!(
+        matches!(told, (Event::Dropped { timestamp_ns: 1, .. }, Event::Closed, true)),
+        "{told:?}"
+    );
+}
+
+/// All in one test: there is one collector a process.
+#[test]
+fn a_handler_of_logs_may_close_and_call_any_session() {
+    tracing::subscriber::set_global_default(Collector).unwrap();
+    // What is made once is there.
+    process(&session(RunningMode::Image), 1).unwrap();
+    closing_a_video();
+    calling_back();
+    closing_a_live_stream();
+}
