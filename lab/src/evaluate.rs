@@ -259,14 +259,56 @@ impl Shown {
         }
     }
 
-    fn of(&self, method: &Method<'_>) -> Self {
+    /// Levels for `target` by `options`, whose encoder is called `encoder`.
+    pub fn encoded(encoder: &str, target: Target, options: EncoderOptions) -> Self {
         Shown {
-            name: self.name.clone(),
-            levels: (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options))),
+            name: encoded_name(encoder, &options),
+            levels: Some((target, options)),
+            ceiling: 0,
+            through: None,
+        }
+    }
+
+    /// The same for `method`, whose pre-filter takes the place of the encoder, also by name.
+    fn of(&self, method: &Method<'_>) -> Self {
+        let levels = (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options)));
+        let name = match (&levels, &method.prefilter) {
+            (Some((_, options)), Some(_)) if self.ceiling == 0 => encoded_name("deep", options),
+            _ => self.name.clone(),
+        };
+        Shown {
+            name,
+            levels,
             ceiling: self.ceiling,
             through: self.through,
         }
     }
+}
+
+fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
+    let EncoderOptions {
+        dark,
+        local_steps,
+        midpoint_steps,
+        ..
+    } = options;
+    let more = match midpoint_steps {
+        0 => String::new(),
+        more => format!(" + {more}"),
+    };
+    format!("{encoder}, dark {dark}, steps {local_steps}{more}")
+}
+
+/// The ways of `shown` in which fields of `method` are judged. A pre-filter takes the place of every encoder, so that
+/// ways which differ in their encoder alone are one.
+pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
+    let mut ways: Vec<Shown> = Vec::new();
+    for shown in shown.iter().map(|shown| shown.of(method)) {
+        if method.prefilter.is_none() || ways.iter().all(|other| other.name != shown.name) {
+            ways.push(shown);
+        }
+    }
+    ways
 }
 
 /// How close one scene's hologram comes to the truth.
@@ -487,8 +529,8 @@ pub struct Sample {
     pub margin: usize,
 }
 
-/// Judges each of `methods` in each of the ways `shown` on the `sample` of the data set in `dir`: rows in that order,
-/// the ways of a method together. `done` hears of each scene.
+/// Judges each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`: rows in that order, the
+/// ways of a method together. `done` hears of each scene.
 ///
 /// # Errors
 /// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.
@@ -526,6 +568,7 @@ pub fn evaluate(
         ));
     }
     let viewer = Viewer::new(manifest)?;
+    let each: Vec<_> = methods.iter().map(|method| (method, ways(method, shown))).collect();
     let of_scenes = scenes
         .par_iter()
         .map(|&index| {
@@ -534,12 +577,12 @@ pub fn evaluate(
             let mut z_m = vec![0.0];
             z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
             let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
-            let mut figures = Vec::with_capacity(methods.len() * shown.len());
+            let mut figures = Vec::new();
             let scene = depth.of(&pair.ldi, (seed << 32) + index as u64)?;
-            for method in methods {
+            for (method, ways) in &each {
                 let field = (method.field)(&scene)?;
-                for shown in shown {
-                    let seen = viewer.views(&field, &shown.of(method), &z_m)?;
+                for shown in ways {
+                    let seen = viewer.views(&field, shown, &z_m)?;
                     figures.push(Figures {
                         light: seen.light,
                         ..judge(&seen.views, &truth, *margin)?
@@ -550,8 +593,8 @@ pub fn evaluate(
             Ok(figures)
         })
         .collect::<Result<Vec<_>>>()?;
-    let ways = methods.iter().flat_map(|m| shown.iter().map(move |s| (m, s)));
-    Ok(ways
+    let rows = (each.iter()).flat_map(|(method, ways)| ways.iter().map(move |shown| (method, shown)));
+    Ok(rows
         .enumerate()
         .map(|(way, (method, shown))| {
             let each = || of_scenes.iter().map(|figures| figures[way]);
@@ -604,7 +647,7 @@ pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Res
     })
 }
 
-/// Writes a PNG of pair `index` by `method` as `shown`, side by side: the visible image, the midpoint's amplitude,
+/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`], side by side: the visible image, the midpoint's amplitude,
 /// the true one, and [`DIFFERENCE_GAIN`] times their difference.
 ///
 /// # Errors
@@ -620,7 +663,7 @@ pub fn write_picture(
     let viewer = Viewer::new(manifest)?;
     let pair = dataset::read_pair(manifest, dir, index)?;
     let ours = viewer
-        .views(&(method.field)(&pair.ldi)?, &shown.of(method), &[0.0])?
+        .views(&(method.field)(&pair.ldi)?, shown, &[0.0])?
         .views
         .remove(0);
     let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.views.remove(0);

@@ -13,6 +13,7 @@ use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::device::Device;
 use phasefront::target::Response;
+use phasefront::unstable::keys;
 use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -61,7 +62,7 @@ impl HologramInfo {
     pub fn display_file(&self) -> Result<DisplayFile> {
         if !self.calibrated.is_empty() {
             return Err(Error::Input(format!(
-                "made for a calibrated display ({}); give its file with --display",
+                "made for a calibrated display ({}); `refocus` and `view` show it on the display's file, --display FILE",
                 self.calibrated.join(", ")
             )));
         }
@@ -611,6 +612,44 @@ impl DisplayFile {
         })
     }
 
+    /// Checks that `hologram` was made for this display: for its lasers, pitch and offset, and levels for its bits.
+    ///
+    /// # Errors
+    /// What differs, of both.
+    pub fn check(&self, hologram: &Hologram) -> Result<()> {
+        let (theirs, ours) = (&hologram.info().display, &self.target.display);
+        let of_levels = !matches!(hologram, Hologram::Complex(..));
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-5 * b.abs();
+        let lasers = |display: &Display| {
+            let nm = display.wavelengths_m().iter().map(|m| rounded(m * 1e9));
+            format!("lasers of {} nm", nm.collect::<Vec<_>>().join("/"))
+        };
+        let pitch = |display: &Display| format!("a pitch of {} µm", rounded(display.pitch_m() * 1e6));
+        let offset = |display: &Display| format!("an offset of {} mm", rounded(display.offset_m() * 1e3));
+        let bits = |display: &Display| format!("levels of {} bits", display.bits());
+        let same_lasers = theirs.colours() == ours.colours()
+            && (theirs.wavelengths_m().iter().zip(ours.wavelengths_m())).all(|(a, b)| near(*a, *b));
+        let same_offset = (theirs.offset_m() - ours.offset_m()).abs() < 1e-8;
+        let says: [(bool, &dyn Fn(&Display) -> String); 4] = [
+            (theirs.bits() == ours.bits() || !of_levels, &bits),
+            (same_lasers, &lasers),
+            (near(theirs.pitch_m(), ours.pitch_m()), &pitch),
+            (same_offset, &offset),
+        ];
+        let list = |of: &Display| {
+            let parts = says.iter().filter(|(same, _)| !same).map(|(_, say)| say(of));
+            parts.collect::<Vec<_>>().join(", ")
+        };
+        match says.iter().all(|(same, _)| *same) {
+            true => Ok(()),
+            false => Err(Error::Input(format!(
+                "the hologram is for {}, the display has {}; make it with this --display, or give the display and the --offset-mm that it was made for",
+                list(theirs),
+                list(ours)
+            ))),
+        }
+    }
+
     /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
     pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
         let keys = [
@@ -625,6 +664,11 @@ impl DisplayFile {
         let there = keys.into_iter().filter(|(_, there)| *there);
         there.map(|(key, _)| key.to_owned()).collect()
     }
+}
+
+/// A figure without the last digits of a float.
+fn rounded(value: f64) -> String {
+    ((value * 1e6).round() / 1e6).to_string()
 }
 
 /// The display of a file, or the device of that name: one that comes along, or one of the user's, a file in
@@ -675,6 +719,28 @@ pub fn own_devices() -> Vec<PathBuf> {
     files
 }
 
+/// Keys of a display's file that name other files.
+const NAMED: [&str; 4] = ["lut", "per_pixel", "laser", "aberration"];
+/// Keys each of which says what phase the levels show: a file has one of them at most.
+const PHASES: [&str; 4] = ["lut", "per_pixel", "levels_turns", "range_turns"];
+
+/// Checks the keys of the `table` of the display's file at `path`.
+fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
+    let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel_file::KEYS].concat();
+    keys::check(table, &known).map_err(|e| Error::file(path, one_line_of(&e)))?;
+    let phases: Vec<_> = PHASES.into_iter().filter(|key| table.contains_key(*key)).collect();
+    match phases[..] {
+        [] | [_] => Ok(()),
+        _ => Err(Error::file(
+            path,
+            format!(
+                "{} each say what phase a level shows; give one of them",
+                phases.join(" and ")
+            ),
+        )),
+    }
+}
+
 /// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
 /// 256 levels, and those of [`crate::calibrate::table`]. Others are those of [`Device`] and [`crate::panel_file`].
 ///
@@ -688,6 +754,7 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let text = read(path)?;
     let mut table: toml::Table =
         toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    check_keys(path, &table)?;
     let mut named = |key: &str| match table.remove(key) {
         None => Ok(None),
         Some(toml::Value::String(name)) => Ok(Some(path.with_file_name(name))),
@@ -703,7 +770,18 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         Some(path) => {
             let levels: std::result::Result<Vec<u8>, _> = read(&path)?.split_whitespace().map(str::parse).collect();
             let levels = levels.map_err(|e| Error::file(&path, format!("holds what is no level of 0..=255: {e}")))?;
-            Some(lut_of(&levels).map_err(|e| Error::file(&path, e))?)
+            let lut = lut_of(&levels).map_err(|e| Error::file(&path, e))?;
+            let most = lut.into_iter().max().unwrap_or_default();
+            if u32::from(most) >> display.bits() != 0 {
+                return Err(Error::file(
+                    &path,
+                    format!(
+                        "holds a level of {most}, over the {} bits of the display",
+                        display.bits()
+                    ),
+                ));
+            }
+            Some(lut)
         }
     };
     let per_pixel = match per_pixel_path {
@@ -731,8 +809,6 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
         (None, None) => None,
     };
     if let Some(response) = calibrated {
-        // A table says what levels show; what the device's file says of them is not asked.
-        target.panel.levels_turns = None;
         target.response = response;
     }
     target.illumination = laser_path.map(|p| table::read_laser(&p)).transpose()?;

@@ -149,22 +149,11 @@ pub fn bit_planes(
 /// The images of a phase-only hologram: one, or one for each colour.
 ///
 /// # Errors
-/// A complex hologram; one that is larger than the modulator or has other bits or colours.
+/// A complex hologram; one that is larger than the modulator, or was made for another display.
 pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
+    display.check(hologram)?;
     let shape = hologram.shape();
-    let bits = hologram.info().display.bits();
-    if bits != display.device.display.bits() {
-        return Err(Error::Input(format!(
-            "the hologram has levels of {bits} bits, the modulator {}; make it with this --display",
-            display.device.display.bits()
-        )));
-    }
-    let (colours, right) = (hologram.info().display.colours(), display.device.display.colours());
-    if colours != right {
-        return Err(Error::Input(format!(
-            "the hologram is of {colours} colours, the display has {right}; make it with this --display"
-        )));
-    }
+    let colours = display.device.display.colours();
     let levels = match hologram {
         Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
         Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),

@@ -18,6 +18,7 @@ use crate::output;
 use image::DynamicImage;
 use phasefront::Target;
 use phasefront::target::{Flatness, Registration};
+use phasefront::unstable::keys;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -41,7 +42,8 @@ enum FlatnessToml {
     Colours([String; 3]),
 }
 
-const KEYS: [&str; 5] = ["carrier_mrad", "lens_mm", "flatness", "shift_px", "scale"];
+/// Their names.
+pub(crate) const KEYS: [&str; 5] = ["carrier_mrad", "lens_mm", "flatness", "shift_px", "scale"];
 
 /// Takes the keys of the panel out of the `table` of the display's file at `path`.
 pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
@@ -53,7 +55,7 @@ pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
             path,
             "flatness must be the name of a file, or of three, for red, green and blue",
         ),
-        message => Error::file(path, message.trim().replace('\n', " ")),
+        _ => Error::file(path, keys::message(&e)),
     })
 }
 

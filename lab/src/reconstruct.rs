@@ -74,17 +74,12 @@ impl Hologram {
     /// aberration, which must be one for all depths.
     ///
     /// # Errors
-    /// As [`Self::views`]; a table made for fewer pixels; an aberration that changes over depth or over the frame.
+    /// As [`Self::views`]; a hologram that was made for another display; a table made for fewer pixels; an aberration that changes over depth or over the frame.
     pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         let shape = self.shape();
         let (height, width) = shape;
         let info = self.info();
-        let (ours, theirs) = (info.display.colours(), file.target.display.colours());
-        if ours != theirs {
-            return Err(Error::Input(format!(
-                "a hologram of {ours} colours on a display of {theirs}; both must have as many"
-            )));
-        }
+        file.check(self)?;
         let (mut field, aperture) = match self {
             Hologram::Complex(field, _) => (field.clone(), None),
             _ => {
@@ -117,14 +112,8 @@ impl Hologram {
     fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
         let (height, width) = self.shape();
         let info = self.info();
-        let (ours, theirs) = (info.display.bits(), file.target.display.bits());
         let levels = match self {
             Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
-            Hologram::Words(..) if ours != theirs => {
-                return Err(Error::Input(format!(
-                    "a hologram of {ours} bits on a display of {theirs}; both must have as many"
-                )));
-            }
             Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
             Hologram::Complex(..) => unreachable!("a complex hologram has no levels"),
         };

@@ -12,6 +12,9 @@ use std::path::Path;
 /// How far the aspect ratios of colour and depth may lie apart, relative.
 const ASPECT_TOLERANCE: f64 = 0.01;
 
+/// Share of the depth that --near and --far clip, beyond which that is said.
+pub const DOUBTFULLY_CLIPPED: f64 = 0.9;
+
 /// What a depth file's numbers mean.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthOptions {
@@ -62,6 +65,14 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     let normalized = depth::normalize(readings.view(), options.unit, options.near_m, options.far_m)
         .map_err(|e| Error::file(depth_path, e))?;
     if let Some((near, far)) = normalized.range_m {
+        let clipped = normalized.clipped as f64 / readings.len() as f64;
+        if clipped > DOUBTFULLY_CLIPPED {
+            log::warn!(
+                "{}: {:.0} % of the depth lies before near {near} m or beyond far {far} m and is shown there; both are metres",
+                depth_path.display(),
+                100.0 * clipped
+            );
+        }
         log::info!(
             "{}: near {near:.3} m, far {far:.3} m, {} pixels filled",
             depth_path.display(),

@@ -111,6 +111,17 @@ impl VideoFrame {
         Ok(())
     }
 
+    /// The share of its readings that lie before `near_m` or beyond `far_m`.
+    pub fn beyond(&self, near_m: f32, far_m: f32) -> f64 {
+        let metres = self.depth.chunks_exact(self.format.pixel_bytes());
+        let (mut all, mut beyond) = (0usize, 0usize);
+        for metres in metres.map(|pixel| self.format.reading(pixel).0).filter(|m| !m.is_nan()) {
+            all += 1;
+            beyond += usize::from(!(near_m..=far_m).contains(&metres));
+        }
+        beyond as f64 / all.max(1) as f64
+    }
+
     /// What a session takes.
     ///
     /// # Errors

@@ -21,6 +21,8 @@ const PAGE: &str = include_str!("viewer/page.html");
 const SCENES_FROM: &str = r#"<script type="application/json" id="scenes">"#;
 const SCENES_TO: &str = "</script>";
 const PLACE: &str = "__SCENES__";
+/// How a picture of a page begins.
+const PICTURE: &str = "data:image/webp;base64,";
 
 /// The widest that a view is packed.
 const WIDEST: u32 = 1280;
@@ -164,15 +166,15 @@ impl Phase {
         let (left, top) = ((width as u32 - w) / 2, (height as u32 - h) / 2);
         let pixels = imageops::crop_imm(&all, left, top, w, h).to_image();
         Ok(Phase {
-            all: url("webp", &pictures::webp(&pictures::at_width(all, PHASE_WIDTH), 60.0)?),
-            pixels: url("webp", &pictures::webp_lossless(&pixels)),
+            all: url(&pictures::webp(&pictures::at_width(all, PHASE_WIDTH), 60.0)?),
+            pixels: url(&pictures::webp_lossless(&pixels)),
             window: [left, top, w, h],
         })
     }
 }
 
-fn url(kind: &str, bytes: &[u8]) -> String {
-    format!("data:image/{kind};base64,{}", STANDARD.encode(bytes))
+fn url(webp: &[u8]) -> String {
+    format!("{PICTURE}{}", STANDARD.encode(webp))
 }
 
 /// The picture of a view's amplitudes, (C, H, W), no wider than pages show them.
@@ -196,7 +198,7 @@ pub fn pack(views: &[RgbImage], most: usize) -> Result<Vec<String>> {
         }
         let packed = views.par_iter().map(one).collect::<Result<Vec<_>>>()?;
         if packed.iter().map(|view| bytes(view.len())).sum::<usize>() <= most {
-            return Ok(packed.iter().map(|view| url("webp", view)).collect());
+            return Ok(packed.iter().map(|view| url(view)).collect());
         }
     }
     Err(Error::Input(format!(
@@ -206,24 +208,37 @@ pub fn pack(views: &[RgbImage], most: usize) -> Result<Vec<String>> {
     )))
 }
 
-/// Writes the page of `scenes`.
+/// The page of `scenes`.
 ///
 /// # Errors
-/// A file that cannot be written.
-pub fn write(path: &Path, scenes: &[Scene]) -> Result<usize> {
+/// No scene at all.
+pub fn page(scenes: &[Scene]) -> Result<String> {
+    if scenes.is_empty() {
+        return Err(Error::Input("a page needs a hologram to show; there is none".into()));
+    }
     // A title with `</script>` in it would end the data.
     let json = serde_json::to_string(scenes)
-        .map_err(|e| Error::file(path, e))?
+        .map_err(|e| Error::Input(format!("the page's data: {e}")))?
         .replace('<', "\\u003c");
-    let page = PAGE.replace(PLACE, &json);
+    Ok(PAGE.replace(PLACE, &json))
+}
+
+/// Writes the [`page`] of `scenes`; gives its bytes.
+///
+/// # Errors
+/// As [`page`]; a file that cannot be written.
+pub fn write(path: &Path, scenes: &[Scene]) -> Result<usize> {
+    let page = page(scenes)?;
     files::write_atomically(path, |file| file.write_all(page.as_bytes()))?;
     Ok(page.len())
 }
 
-/// The scenes of a page that [`write()`] made.
+/// The scenes of a page that [`write()`] made. Whoever sent it may have changed it: nothing but its data is taken, and
+/// that is checked.
 ///
 /// # Errors
-/// A file that is missing or another page.
+/// A file that is missing or another page; one without scenes, or with scenes that [`write()`] never makes, as with
+/// pictures that are elsewhere.
 pub fn read(path: &Path) -> Result<Vec<Scene>> {
     output::reading(path)?;
     let page = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
@@ -231,7 +246,63 @@ pub fn read(path: &Path) -> Result<Vec<Scene>> {
         .split_once(SCENES_FROM)
         .and_then(|(_, rest)| Some(rest.split_once(SCENES_TO)?.0));
     let json = json.ok_or_else(|| Error::file(path, "is no page that `phasefront view` made"))?;
-    serde_json::from_str(json).map_err(|e| Error::file(path, format!("its scenes are broken: {e}")))
+    let scenes: Vec<Scene> =
+        serde_json::from_str(json).map_err(|e| Error::file(path, format!("its scenes are broken: {e}")))?;
+    if scenes.is_empty() {
+        return Err(Error::file(path, "holds no hologram"));
+    }
+    for scene in &scenes {
+        scene
+            .check()
+            .map_err(|why| Error::file(path, format!("its scenes are broken: {why}")))?;
+    }
+    Ok(scenes)
+}
+
+/// Checks that `url` is a picture as [`write()`] puts it into a page, which no browser fetches from elsewhere.
+fn check_picture(url: &str) -> std::result::Result<(), String> {
+    let data = url.strip_prefix(PICTURE);
+    match data.is_some_and(|data| STANDARD.decode(data).is_ok()) {
+        true => Ok(()),
+        false => {
+            let begin: String = url.chars().take(60).collect();
+            Err(format!("{begin:?} is no picture in the page itself ({PICTURE}…)"))
+        }
+    }
+}
+
+impl Scene {
+    /// Checks what a page's script relies on.
+    fn check(&self) -> std::result::Result<(), String> {
+        let views = self.z_mm.len().checked_mul(self.frames).filter(|views| *views > 0);
+        if views != Some(self.shown.len()) || !(self.field.is_empty() || self.field.len() == self.shown.len()) {
+            return Err(format!(
+                "{} views and {} of the field for {} frames at {} depths",
+                self.shown.len(),
+                self.field.len(),
+                self.frames,
+                self.z_mm.len()
+            ));
+        }
+        let phase = self.phase.iter().flat_map(|phase| [&phase.all, &phase.pixels]);
+        self.shown
+            .iter()
+            .chain(&self.field)
+            .chain(phase)
+            .try_for_each(|url| check_picture(url))?;
+        let Depth {
+            width, height, slices, ..
+        } = &self.depth;
+        let slices = STANDARD.decode(slices).map_err(|e| format!("its depth: {e}"))?;
+        let places = width
+            .checked_mul(*height)
+            .and_then(|area| area.checked_mul(self.frames));
+        let inside = slices.iter().all(|slice| usize::from(*slice) < self.z_mm.len());
+        match places == Some(slices.len()) && inside {
+            true => Ok(()),
+            false => Err(format!("its depth has {} places of {width}×{height}", slices.len())),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -238,6 +238,40 @@ fn an_image_is_fitted_to_the_modulator() {
 }
 
 #[test]
+fn a_hologram_of_another_size_than_its_modulator_is_told_of() {
+    let folder = Folder::new().with_frame();
+    for (name, (width, height)) in [("wide", (1921, 8)), ("whole", (96, 8))] {
+        let rgb = image::RgbImage::from_pixel(width, height, image::Rgb([90; 3]));
+        rgb.save(folder.path(&format!("{name}.png"))).unwrap();
+        let depth = image::GrayImage::from_fn(width, height, |x, _| image::Luma([(x % 256) as u8]));
+        depth.save(folder.path(&format!("{name}-depth.png"))).unwrap();
+    }
+    fs::write(folder.path("usual.toml"), "pitch_um = 8").unwrap();
+    fs::write(folder.path("same.toml"), "width = 96\nheight = 8").unwrap();
+    let told = |name: &str, more: &[&str]| {
+        let (rgb, depth) = (format!("{name}.png"), format!("{name}-depth.png"));
+        let sweep = ["--method", "sweep", "--planes", "3"];
+        let output = folder.run(&[&hologram(&rgb, &depth)[..], &sweep, more].concat());
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    // The default display is a stand-in: smaller is silent, larger is not.
+    assert_eq!(told("whole", &[]), "");
+    let larger = told("wide", &[]);
+    assert!(
+        larger.contains("1921×8") && larger.contains("default modulator 1920×1080"),
+        "{larger}"
+    );
+    let smaller = told("whole", &["--display", "usual.toml"]);
+    assert!(
+        smaller.contains("96×8") && smaller.contains("the modulator 1920×1080: --fit"),
+        "{smaller}"
+    );
+    assert_eq!(told("whole", &["--display", "same.toml"]), "");
+    assert_eq!(told("wide", &["--fit", "contain", "--display", "same.toml"]), "");
+}
+
+#[test]
 fn depth_is_turned_round() {
     let folder = Folder::new().with_frame();
     let turned = image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 225 } else { 35 }]));
@@ -255,8 +289,15 @@ fn names_of_networks_are_listed_and_a_deep_field_is_told() {
     let folder = Folder::new().with_frame();
     let list = folder.succeeds(&["networks"]);
     for name in ["ddpm-8", "rgbd-8", "rgbd-15", "seeded-6"] {
-        assert!(list.contains(name), "{list}");
+        assert_eq!(
+            list.lines()
+                .filter(|line| line.starts_with(&format!("{name} ")))
+                .count(),
+            1,
+            "{list}"
+        );
     }
+    assert!(list.contains("0, 6, 12 mm"), "{list}");
     let warned = |network| {
         let output = folder.run(&made(&["--network", network, "--complex", "f.npy"]));
         assert!(output.status.success());
@@ -319,8 +360,12 @@ fn real_captures_are_filled_and_shown() {
     }
     let folder = Folder::new();
     let (rgb, depth) = (tum.join("color.png"), tum.join("depth.png"));
-    for method in ["network", "layers", "points"] {
-        folder.succeeds(&[
+    for method in [
+        &["network"][..],
+        &["layers", "--planes", "16"],
+        &["points", "--planes", "16"],
+    ] {
+        let frame = [
             "hologram",
             "--rgb",
             rgb.to_str().unwrap(),
@@ -330,13 +375,11 @@ fn real_captures_are_filled_and_shown() {
             "raw",
             "--depth-scale",
             "5000",
-            "--method",
-            method,
-            "--planes",
-            "16",
             "-o",
             "h.png",
-        ]);
+            "--method",
+        ];
+        folder.succeeds(&[&frame[..], method].concat());
         folder.succeeds(&["refocus", "h.png", "--z-mm", "-2", "-o", "view.png"]);
     }
 }
@@ -510,6 +553,27 @@ fn depth_that_means_nothing_is_named() {
         ),
         ("no pixel", hologram("rgb.png", "nothing.npy"), &["nothing.npy"]),
     ]);
+    let millimetres = Array2::from_shape_fn((32, 48), |(_, x)| 500.0 + 70.0 * x as f32);
+    folder.depth_npy("mm.npy", &millimetres);
+    let near_far = |unit, near, far| {
+        let more = ["--depth-unit", unit, "--near", near, "--far", far];
+        [&hologram("rgb.png", "mm.npy")[..], &more].concat()
+    };
+    folder.refuses_each(&[
+        (
+            "near and far in millimetres",
+            near_far("mm", "500", "4000"),
+            &["mm.npy", "near 500 m", "from 0.5 m to 3.79 m", "both are metres"],
+        ),
+        (
+            "near and far of normalized depth",
+            made(&["--near", "0.2", "--far", "0.8"]),
+            &["depth.png", "near and far are metres"],
+        ),
+    ]);
+    let told = |arguments: &[&str]| String::from_utf8(folder.run(arguments).stderr).unwrap();
+    assert!(told(&near_far("mm", "0.5", "0.6")).contains("96 % of the depth"));
+    assert_eq!(told(&near_far("mm", "0.5", "4")), "");
     // Holes are filled; in metres infinity is one.
     depth[(3, 4)] = f32::NAN;
     folder.depth_npy("hole.npy", &depth);
@@ -600,9 +664,91 @@ fn options_that_cannot_be_meant_are_named() {
 }
 
 #[test]
+fn a_flag_that_would_change_nothing_is_refused() {
+    let folder = Folder::new().with_frame();
+    folder.succeeds(&["scene", "--seed", "5", "--size", "48x32", "--layers", "1", "-o", "ldi"]);
+    folder.succeeds(&made(&["--method", "sweep", "--planes", "4"]));
+    fs::rename(folder.path("h.png"), folder.path("there.png")).unwrap();
+    let file = format!("{MODELS}/rgbd-8-int8.onnx");
+    for (flags, with) in [
+        (
+            &["--method", "sweep", "--network", "8"][..],
+            "--method network, seeded or auto",
+        ),
+        (
+            &["--method", "layers", "--network", "8"],
+            "--method network, seeded or auto",
+        ),
+        (
+            &["--method", "points", "--precision", "f32"],
+            "--method network, seeded or auto",
+        ),
+        (&["--network", &file, "--precision", "f32"], "bundled networks"),
+        (
+            &["--method", "network", "--planes", "8"],
+            "sweep, auto, layers or points",
+        ),
+        (&["--encoder", "deep", "--taps", "9"], "--method sweep or auto"),
+        (&["--method", "layers", "--taps", "9"], "--method sweep or auto"),
+        (&["--method", "layers", "--occlusion", "none"], "--method points"),
+        (&["--depth-scale", "5000"], "--depth-unit raw"),
+        (&["--depth-unit", "mm", "--depth-scale", "5000"], "--depth-unit raw"),
+        (&["--gpu", "any"], "--backend gpu"),
+    ] {
+        folder.refuses(
+            &made(flags),
+            1,
+            &[*flags.iter().rfind(|flag| flag.starts_with("--")).unwrap(), with],
+        );
+    }
+    let sweep = "multiplex --rgb rgb.png --depth depth.png --network 8 -o maps";
+    let cases = [
+        (sweep, "not with sweep"),
+        ("compare rgb.png rgb.png --z-mm 1", "two images"),
+        ("refocus there.png --z-mm 0 --offset-mm 3 -o v.png", "--display"),
+        ("show there.png --offset-mm 3", "--display"),
+        ("bench --fusion pairs", "--backend gpu"),
+        ("bench --layers 0 --precision int8", "a network"),
+        ("study layers --ldi-layers 3 -o study", "the study of planes"),
+        ("study flicker --size 64 -o study", "scenes without a sensor's depth"),
+        ("view there.png --frames 3 -o v.html", "a folder of `video`"),
+    ];
+    for (call, word) in cases {
+        folder.refuses(&call.split(' ').collect::<Vec<_>>(), 1, &[word]);
+    }
+    // What the arguments alone tell is code 2.
+    for (call, word) in [
+        ("hologram --ldi ldi --invert -o h.png", "--invert"),
+        ("hologram --ldi ldi --depth-unit mm -o h.png", "--depth-unit"),
+        ("judge --ldi ldi --near 1", "--near"),
+        ("hologram --photo p.jpg --depth-unit mm -o h.png", "--depth-unit"),
+        (
+            "hologram --rgb rgb.png --depth-network n.onnx --near 1 -o h.png",
+            "--near",
+        ),
+        ("view there.png --method sweep -o v.html", "--method"),
+        ("view there.png --dark 0.2 -o v.html", "--dark"),
+        ("show there.png --colour red", "--display"),
+    ] {
+        folder.refuses(&call.split(' ').collect::<Vec<_>>(), 2, &[word]);
+    }
+    // Auto takes a network along for depth that is not sharp.
+    folder.succeeds(&made(&[
+        "--method",
+        "auto",
+        "--network",
+        "8",
+        "--precision",
+        "f32",
+        "--planes",
+        "4",
+    ]));
+}
+
+#[test]
 fn displays_that_cannot_be_used_are_named() {
     let folder = Folder::new().with_frame();
-    let cases: [(&str, &str, &[&str]); 4] = [
+    let cases: [(&str, &str, &[&str]); 14] = [
         (
             "a wavelength in µm",
             "wavelengths_nm = [0.638, 520, 450]",
@@ -611,7 +757,62 @@ fn displays_that_cannot_be_used_are_named() {
         ("12 bits", "bits = 12", &["display.toml", "bits"]),
         ("a table that is not there", "lut = \"none.txt\"", &["none.txt"]),
         ("a table of 3", "lut = \"lut.txt\"", &["lut.txt", "256"]),
+        (
+            "blue first",
+            "wavelengths_nm = [450, 520, 638]",
+            &["display.toml", "red, green, blue", "[638, 520, 450]"],
+        ),
+        (
+            "another unit",
+            "pitch_mm = 0.008",
+            &["display.toml: unknown key `pitch_mm`; did you mean `pitch_um`?"],
+        ),
+        (
+            "a slip in a file's key",
+            "luts = \"a\"",
+            &["unknown key `luts`; did you mean `lut`?"],
+        ),
+        (
+            "a slip in the panel",
+            "lens_m = 0.3",
+            &["unknown key `lens_m`; did you mean `lens_mm`?"],
+        ),
+        (
+            "a slip in an aberration",
+            "aberration = \"lens.toml\"",
+            &["lens.toml", "did you mean `green`?"],
+        ),
+        (
+            "a table and a range",
+            "lut = \"whole.txt\"\nrange_turns = 1.3",
+            &["display.toml", "lut and range_turns", "give one"],
+        ),
+        (
+            "two tables",
+            "lut = \"whole.txt\"\nper_pixel = \"table.pfp\"",
+            &["lut and per_pixel", "give one"],
+        ),
+        (
+            "a table for each pixel and levels",
+            "bits = 1\nper_pixel = \"table.pfp\"\nlevels_turns = [0, 0.5]",
+            &["per_pixel and levels_turns", "give one"],
+        ),
+        (
+            "a table of more bits",
+            "bits = 4\nlut = \"whole.txt\"",
+            &["whole.txt", "255", "4 bits"],
+        ),
+        (
+            "an aberration of one laser and of three",
+            "aberration = \"both.toml\"",
+            &["both.toml", "laser", "red"],
+        ),
     ];
+    let whole: Vec<_> = (0..256).map(|level: u16| level.to_string()).collect();
+    fs::write(folder.path("whole.txt"), whole.join(" ")).unwrap();
+    fs::write(folder.path("lens.toml"), "[[at]]\nz_mm = 0\ngreeen = [0, 0, 0, 0, 0]").unwrap();
+    let both = "[[at]]\nz_mm = 0\nlaser = [0, 0, 0, 0, 0]\nred = [1, 0, 0, 0, 0]";
+    fs::write(folder.path("both.toml"), both).unwrap();
     fs::write(folder.path("lut.txt"), "1 2 3").unwrap();
     for (name, text, words) in cases {
         fs::write(folder.path("display.toml"), text).unwrap();
@@ -629,9 +830,17 @@ fn networks_that_cannot_be_used_are_named() {
         ("no network", made(&["--network", "no.onnx"]), &["no.onnx"]),
         ("half a network", made(&["--network", "half.onnx"]), &["half.onnx"]),
         (
-            "none that comes along",
+            "none that is bundled",
             made(&["--network", "9"]),
-            &["9", "comes along"],
+            &[
+                "bundled network (rgbd-8, rgbd-15, seeded-6, ddpm-8)",
+                "--network FILE.onnx",
+            ],
+        ),
+        (
+            "one of the source tree",
+            made(&["--network", "rgbd-30"]),
+            &["rgbd-30: is not bundled", "--network models/rgbd-30.onnx"],
         ),
     ]);
 }

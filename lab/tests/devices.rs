@@ -249,6 +249,98 @@ fn what_is_wrong_is_one_line() {
 }
 
 #[test]
+fn a_hologram_is_for_the_display_that_it_was_made_for() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    for (name, text) in [
+        ("own", ""),
+        ("near", "pitch_um = 8.000001\nwavelengths_nm = [638.000001, 520, 450]\n"),
+        ("fine", "pitch_um = 3.74\n"),
+        ("lasers", "wavelengths_nm = [660, 532, 450]\n"),
+        ("bits", "bits = 4\n"),
+        ("calibrated", "lut = \"lut.txt\"\ncarrier_mrad = [2, 0]\n"),
+    ] {
+        let toml = format!("width = 64\nheight = 48\n{text}");
+        fs::write(folder.path(&format!("{name}.toml")), toml).unwrap();
+    }
+    let levels: Vec<_> = (0..256).map(|level: u16| (255 - level).to_string()).collect();
+    fs::write(folder.path("lut.txt"), levels.join(" ")).unwrap();
+    let make = "hologram --rgb rgb.png --depth depth.png --method sweep --planes 4 --display own.toml";
+    let call = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    let succeeds = |line: &str| {
+        let call = call(line);
+        folder.succeeds(&call.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    succeeds(&format!("{make} --complex f.npy -o h.png"));
+    succeeds(&format!("{make} --offset-mm 3 -o moved.png"));
+    let commands = [
+        "pack h.png -o n.png",
+        "refocus h.png --z-mm 0 -o n.png",
+        "view h.png --views 2 -o n.html",
+    ];
+    for display in ["own", "near", "calibrated"] {
+        for command in commands {
+            succeeds(&format!("{command} --display {display}.toml"));
+        }
+    }
+    for name in ["n.png", "n.html"] {
+        fs::remove_file(folder.path(name)).unwrap();
+    }
+    for (display, theirs, ours) in [
+        ("fine.toml", "for a pitch of 8 µm", "has a pitch of 3.74 µm"),
+        (
+            "lasers.toml",
+            "for lasers of 638/520/450 nm",
+            "has lasers of 660/532/450 nm",
+        ),
+        ("bits.toml", "for levels of 8 bits", "has levels of 4 bits"),
+        (
+            "own.toml --offset-mm 3",
+            "for an offset of 0 mm",
+            "has an offset of 3 mm",
+        ),
+        (
+            "ti-plm-p47",
+            "levels of 8 bits, a pitch of 8 µm",
+            "levels of 4 bits, a pitch of 10.8 µm",
+        ),
+    ] {
+        for command in commands.into_iter().chain(["show h.png"]) {
+            let call = call(&format!("{command} --display {display}"));
+            let errors = folder.fails(&call.iter().map(String::as_str).collect::<Vec<_>>(), 1);
+            assert!(
+                errors.lines().count() == 1 && errors.contains("h.png: the hologram is "),
+                "{errors}"
+            );
+            assert!(errors.contains(theirs) && errors.contains(ours), "{call:?}: {errors}");
+            assert!(!folder.path("n.png").exists() && !folder.path("n.html").exists());
+        }
+    }
+    let planes = [
+        "pack",
+        "h.png",
+        "h.png",
+        "--colour",
+        "red",
+        "--display",
+        "ti-plm-p47",
+        "-o",
+        "n.png",
+    ];
+    assert!(folder.fails(&planes, 1).contains("levels of 4 bits"));
+    // A field has no levels, and an offset can be said.
+    succeeds("refocus f.npy --z-mm 0 --display bits.toml -o n.png");
+    succeeds("refocus moved.png --z-mm 0 --display own.toml --offset-mm 3 -o n.png");
+    // What a hologram needs a display for is not made up.
+    succeeds(&format!("{} -o c.png", make.replace("own", "calibrated")));
+    let errors = folder.fails(&["view", "c.png", "-o", "c.html"], 1);
+    assert!(
+        errors.contains("carrier_mrad") && errors.contains("--display"),
+        "{errors}"
+    );
+}
+
+#[test]
 fn devices_are_listed_with_their_sources() {
     let folder = Folder::new();
     let text = folder.succeeds(&["devices"]);

@@ -368,9 +368,9 @@ fn a_focal_stack_is_the_fullest_bins_and_random_others() {
 #[test]
 fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
     let data = Data::new();
-    let network = models::network("8", Precision::Float32).unwrap();
+    let network = models::network("8", Some(Precision::Float32)).unwrap();
     let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../models/ldi3-15.onnx");
-    let layers = models::network(layers, Precision::Float32).unwrap();
+    let layers = models::network(layers, None).unwrap();
     let judged = [("8", &network), ("layers", &layers)]
         .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());
     let [flat, layers] = judged;
@@ -429,6 +429,32 @@ fn the_command_prints_figures_and_draws_the_worst() {
         assert_eq!(picture.dim(), (3, SIZE, 4 * SIZE + 12));
     }
 
+    // A pre-filter takes the place of every encoder, once.
+    let encoders = [
+        "--encoder",
+        "double,anti-alias,band-limit",
+        "--dark",
+        "0,0.4",
+        "--scenes",
+        "1",
+        "--json",
+    ];
+    let output = data.command(&[&["--pair", "--method", "rgb"], &encoders[..]].concat());
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let of = |method: &str| -> Vec<String> {
+        let rows = result["rows"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|row| row["method"] == method);
+        rows.map(|row| row["shown"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(
+        of("pair"),
+        ["complex", "deep, dark 0, steps 1", "deep, dark 0.4, steps 1"]
+    );
+    assert_eq!(of("rgb").len(), 7);
+
     let refused = |arguments: &[&str], code: i32, word: &str| {
         let output = data.command(arguments);
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -440,4 +466,20 @@ fn the_command_prints_figures_and_draws_the_worst() {
     refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
     refused(&["--method", "rgb", "--margin", "24"], 1, "leaves nothing");
     refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
+    refused(
+        &["--method", "rgb", "--taps", "9"],
+        1,
+        "--taps goes with --method sweep",
+    );
+    refused(
+        &["--method", "rgb", "--planes", "9"],
+        1,
+        "--planes goes with a --method of waves",
+    );
+    refused(
+        &["--method", "rgb", "--precision", "f32"],
+        1,
+        "--precision goes with a bundled --network or --pair",
+    );
+    refused(&["--method", "rgb", "--dark", "0"], 2, "--encoder");
 }

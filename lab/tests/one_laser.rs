@@ -174,17 +174,7 @@ fn holograms_are_judged_shown_on_pages_and_measured() {
     let wavelengths = ("Wavelengths".to_owned(), "532 nm".to_owned());
     assert!(scenes[0].figures.contains(&wavelengths));
     for layers in ["0", "8"] {
-        let bench = [
-            "bench",
-            "--layers",
-            layers,
-            "--precision",
-            "int8",
-            "--size",
-            "40x30",
-            "--seconds",
-            "0",
-        ];
+        let bench = ["bench", "--layers", layers, "--size", "40x30", "--seconds", "0"];
         let told =
             json(&folder.succeeds(&[&bench[..], &["--display", "one.toml", "--threads", "1", "--json"]].concat()));
         assert!(told["rows"][0]["total_ms"].as_f64() > Some(0.0));
@@ -350,11 +340,11 @@ fn what_is_not_for_one_laser_is_one_line() {
         ),
         (
             "pack h.png --display three.toml -o n.png".into(),
-            "is of 1 colours, the display has 3",
+            "for lasers of 532 nm, the display has lasers of 638/520/450 nm",
         ),
         (
             "refocus h.png --display three.toml --z-mm 0 -o n.png".into(),
-            "of 1 colours on a display of 3",
+            "for lasers of 532 nm, the display has lasers of 638/520/450 nm",
         ),
         ("compare h.png rgb.png".into(), "of the same colours"),
         (

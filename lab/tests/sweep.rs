@@ -66,7 +66,7 @@ fn other_displays_need_no_training() {
         "pitch_um = 3.74",
         "volume_depth_mm = 12.0",
         "wavelengths_nm = [660, 532, 473]",
-        "wavelengths_nm = [450, 638, 520]\npitch_um = 4.5\nvolume_depth_mm = 3.0",
+        "wavelengths_nm = [638, 520, 450]\npitch_um = 4.5\nvolume_depth_mm = 3.0",
         "offset_mm = 6.0",
         "offset_mm = -10.0",
         "offset_mm = 20.0",

@@ -178,6 +178,33 @@ fn wrong_input_is_named() {
     assert!(refusal(&[name, "--raw", "64x48"]).contains("give - as input"));
     assert!(refusal(&[name, "--near", "1"]).contains("--far"));
     assert!(refusal(&[name, "--rate", "0"]).contains("--rate"));
+    let normalized = refusal(&[name, "--near", "1", "--far", "2"]);
+    assert!(normalized.contains("name the unit by --depth-unit"), "{normalized}");
+    // What would change nothing.
+    for (arguments, word) in [
+        (
+            &["-", "--raw", "64x48", "--repeat", "2"][..],
+            "--repeat goes with a folder",
+        ),
+        (
+            &["-", "--raw", "64x48", "--invert"],
+            "--invert goes with a folder or a film",
+        ),
+        (
+            &["-", "--raw", "64x48", "--pairs", "a*,b*"],
+            "--pairs goes with a folder",
+        ),
+        (&[name, "--depth-beside"], "--depth-beside goes with a film"),
+        (&[name, "--depth-network", "n.onnx"], "--depth-network goes with a film"),
+        (&[name, "--depth-scale", "5000"], "--depth-unit raw"),
+        (
+            &[name, "--depth-unit", "mm", "--method", "sweep", "--network", "8"],
+            "not with sweep",
+        ),
+    ] {
+        let said = refusal(arguments);
+        assert!(said.contains(word), "{arguments:?}: {said}");
+    }
     // Millimetres are no normalized depth.
     std::fs::remove_file(input.join("depth_1.png")).unwrap();
     assert!(refusal(&[name]).contains("no partner"));
@@ -185,6 +212,39 @@ fn wrong_input_is_named() {
     std::fs::create_dir(&empty).unwrap();
     assert!(refusal(&[empty.to_str().unwrap()]).contains("no frames"));
     assert!(!out.exists());
+}
+
+#[test]
+fn depth_beyond_near_and_far_and_another_size_are_told_of() {
+    let (dir, input) = folder(1);
+    let display = dir.path().join("display.toml");
+    std::fs::write(&display, "width = 96\nheight = 48").unwrap();
+    let told = |more: &[&str]| {
+        let call = [
+            "video",
+            input.to_str().unwrap(),
+            "--json",
+            "--depth-unit",
+            "mm",
+            "--method",
+            "sweep",
+        ];
+        let output = phasefront(&[&call[..], more].concat()).output().unwrap();
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let metres = told(&["--near", "500", "--far", "4000"]);
+    assert!(
+        metres.contains("100 % of the depth") && metres.contains("both are metres"),
+        "{metres}"
+    );
+    assert_eq!(told(&["--near", "0.5", "--far", "4"]), "");
+    let size = told(&["--display", display.to_str().unwrap()]);
+    assert!(
+        size.contains("64×48") && size.contains("the modulator 96×48: --size 96x48"),
+        "{size}"
+    );
+    assert_eq!(told(&["--display", display.to_str().unwrap(), "--size", "96x48"]), "");
 }
 
 /// A real sensor's holes, noise and misaligned colour, as video and as a live stream.

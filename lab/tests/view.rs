@@ -79,6 +79,69 @@ fn pages_and_holograms_are_joined_and_keep_their_budget() {
 }
 
 #[test]
+fn a_page_takes_nothing_of_another_but_its_data() {
+    let folder = with_frame();
+    folder.succeeds(
+        &[
+            &["hologram", "--method", "sweep", "--planes", "4"],
+            &FRAME[..],
+            &["-o", "h.png"],
+        ]
+        .concat(),
+    );
+    let title = "</script><script>alert(1)</script>";
+    folder.succeeds(&["view", "h.png", "--views", "2", "--title", title, "-o", "one.html"]);
+    let one = std::fs::read_to_string(folder.path("one.html")).unwrap();
+    assert!(one.contains("default-src 'none'; img-src data:;") && !one.contains("alert(1)</script>"));
+    // All around the data is the program's own.
+    let visited = one.replace("<main>", "<img src=\"https://example.org/a.png\"><main>");
+    std::fs::write(folder.path("visited.html"), visited).unwrap();
+    folder.succeeds(&["view", "visited.html", "h.png", "-o", "joined.html"]);
+    let joined = std::fs::read_to_string(folder.path("joined.html")).unwrap();
+    assert!(!joined.contains("example.org") && joined.matches("Content-Security-Policy").count() == 1);
+    let (before, rest) = one.split_once("data:image/webp;base64,").unwrap();
+    let (data, after) = rest.split_once('"').unwrap();
+    let picture = |url: &str| format!("{before}{url}\"{after}");
+    let data = format!("data:image/webp;base64,{data}");
+    assert_eq!(picture(&data), one);
+    for (name, page, word) in [
+        (
+            "remote",
+            picture("https://example.org/a.webp"),
+            "https://example.org/a.webp",
+        ),
+        ("svg", picture("data:image/svg+xml;base64,PHN2Zy8+"), "svg"),
+        ("text", picture("data:image/webp;base64,\\\"><b>"), "no picture"),
+        ("fewer", one.replacen(&format!("\"{data}\","), "", 1), "1 views"),
+        ("depth", one.replacen("\"slices\":\"", "\"slices\":\"////", 1), "depth"),
+        (
+            "empty",
+            "<script type=\"application/json\" id=\"scenes\">[]</script>".into(),
+            "no hologram",
+        ),
+    ] {
+        std::fs::write(folder.path("bad.html"), page).unwrap();
+        let errors = folder.fails(&["view", "bad.html", "h.png", "-o", "n.html"], 1);
+        assert!(
+            errors.lines().count() == 1 && errors.contains("bad.html"),
+            "{name}: {errors}"
+        );
+        assert!(
+            errors.contains(word) && !folder.path("n.html").exists(),
+            "{name}: {errors}"
+        );
+    }
+    let none = viewer::write(&folder.path("n.html"), &[]).unwrap_err().to_string();
+    assert!(none.contains("a page needs a hologram") && !folder.path("n.html").exists());
+    let small = [
+        "view", "one.html", "h.png", "--views", "2", "--max-mb", "0.9", "-o", "n.html",
+    ];
+    folder.succeeds(&small);
+    let alone = ["view", "one.html", "--views", "2", "-o", "n.html"];
+    assert!(folder.fails(&alone, 1).contains("pages keep their views"));
+}
+
+#[test]
 fn ways_are_judged_by_the_best_wave_at_hand() {
     let folder = with_frame();
     let judged = |more: &[&str]| -> Value {

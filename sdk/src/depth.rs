@@ -57,14 +57,20 @@ pub struct NormalizedDepth {
     pub range_m: Option<(f32, f32)>,
     /// Pixels that had no reading.
     pub filled: usize,
+    /// Pixels that lie before near or beyond far, and became 0 or 1.
+    pub clipped: usize,
 }
+
+/// Share of the pixels that near and far may clip; beyond it nothing is left of the depth.
+const MOST_CLIPPED: f64 = 0.99;
 
 /// Normalizes `depth`, (H, W), of `unit`: pixels with no reading take the nearest reading's, and
 /// `near_m` and `far_m` (metres) become 0 and 1, by default the 1st and 99th percentile of the readings;
 /// what lies beyond them is clamped.
 ///
 /// # Errors
-/// An empty image, no reading at all, a normalized value outside \[0, 1], or a range that is no range.
+/// An empty image, no reading at all, a normalized value outside \[0, 1], near or far for normalized depth, a range that
+/// is no range, or one that hardly any reading lies in.
 pub fn normalize(
     depth: ArrayView2<'_, f32>,
     unit: DepthUnit,
@@ -82,6 +88,12 @@ pub fn normalize(
         )));
     }
     let normalized = unit == DepthUnit::Normalized;
+    let given = near_m.is_some() || far_m.is_some();
+    if normalized && given {
+        return Err(Error::Frame(
+            "near and far are metres and normalized depth has no unit; leave them out, or name the unit of the depth's numbers".into(),
+        ));
+    }
     let mut metres = depth.mapv(|v| match normalized {
         true => v,
         false => unit.metres(v).unwrap_or(f32::NAN),
@@ -97,6 +109,7 @@ pub fn normalize(
             depth: metres,
             range_m: None,
             filled,
+            clipped: 0,
         });
     }
     let (near, far) = match (near_m, far_m) {
@@ -106,10 +119,17 @@ pub fn normalize(
             (near_m.unwrap_or(low), far_m.unwrap_or(high))
         }
     };
-    let given = near_m.is_some() || far_m.is_some();
+    let least = metres.iter().copied().fold(f32::INFINITY, f32::min);
+    let most = metres.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     if !(near.is_finite() && far.is_finite() && near >= 0.0 && (near < far || !given && near == far)) {
         return Err(Error::Frame(format!(
-            "near {near} m and far {far} m are no range; near must lie before far"
+            "near {near} m and far {far} m are no range; near must lie before far, both in metres; the depth lies from {least} m to {most} m"
+        )));
+    }
+    let clipped = metres.iter().filter(|m| !(near..=far).contains(*m)).count();
+    if given && clipped as f64 > MOST_CLIPPED * metres.len() as f64 {
+        return Err(Error::Frame(format!(
+            "near {near} m and far {far} m leave nothing of the depth, which lies from {least} m to {most} m; both are metres"
         )));
     }
     // One distance everywhere has no extent: it lies in the middle of the volume.
@@ -121,6 +141,7 @@ pub fn normalize(
         depth,
         range_m: Some((near, far)),
         filled,
+        clipped,
     })
 }
 
@@ -235,12 +256,28 @@ mod tests {
             (DepthUnit::Metres, Some(1.0), Some(1.0), "no range"),
             (DepthUnit::Metres, Some(f32::NAN), None, "no range"),
             (DepthUnit::Raw { units_per_m: 0.0 }, None, None, "scale"),
+            (DepthUnit::Normalized, Some(0.5), None, "near and far are metres"),
+            (DepthUnit::Metres, Some(500.0), None, "from 0.5 m to 2 m"),
+            (
+                DepthUnit::Metres,
+                Some(500.0),
+                Some(4000.0),
+                "leave nothing of the depth, which lies from 0.5 m to 2 m; both are metres",
+            ),
+            (DepthUnit::Metres, Some(0.1), Some(0.2), "leave nothing"),
         ] {
             let e = normalize(d.view(), unit, near, far).unwrap_err();
             assert!(e.to_string().contains(word), "{e}");
         }
         let none = normalize(array![[0.0, 0.0]].view(), DepthUnit::Metres, None, None);
         assert!(none.unwrap_err().to_string().contains("no reading"));
+    }
+
+    #[test]
+    fn what_lies_beyond_near_and_far_is_counted() {
+        let d = array![[0.5, 1.0, 2.0, 4.0]];
+        let n = normalize(d.view(), DepthUnit::Metres, Some(1.0), Some(2.0)).unwrap();
+        assert_eq!((n.depth, n.clipped), (array![[0.0, 0.0, 1.0, 1.0]], 2));
     }
 
     #[test]

@@ -11,6 +11,7 @@
 
 use crate::display::Display;
 use crate::error::{Error, Result};
+use crate::keys;
 use crate::output::{Cells, Layout, Split};
 use crate::target::{Panel, Response, Target};
 use serde::Deserialize;
@@ -84,19 +85,6 @@ enum PackingToml {
     },
 }
 
-/// The keys of [`DeviceToml`].
-const KEYS: [&str; 9] = [
-    "name",
-    "packing",
-    "flip_x",
-    "flip_y",
-    "levels_turns",
-    "range_turns",
-    "rate_hz",
-    "sources",
-    "unconfirmed",
-];
-
 /// The names of the packings that need no figures.
 const NAMED: [(&str, Layout); 3] = [
     ("rgb", Layout::Rgb),
@@ -144,7 +132,7 @@ impl Device {
     /// # Errors
     /// Text that is not TOML, an unknown key, or what cannot be.
     pub fn from_toml(text: &str) -> Result<Self> {
-        let table = toml::from_str(text).map_err(|e| refuse(one_line(&e)))?;
+        let table = toml::from_str(text).map_err(|e| refuse(keys::message(&e)))?;
         Self::from_table(table)
     }
 
@@ -153,11 +141,12 @@ impl Device {
     /// # Errors
     /// An unknown key, or what cannot be.
     pub fn from_table(mut table: toml::Table) -> Result<Self> {
-        let own: toml::Table = (KEYS.iter())
+        keys::check(&table, &[&keys::DISPLAY[..], &keys::DEVICE].concat())?;
+        let own: toml::Table = (keys::DEVICE.iter())
             .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
             .collect();
-        let display = Display::deserialize(table).map_err(|e| refuse(one_line(&e)))?;
-        let own = DeviceToml::deserialize(own).map_err(|e| match one_line(&e) {
+        let display = Display::deserialize(table).map_err(|e| refuse(keys::message(&e)))?;
+        let own = DeviceToml::deserialize(own).map_err(|e| match keys::message(&e) {
             message if message.contains("untagged") => refuse(format!(
                 "packing must be {}, or say which bits red, green and blue hold, or memory and layout of cells",
                 NAMED.map(|(name, _)| name).join(", ")
@@ -208,12 +197,6 @@ impl Device {
             }),
         }
     }
-}
-
-/// An error of the TOML reader in one line.
-fn one_line(error: &toml::de::Error) -> String {
-    let message = error.message().trim().replace('\n', " ");
-    message.trim_start_matches("display: ").to_owned()
 }
 
 /// The phase of each level in turns, where they are not even over one turn.
@@ -390,7 +373,9 @@ mod tests {
     fn what_cannot_be_is_named_in_one_line() {
         for (text, word) in [
             ("width = ", "expected"),
-            ("widht = 4", "widht"),
+            ("widht = 4", "unknown key `widht`; did you mean `width`?"),
+            ("pack = \"rgb\"", "unknown key `pack`; did you mean `packing`?"),
+            ("wavelengths_nm = [450, 520, 638]", "the longest first: [638, 520, 450]"),
             ("bits = 12", "bits"),
             ("packing = \"rbg\"", "rbg"),
             ("packing = 3", "packing"),

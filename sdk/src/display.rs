@@ -3,6 +3,7 @@
 //! Lengths are metres inside (`_m`); the TOML form has mm, µm and nm, named so.
 
 use crate::error::{Error, Result};
+use crate::keys;
 use serde::{Deserialize, Serialize};
 
 /// One spatial light modulator, its lasers, and the volume it shows.
@@ -109,13 +110,13 @@ impl Display {
     /// Text that is not TOML, an unknown key, or a value out of its range.
     pub fn from_toml(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|e| {
-            let message = e.message().trim();
+            let message = keys::message(&e);
             Error::Display(match e.span() {
                 Some(span) => {
                     let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
-                    format!("line {line}: {}", message.trim_start_matches("display: "))
+                    format!("line {line}: {message}")
                 }
-                None => message.trim_start_matches("display: ").to_owned(),
+                None => message,
             })
         })
     }
@@ -148,6 +149,15 @@ impl Display {
                     self.pitch_m * 1e6
                 ));
             }
+        }
+        if self.wavelengths_m.windows(2).any(|pair| pair[1] > pair[0]) {
+            let mut right = self.wavelengths_m.clone();
+            right.sort_by(|a, b| b.total_cmp(a));
+            return refuse(format!(
+                "wavelengths_nm is {}; three lasers stand in the order red, green, blue, the longest first: {}",
+                nm(&self.wavelengths_m),
+                nm(&right)
+            ));
         }
         if !(self.volume_depth_m > 0.0 && self.volume_depth_m <= 1.0) {
             return refuse(format!(
@@ -250,6 +260,14 @@ impl Display {
     }
 }
 
+/// Wavelengths as the file has them.
+fn nm(wavelengths_m: &[f64]) -> String {
+    let all: Vec<_> = (wavelengths_m.iter())
+        .map(|m| ((m * 1e15).round() / 1e6).to_string())
+        .collect();
+    format!("[{}]", all.join(", "))
+}
+
 /// Checks that `what`, which is of `colours` colours, is for a display of `right` lasers.
 ///
 /// # Errors
@@ -293,13 +311,18 @@ mod tests {
             ("bits = 11", "bits"),
             ("aperture_radius = 0", "aperture_radius"),
             ("aperture_radius = nan", "aperture_radius"),
-            ("pich_um = 8", "pich_um"),
+            ("pich_um = 8", "unknown key `pich_um`; did you mean `pitch_um`?"),
+            ("pitch_mm = 0.008", "unknown key `pitch_mm`; did you mean `pitch_um`?"),
+            ("wavelengths_nm = [450, 520, 638]", "the longest first: [638, 520, 450]"),
+            ("wavelengths_nm = [638, 450, 520]", "red, green, blue"),
             ("width = ", "line 1"),
         ] {
             let message = Display::from_toml(text).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
+        // One laser's light may stand for all three.
+        assert!(Display::from_toml("wavelengths_nm = [532, 532, 532]").is_ok());
     }
 
     #[test]

@@ -84,6 +84,7 @@ mod frame;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod illumination;
+mod keys;
 mod method;
 mod modulator;
 mod network;

@@ -23,6 +23,10 @@ pub mod frame {
 pub mod gpu {
     pub use crate::gpu::*;
 }
+/// Keys of files, and messages about unknown ones.
+pub mod keys {
+    pub use crate::keys::*;
+}
 /// Plans of methods.
 pub mod method {
     pub use crate::method::{MethodPlan, MethodScratch};

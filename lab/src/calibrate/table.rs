@@ -25,6 +25,7 @@ use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::Display;
 use phasefront::target::{Aberration, Illumination, PerPixel};
+use phasefront::unstable::keys;
 use phasefront::unstable::wave::zernike::{Aberrations, Coefficients};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
@@ -140,9 +141,13 @@ impl Entry {
     }
 
     fn aberration(&self) -> phasefront::Result<Aberration> {
+        let three = [self.red, self.green, self.blue];
         match self.laser {
+            Some(_) if three != [Coefficients::default(); 3] => Err(phasefront::Error::Display(
+                "laser stands in the place of red, green and blue; give one or the others".into(),
+            )),
             Some(laser) => Aberration::new([laser]),
-            None => Aberration::new([self.red, self.green, self.blue]),
+            None => Aberration::new(three),
         }
     }
 }
@@ -221,8 +226,7 @@ impl AberrationFile {
 pub fn read_entries(path: &Path) -> Result<Vec<Entry>> {
     output::reading(path)?;
     let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-    let parsed: AberrationToml =
-        toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    let parsed: AberrationToml = toml::from_str(&text).map_err(|e| Error::file(path, keys::message(&e)))?;
     Ok(parsed.at)
 }
 
@@ -343,6 +347,8 @@ mod tests {
         assert_eq!(places, [[0.2, 0.5], [0.8, 0.5]]);
         let laser = |z_mm: f64| Entry {
             laser: Some([0.5, 0.0, -1.0, 0.0, z_mm]),
+            red: [0.0; 5],
+            green: [0.0; 5],
             ..entry(z_mm, None)
         };
         write_aberrations(&path, &[laser(0.0), laser(1.0)]).unwrap();
@@ -354,6 +360,13 @@ mod tests {
         assert_eq!(read.at(1e-3).coefficients(), [[0.5, 0.0, -1.0, 0.0, 1.0]]);
         for (entries, word) in [
             (vec![laser(0.0), entry(1.0, None)], "one colour and of three"),
+            (
+                vec![Entry {
+                    laser: Some([0.0; 5]),
+                    ..entry(0.0, None)
+                }],
+                "laser stands in the place of",
+            ),
             (vec![entry(2.0, None), entry(1.0, None)], "ascend"),
             (vec![entry(0.0, None), entry(1.0, Some(0.5))], "x and y"),
             (vec![entry(0.0, Some(1.5))], "0 to 1"),

@@ -1,6 +1,6 @@
 //! `phasefront bench`: how fast a frame is on this machine, stage by stage.
 
-use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, parse_size, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, check_used, parse_size, progress_bar};
 use super::hologram::PrecisionName;
 use clap::{Args, ValueEnum};
 use phasefront::unstable::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
@@ -67,6 +67,17 @@ impl Bench {
         if let Some(path) = &self.plot {
             output::file(path, &["svg"])?;
         }
+        let on_gpu = self.backend.device()?.is_some();
+        check_used(&[
+            ("--fusion", self.fusion.is_some(), on_gpu, "--backend gpu"),
+            ("--plot", self.plot.is_some(), !on_gpu, "--backend cpu"),
+            (
+                "--precision",
+                self.precision.is_some(),
+                self.layers != Some(0),
+                "a network",
+            ),
+        ])?;
         let target = self.display.read()?.target;
         let budget = Duration::try_from_secs_f64(self.seconds)
             .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
@@ -85,7 +96,7 @@ impl Bench {
     /// What is asked for, or all that comes along.
     fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
         if let Some(file) = &self.network {
-            let network = models::network(file, Precision::Float32)?;
+            let network = models::network(file, None)?;
             return Ok(vec![Method::trained(network)]);
         }
         let mut methods: Vec<_> = (self.come_along().into_iter()).map(Method::trained).collect();
@@ -178,9 +189,6 @@ impl Bench {
         budget: Duration,
         json: bool,
     ) -> Result<()> {
-        if self.plot.is_some() {
-            return Err(Error::Input("--plot goes with --backend cpu".into()));
-        }
         let device = Arc::new(Device::open(options)?);
         let fusions = match self.fusion {
             Some(FusionName::Layers) => vec![Fusion::Layers],

@@ -13,13 +13,18 @@ pub(crate) struct Compare {
     a: PathBuf,
     /// What to compare it with
     b: PathBuf,
-    /// Focus for holograms, mm from the middle of the volume, positive toward the viewer
-    #[arg(long, value_name = "Z", allow_negative_numbers = true, default_value_t = 0.0)]
-    z_mm: f64,
+    /// Focus for holograms, mm from the middle of the volume, positive toward the viewer [default: 0]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    z_mm: Option<f64>,
 }
 
 impl Compare {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        if self.z_mm.is_some() && !files::is_hologram(&self.a)? && !files::is_hologram(&self.b)? {
+            return Err(Error::Input(
+                "--z-mm is the focus of holograms; these are two images, leave it out".into(),
+            ));
+        }
         let a = self.amplitude(&self.a)?;
         let b = self.amplitude(&self.b)?;
         let result = metrics::compare(a.view(), b.view()).map_err(|e| Error::file(&self.b, e))?;
@@ -38,7 +43,9 @@ impl Compare {
     fn amplitude(&self, path: &Path) -> Result<Array3<f32>> {
         if files::is_hologram(path)? {
             let hologram = files::read_hologram(path)?;
-            let mut views = hologram.views(&[self.z_mm / 1e3]).map_err(|e| Error::file(path, e))?;
+            let mut views = hologram
+                .views(&[self.z_mm.unwrap_or(0.0) / 1e3])
+                .map_err(|e| Error::file(path, e))?;
             return Ok(views.remove(0));
         }
         files::read_rgb(path)

@@ -4,8 +4,7 @@ use super::flags::{DisplayFlags, EncoderFlags};
 use clap::Args;
 use phasefront::{Display, Method};
 use phasefront_lab::doctor::{self, Check, Machine};
-use phasefront_lab::models::{self, Precision};
-use phasefront_lab::{Result, gpu};
+use phasefront_lab::{Result, gpu, models};
 use phasefront_models::usual_network;
 use serde::Serialize;
 use serde_json::json;
@@ -62,7 +61,7 @@ impl Chosen {
                 network.layers()
             ),
             None => {
-                let why = models::network("8", Precision::Int8)?.check_display(display);
+                let why = models::network("8", None)?.check_display(display);
                 let why = why.map_or_else(|why| why.to_string(), |()| "none comes along".into());
                 format!("auto: the plane sweep, for no network suits the display ({why})")
             }

@@ -1,6 +1,6 @@
 //! `phasefront evaluate`: the paper's Table 2 on a data set.
 
-use super::flags::{EncoderName, OverwriteFlag, progress_bar};
+use super::flags::{EncoderName, OverwriteFlag, check_used, progress_bar};
 use super::hologram::{PrecisionName, sweep_for};
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
@@ -33,23 +33,24 @@ pub(crate) struct Evaluate {
     /// Networks to judge, separated by commas: one that comes along, or an ONNX file
     #[arg(long, value_name = "8|15|seeded-6|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
-    /// Numbers that networks which come along compute in
-    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
-    precision: PrecisionName,
-    /// Judge the pair of networks that comes along for the offset as well; its pre-filter takes the place of --encoder
+    /// Numbers that bundled networks compute in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
+    /// Judge the bundled pair of networks for the offset as well; its pre-filter takes the place of each --encoder, so
+    /// that its rows are called deep
     #[arg(long)]
     pair: bool,
     /// Encoders to judge as well, separated by commas; the complex field always is
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     encoder: Vec<EncoderName>,
     /// Each encoder with each of these amounts of dark: shares of full light below which phases are drawn to 0
-    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK])]
+    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK], requires = "encoder")]
     dark: Vec<f32>,
     /// Each encoder with each of these numbers of local steps of correction
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1])]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1], requires = "encoder")]
     local_steps: Vec<usize>,
     /// Each encoder with each of these numbers of steps at the midpoint
-    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0])]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0], requires = "encoder")]
     midpoint_steps: Vec<usize>,
     /// Also where a descent of so many steps from the last of these ends: the ceiling of every encoder, some seconds a
     /// scene
@@ -59,13 +60,19 @@ pub(crate) struct Evaluate {
     #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
     offset_mm: f64,
     /// Bits of the modulator that encoded holograms are for
-    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "encoder")]
     bits: u32,
     /// Radius of the aperture that is looked through [default: the display's, which holograms are made for]
-    #[arg(long, value_name = "R")]
+    #[arg(long, value_name = "R", requires = "encoder")]
     look_radius: Option<f64>,
     /// How far its centre lies beside the optical axis, of its radius
-    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        requires = "encoder"
+    )]
     look_shift: f64,
     /// Depth that methods are given
     #[arg(long, value_enum, default_value_t = Depth::Rendered)]
@@ -82,12 +89,12 @@ pub(crate) struct Evaluate {
     /// Taps of the sweep's filter [default: what suits its planes and the display]
     #[arg(long, value_name = "N")]
     taps: Option<usize>,
-    /// Hidden layers of the sweep
-    #[arg(long, value_name = "N", default_value_t = MAX_HIDDEN_LAYERS)]
-    hidden_layers: usize,
-    /// Pixels along each side of the sweep's tiles
-    #[arg(long, value_name = "N", default_value_t = Sweep::TILE)]
-    tile: usize,
+    /// Hidden layers of the sweep [default: 2]
+    #[arg(long, value_name = "N")]
+    hidden_layers: Option<usize>,
+    /// Pixels along each side of the sweep's tiles [default: 256]
+    #[arg(long, value_name = "N")]
+    tile: Option<usize>,
     /// Chooses the random depths of the focal stacks
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
     seed: u64,
@@ -105,7 +112,7 @@ pub(crate) struct Evaluate {
     overwrite: OverwriteFlag,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum MethodName {
     /// The visible image as the field, phase 0
     Rgb,
@@ -140,6 +147,7 @@ impl Evaluate {
             Split::Test => ("test", manifest.splits.test),
         };
         let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
+        self.check_flags()?;
         let methods = self.methods(&manifest)?;
         let shown = self.shown(&manifest.display)?;
         let bar = progress_bar(scenes.len() as u64, "scenes");
@@ -154,8 +162,12 @@ impl Evaluate {
         bar.finish_and_clear();
         if let Some(dir) = &self.pictures {
             output::make_folder(dir)?;
-            for (way, row) in rows.iter().enumerate() {
-                let (method, shown) = (&methods[way / shown.len()], &shown[way % shown.len()]);
+            let ways = methods.iter().flat_map(|method| {
+                evaluate::ways(method, &shown)
+                    .into_iter()
+                    .map(move |shown| (method, shown))
+            });
+            for (row, (method, shown)) in rows.iter().zip(ways) {
                 for (rank, index) in row.worst(self.worst).into_iter().enumerate() {
                     let name = format!(
                         "{}-{}-worst-{}-scene-{index:06}.png",
@@ -163,7 +175,7 @@ impl Evaluate {
                         row.shown.replace(", ", "-").replace(' ', "-"),
                         rank + 1
                     );
-                    evaluate::write_picture(&dir.join(name), &manifest, &self.data, index, method, shown)?;
+                    evaluate::write_picture(&dir.join(name), &manifest, &self.data, index, method, &shown)?;
                 }
             }
         }
@@ -179,6 +191,27 @@ impl Evaluate {
         });
         super::print(json, &value, table(&rows, scenes.len(), split));
         Ok(())
+    }
+
+    /// Refuses flags that no method of those which are judged takes.
+    fn check_flags(&self) -> Result<()> {
+        let has = |wanted: &[MethodName]| self.method.iter().any(|method| wanted.contains(method));
+        let sweep = has(&[MethodName::Sweep]);
+        let planes = self.method.iter().any(|method| *method != MethodName::Rgb);
+        let networks = self.pair || self.network.iter().any(|name| models::is_bundled(name));
+        let cases = [
+            (
+                "--precision",
+                self.precision.is_some(),
+                networks,
+                "a bundled --network or --pair",
+            ),
+            ("--planes", self.planes.is_some(), planes, "a --method of waves"),
+            ("--taps", self.taps.is_some(), sweep, "--method sweep"),
+            ("--hidden-layers", self.hidden_layers.is_some(), sweep, "--method sweep"),
+            ("--tile", self.tile.is_some(), sweep, "--method sweep"),
+        ];
+        check_used(&cases)
     }
 
     fn shown(&self, display: &Display) -> Result<Vec<Shown>> {
@@ -201,22 +234,17 @@ impl Evaluate {
             })?;
             for &dark in &self.dark {
                 for &local_steps in &self.local_steps {
-                    shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| Shown {
-                        name: match midpoint_steps {
-                            0 => format!("{}, dark {dark}, steps {local_steps}", encoder.name()),
-                            more => format!("{}, dark {dark}, steps {local_steps} + {more}", encoder.name()),
-                        },
-                        levels: Some((
-                            target.clone(),
-                            EncoderOptions {
-                                dark,
-                                local_steps,
-                                midpoint_steps,
-                                ..encoding.clone().into()
-                            },
-                        )),
-                        ceiling: 0,
-                        through,
+                    shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| {
+                        let options = EncoderOptions {
+                            dark,
+                            local_steps,
+                            midpoint_steps,
+                            ..encoding.clone().into()
+                        };
+                        Shown {
+                            through,
+                            ..Shown::encoded(encoder.name(), target.clone(), options)
+                        }
                     }));
                 }
             }
@@ -233,8 +261,8 @@ impl Evaluate {
 
     fn sweep(&self, display: &Display) -> Sweep {
         Sweep {
-            hidden_layers: self.hidden_layers,
-            tile: self.tile,
+            hidden_layers: self.hidden_layers.unwrap_or(MAX_HIDDEN_LAYERS),
+            tile: self.tile.unwrap_or(Sweep::TILE),
             ..sweep_for(display, self.planes.map(|n| n as usize), self.taps)
         }
     }
@@ -255,19 +283,21 @@ impl Evaluate {
             })
             .collect::<Result<_>>()?;
         for name in &self.network {
-            let network = models::network(name, self.precision.precision())?;
+            let precision = self.precision.filter(|_| models::is_bundled(name));
+            let network = models::network(name, precision.map(PrecisionName::precision))?;
             let label = format!("network {}", file_stem(name));
             let method = Method::network(label, &network, manifest.size, &manifest.display);
             methods.push(method.map_err(|e| Error::file(name, e))?);
         }
         if self.pair {
             let target = display.clone().with_offset_m(self.offset_mm / 1e3)?;
-            let pair = phasefront_models::pair_for(&target, self.precision.precision()).ok_or_else(|| {
-                Error::Input(format!(
-                    "no pair comes along for an offset of {} mm and this display",
-                    self.offset_mm
-                ))
-            })?;
+            let pair = phasefront_models::pair_for(&target, self.precision.unwrap_or_default().precision())
+                .ok_or_else(|| {
+                    Error::Input(format!(
+                        "no pair of networks is bundled for an offset of {} mm and this display",
+                        self.offset_mm
+                    ))
+                })?;
             methods.push(Method::pair(
                 "pair",
                 &pair.hologram,

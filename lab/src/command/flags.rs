@@ -53,6 +53,17 @@ impl DisplayFlags {
         }
     }
 
+    /// Of a command that needs none.
+    pub(crate) fn read_if_given(&self) -> Result<Option<DisplayFile>> {
+        match (&self.display, self.offset_mm) {
+            (Some(_), _) => Ok(Some(self.read()?)),
+            (None, None) => Ok(None),
+            (None, Some(_)) => Err(Error::Input(
+                "--offset-mm goes with --display; a hologram file says its own offset".into(),
+            )),
+        }
+    }
+
     pub(crate) fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => files::find_display(name)?,
@@ -156,7 +167,7 @@ impl EncoderFlags {
     /// For fields that no network of a pair makes.
     pub(crate) fn read(&self) -> Result<Encoder> {
         let prefilter = match &self.prefilter {
-            Some(file) => Some(models::network(file, Precision::Float32)?),
+            Some(file) => Some(models::network(file, None)?),
             None => None,
         };
         let usual = if prefilter.is_some() { DEEP } else { "anti-alias" };
@@ -182,21 +193,21 @@ impl EncoderFlags {
         matches!(self.encoder, Some(EncoderName(DEEP)))
     }
 
-    /// The network called `network`, and the encoder that belongs to it or is asked for: the pair that comes along for
+    /// The network called `network`, and the encoder that belongs to it or is asked for: the bundled pair for
     /// `display` by its name or for --encoder deep, else 8 layers.
     pub(crate) fn with_network(
         &self,
         network: Option<&str>,
-        precision: Precision,
+        precision: Option<Precision>,
         display: &Display,
     ) -> Result<(Arc<Network>, Encoder)> {
         let by_name = network == Some(models::DEEP);
         let deep = self.is_deep() || (by_name && self.encoder.is_none());
         if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
-            let Some(pair) = phasefront_models::pair_for(display, precision) else {
+            let Some(pair) = phasefront_models::pair_for(display, precision.unwrap_or_default()) else {
                 let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
                 return Err(Error::Input(format!(
-                    "networks for the deep encoder come along for offsets of {} mm and the usual display; train a pair for this one, or take --network 8 --encoder anti-alias",
+                    "networks for the deep encoder are bundled for offsets of {} mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias",
                     offsets.collect::<Vec<_>>().join(", ")
                 )));
             };
@@ -266,16 +277,16 @@ impl EncoderName {
 /// What the numbers of a depth image mean, and which are shown where.
 #[derive(Default, Args)]
 pub(crate) struct DepthFlags {
-    /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth
-    #[arg(long, value_enum, default_value_t = UnitName::Normalized)]
-    depth_unit: UnitName,
+    /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth [default: normalized]
+    #[arg(long, value_enum)]
+    depth_unit: Option<UnitName>,
     /// Units in a metre, for --depth-unit raw
     #[arg(long, value_name = "N", required_if_eq("depth_unit", "raw"))]
     depth_scale: Option<f64>,
-    /// Metres shown nearest [default: the 1st percentile]
+    /// Metres shown nearest, whatever the unit of the depth's numbers [default: the 1st percentile]
     #[arg(long, value_name = "M")]
     near: Option<f32>,
-    /// Metres shown farthest [default: the 99th percentile]
+    /// Metres shown farthest, whatever the unit of the depth's numbers [default: the 99th percentile]
     #[arg(long, value_name = "M")]
     far: Option<f32>,
 }
@@ -303,14 +314,30 @@ impl DepthFlags {
             near,
             far,
         } = self;
-        request.choice("--depth-unit", Some(depth_unit));
+        request.choice("--depth-unit", Some(&depth_unit.unwrap_or_default()));
         request.set("--depth-scale", *depth_scale);
         request.set("--near", *near);
         request.set("--far", *far);
     }
 
-    pub(crate) fn options(&self) -> DepthOptions {
-        let unit = match self.depth_unit {
+    /// --near and --far of video, metres.
+    pub(crate) fn range(&self) -> Result<Option<(f32, f32)>> {
+        match (self.near, self.far) {
+            (None, None) => Ok(None),
+            (Some(near), Some(far)) => Ok(Some((near, far))),
+            _ => Err(Error::Input("video needs both --near and --far, or neither".into())),
+        }
+    }
+
+    pub(crate) fn options(&self) -> Result<DepthOptions> {
+        let unit = self.depth_unit.unwrap_or_default();
+        check_used(&[(
+            "--depth-scale",
+            self.depth_scale.is_some(),
+            unit == UnitName::Raw,
+            "--depth-unit raw",
+        )])?;
+        let unit = match unit {
             UnitName::Normalized => DepthUnit::Normalized,
             UnitName::M => DepthUnit::Metres,
             UnitName::Mm => DepthUnit::Millimetres,
@@ -319,11 +346,11 @@ impl DepthFlags {
                 units_per_m: self.depth_scale.unwrap_or(f64::NAN),
             },
         };
-        DepthOptions {
+        Ok(DepthOptions {
             unit,
             near_m: self.near,
             far_m: self.far,
-        }
+        })
     }
 }
 
@@ -361,6 +388,16 @@ impl BackendFlags {
             (BackendName::Cpu, None) => Ok(None),
             (BackendName::Cpu, Some(_)) => Err(Error::Input("--gpu needs --backend gpu".into())),
         }
+    }
+}
+
+/// Refuses a flag that changes nothing: of each its name, whether it is given, whether it is used, and what it goes with.
+pub(crate) fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
+    match flags.iter().find(|(_, given, used, _)| *given && !*used) {
+        None => Ok(()),
+        Some((flag, .., with)) => Err(Error::Input(format!(
+            "{flag} goes with {with}; here it would change nothing, leave it out"
+        ))),
     }
 }
 

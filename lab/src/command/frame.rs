@@ -22,11 +22,13 @@ pub(crate) struct FrameFlags {
     #[arg(long, value_name = "FILE", requires = "rgb", conflicts_with = "depth_network")]
     depth: Option<PathBuf>,
     /// A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
     photo: Option<PathBuf>,
     #[command(flatten)]
     seen: SeenDepthFlags,
-    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with --photo]
+    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with --photo].
+    /// An image of another size than the modulator's is told of: with --display any, without it one that is larger than
+    /// the default display
     #[arg(long, value_enum)]
     fit: Option<FitName>,
     #[command(flatten)]
@@ -37,7 +39,7 @@ pub(crate) struct FrameFlags {
 #[derive(Clone, Default, Args)]
 pub(crate) struct SeenDepthFlags {
     /// ONNX file of a network that sees relative inverse depth in colour alone (docs/depth.md)
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_network: Option<PathBuf>,
     /// Numbers that the colours are for --depth-network
     #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
@@ -152,7 +154,35 @@ fn of_two_folders(colour: &Path, depth: &Path) -> Result<Vec<Picture>> {
     Ok(pairs.chain(alone).collect())
 }
 
+/// Says that a hologram of (H, W) pixels is not the size of its modulator, which `flag` would make it. A display that
+/// nobody `named` is a stand-in, in whose middle any smaller hologram may lie.
+pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, named: bool, flag: &str) {
+    let (rows, columns) = (display.height(), display.width());
+    let larger = height > rows || width > columns;
+    if larger || named && (height, width) != (rows, columns) {
+        let whose = if named { "modulator" } else { "default modulator" };
+        log::warn!(
+            "the hologram is {width}×{height} as the image is, the {whose} {columns}×{rows}: {flag} makes the whole modulator's"
+        );
+    }
+}
+
 impl FrameFlags {
+    /// The names of the flags, for what takes their place.
+    pub(crate) const NAMES: [&str; 11] = [
+        "rgb",
+        "depth",
+        "photo",
+        "depth_network",
+        "depth_network_colours",
+        "invert",
+        "fit",
+        "depth_unit",
+        "depth_scale",
+        "near",
+        "far",
+    ];
+
     /// Notes all but which picture it is.
     pub(crate) fn record(&self, request: &mut Request) -> Result<()> {
         let FrameFlags {
@@ -209,11 +239,11 @@ impl FrameFlags {
         self.photo.as_deref().or(self.rgb.as_deref())
     }
 
-    /// The frame for `display`, in the colours of its lasers.
-    pub(crate) fn read(&self, display: &Display) -> Result<RgbdFrame> {
+    /// The frame for `display`, in the colours of its lasers; `named` where the display was asked for.
+    pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
         let frame = match (&self.rgb, &self.depth, &self.photo) {
             (Some(rgb), Some(depth), _) => {
-                let frame = rgbd::read(rgb, depth, self.depth_numbers.options())?;
+                let frame = rgbd::read(rgb, depth, self.depth_numbers.options()?)?;
                 let frame = self.inverted(frame)?;
                 let placement = self.placement(frame.shape(), display);
                 placement.frame(placement.colour(frame.rgb()), placement.depth(frame.depth()))
@@ -230,17 +260,7 @@ impl FrameFlags {
                 "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
             )),
         }?;
-        let modulator = (display.height(), display.width());
-        let usual = Display::default();
-        let is_usual = modulator == (usual.height(), usual.width());
-        if frame.shape() != modulator && !is_usual {
-            let (height, width) = frame.shape();
-            log::warn!(
-                "the hologram is {width}×{height} as the image is, the modulator {}×{}: --fit contain, cover or centre makes the whole modulator's",
-                modulator.1,
-                modulator.0
-            );
-        }
+        warn_of_size(frame.shape(), display, named, "--fit contain, cover or centre");
         Ok(frame.for_display(display))
     }
 
@@ -261,7 +281,7 @@ impl FrameFlags {
 
     /// The frame of a photo: by its distances where --near or --far ask for them, else d_n as it is.
     fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
-        let options = self.depth_numbers.options();
+        let options = self.depth_numbers.options()?;
         let depth = match (options.near_m, options.far_m, photo.metres()) {
             (None, None, _) => rgbd::relative(photo.depth.view(), None, None),
             (near, far, Some(metres)) => rgbd::relative(metres.view(), near, far),

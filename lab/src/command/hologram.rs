@@ -1,6 +1,6 @@
 //! `phasefront hologram`: an RGB-D image or a layered depth image to a phase-only hologram.
 
-use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, progress_bar};
+use super::flags::{BackendFlags, DisplayFlags, Encoder, EncoderFlags, check_used, progress_bar};
 use super::frame::{FrameFlags, Picture};
 use super::method::{CoreMethod, Parts};
 use super::request::{Before, Request};
@@ -60,28 +60,27 @@ pub(crate) struct Making {
     #[command(flatten)]
     frame: FrameFlags,
     /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth", "photo", "depth_network", "fit"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
     ldi: Option<PathBuf>,
     /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
     /// and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with
-    /// --method seeded]
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method seeded]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
-    /// Numbers that a network which comes along computes in
-    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
-    precision: PrecisionName,
+    /// Numbers that a bundled network computes in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
     /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
     #[arg(long, value_name = "N")]
     planes: Option<usize>,
     /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
     #[arg(long, value_name = "N")]
     taps: Option<usize>,
-    /// What keeps light from where it should not go, for --method points
-    #[arg(long, value_enum, default_value_t = OcclusionName::Geometric)]
-    occlusion: OcclusionName,
+    /// What keeps light from where it should not go, for --method points [default: geometric]
+    #[arg(long, value_enum)]
+    occlusion: Option<OcclusionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     /// The amplitude that full light stands for [default: the largest of the image]
@@ -121,13 +120,14 @@ impl ValueEnum for Method {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Default, ValueEnum)]
 enum OcclusionName {
     /// Nothing: every point of every layer lights its whole sub-hologram
     None,
     /// The image: only points of the front layer shine
     Input,
     /// Rays: every point shines where no nearer surface is in the way
+    #[default]
     Geometric,
 }
 
@@ -142,8 +142,9 @@ impl OcclusionName {
 }
 
 /// The numbers of a network.
-#[derive(Clone, Copy, PartialEq, ValueEnum)]
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
 pub(crate) enum PrecisionName {
+    #[default]
     /// Whole numbers of 8 bits: the fastest
     Int8,
     /// Floating point
@@ -297,6 +298,36 @@ pub(crate) enum Image {
 }
 
 impl Making {
+    /// The names of the flags but for those of the display, for what takes their place.
+    pub(crate) const NAMES: [&str; 26] = [
+        "rgb",
+        "depth",
+        "photo",
+        "depth_network",
+        "depth_network_colours",
+        "invert",
+        "fit",
+        "depth_unit",
+        "depth_scale",
+        "near",
+        "far",
+        "ldi",
+        "method",
+        "network",
+        "precision",
+        "planes",
+        "taps",
+        "occlusion",
+        "encoder",
+        "prefilter",
+        "dark",
+        "local_steps",
+        "midpoint_steps",
+        "scale",
+        "backend",
+        "gpu",
+    ];
+
     /// Of images that are read already, for `display`.
     pub(crate) fn of(display: DisplayFlags) -> Self {
         Making {
@@ -304,10 +335,10 @@ impl Making {
             ldi: None,
             method: None,
             network: None,
-            precision: PrecisionName::Int8,
+            precision: None,
             planes: None,
             taps: None,
-            occlusion: OcclusionName::Geometric,
+            occlusion: None,
             encoder: EncoderFlags::default(),
             scale: None,
             backend: BackendFlags::default(),
@@ -319,7 +350,7 @@ impl Making {
     /// The same image another way.
     pub(crate) fn way(&mut self, method: Method, network: Option<String>, encoder: EncoderFlags) {
         (self.method, self.network, self.encoder) = (Some(method), network, encoder);
-        (self.planes, self.precision) = (None, PrecisionName::Int8);
+        (self.planes, self.precision) = (None, None);
     }
 
     /// With so many planes.
@@ -329,7 +360,7 @@ impl Making {
 
     /// By a network in floating point.
     pub(crate) fn in_float32(&mut self) {
-        self.precision = PrecisionName::F32;
+        self.precision = Some(PrecisionName::F32);
     }
 
     pub(crate) fn display(&self) -> Result<DisplayFile> {
@@ -356,10 +387,10 @@ impl Making {
         frame.record(request)?;
         request.choice("--method", method.as_ref());
         request.name_or_file("--network", network.as_deref())?;
-        request.choice("--precision", Some(precision));
+        request.choice("--precision", Some(&precision.unwrap_or_default()));
         request.set("--planes", *planes);
         request.set("--taps", *taps);
-        request.choice("--occlusion", Some(occlusion));
+        request.choice("--occlusion", Some(&occlusion.unwrap_or_default()));
         encoder.record(request)?;
         request.set("--scale", *scale);
         backend.record(request);
@@ -381,13 +412,58 @@ impl Making {
         self.frame.take(picture);
     }
 
+    pub(crate) fn is_for_a_display(&self) -> bool {
+        self.display.is_given()
+    }
+
+    pub(crate) fn display_if_given(&self) -> Result<Option<DisplayFile>> {
+        self.display.read_if_given()
+    }
+
     /// The file that the image is from.
     pub(crate) fn source(&self) -> Option<&Path> {
         self.ldi.as_deref().or(self.frame.source())
     }
 
+    /// What the flags ask for.
+    fn method(&self) -> Method {
+        self.method.unwrap_or(match (&self.ldi, &self.network) {
+            (Some(_), None) => Method::Layers,
+            (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
+            _ => Method::Core(CoreMethod::Network),
+        })
+    }
+
+    /// Refuses flags that the method does not take.
+    fn check_flags(&self) -> Result<()> {
+        use CoreMethod::{Auto, Network, Seeded, Sweep};
+        let method = self.method();
+        let any = |of: &[CoreMethod]| matches!(method, Method::Core(core) if of.contains(&core));
+        let (sweeps, trained) = (any(&[Sweep, Auto]), any(&[Network, Seeded, Auto]));
+        let planes = sweeps || matches!(method, Method::Layers | Method::Points);
+        let network = "--method network, seeded or auto";
+        check_used(&[
+            ("--network", self.network.is_some(), trained, network),
+            ("--precision", self.precision.is_some(), trained, network),
+            (
+                "--planes",
+                self.planes.is_some(),
+                planes,
+                "--method sweep, auto, layers or points",
+            ),
+            ("--taps", self.taps.is_some(), sweeps, "--method sweep or auto"),
+            (
+                "--occlusion",
+                self.occlusion.is_some(),
+                method == Method::Points,
+                "--method points",
+            ),
+        ])
+    }
+
     /// The image for `display`.
     pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
+        self.check_flags()?;
         if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.ldi)
             && method != CoreMethod::Network
         {
@@ -400,16 +476,14 @@ impl Making {
             Some(dir) => Ok(Image::Layers(
                 Ldi::read(dir)?.for_display(&display.target.display).into_owned(),
             )),
-            None => Ok(Image::Rgbd(self.frame.read(&display.target.display)?)),
+            None => Ok(Image::Rgbd(
+                self.frame.read(&display.target.display, self.display.is_given())?,
+            )),
         }
     }
 
     pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<Made> {
-        let method = self.method.unwrap_or(match (&self.ldi, &self.network) {
-            (Some(_), None) => Method::Layers,
-            (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
-            _ => Method::Core(CoreMethod::Network),
-        });
+        let method = self.method();
         let device = self.backend.device()?;
         if device.is_some()
             && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())
@@ -421,13 +495,16 @@ impl Making {
         }
         match (method, image) {
             (Method::Core(method), Image::Rgbd(frame)) => {
-                let method = match method {
+                let chosen = match method {
                     CoreMethod::Auto => self.by_sharpness(frame, &display.target.display)?,
                     method => method,
                 };
+                // Where depth is sharp, auto leaves its network alone.
+                let trained = method == chosen || chosen == CoreMethod::Network;
+                let method = chosen;
                 let (core, encoder) = method.of(&Parts {
-                    network: self.network.as_deref(),
-                    precision: self.precision.precision(),
+                    network: self.network.as_deref().filter(|_| trained),
+                    precision: self.precision.filter(|_| trained),
                     display: &display.target.display,
                     sweep: sweep_for(&display.target.display, self.planes, self.taps),
                     encoder: &self.encoder,
@@ -582,7 +659,7 @@ impl Making {
             }
             Method::Points => {
                 bar.set_message("rows");
-                let occlusion = self.occlusion.occlusion();
+                let occlusion = self.occlusion.unwrap_or_default().occlusion();
                 let field = point_based::hologram(ldi, display, planes, occlusion, &progress)?;
                 ("points", field)
             }
@@ -634,7 +711,7 @@ impl Making {
         let name = self.network.as_deref().ok_or_else(|| {
             Error::Input("--method network with --ldi needs a --network for layered depth images".into())
         })?;
-        let network = models::network(name, self.precision.precision())?;
+        let network = models::network(name, self.precision.map(PrecisionName::precision))?;
         if !matches!(network.input(), InputKind::Ldi { .. }) {
             return Err(Error::Input(format!(
                 "--network {name} takes '{}'; for a layered depth image one for 'ldi2' to 'ldi9' is needed",

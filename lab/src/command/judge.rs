@@ -28,7 +28,7 @@ pub(crate) struct Judge {
     #[command(flatten)]
     frame: FrameFlags,
     /// Folder of a layered depth image
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["rgb", "depth", "photo", "depth_network", "fit"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
     ldi: Option<PathBuf>,
     /// Methods [default: sweep and, where they were trained for the display, network and seeded]
     #[arg(long, value_enum, value_delimiter = ',')]
@@ -84,7 +84,7 @@ impl Judge {
         let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
         let frame = match &layers {
             Some(ldi) => evaluate::visible_frame(ldi, display)?,
-            None => self.frame.read(display)?,
+            None => self.frame.read(display, self.display.is_given())?,
         };
         let (height, width) = frame.shape();
         if 2 * self.margin >= height.min(width) {
@@ -145,7 +145,7 @@ impl Judge {
     ) -> Result<(Hologram, String)> {
         let display = &file.target.display;
         let best = "15";
-        let trained = models::network(best, models::Precision::Float32)?
+        let trained = models::network(best, Some(models::Precision::Float32))?
             .check_display(display)
             .is_ok();
         making.keeps_field = true;

@@ -1,10 +1,11 @@
 //! The methods of the core, by the names that the commands have for them.
 
-use super::flags::{Encoder, EncoderFlags};
+use super::flags::{Encoder, EncoderFlags, check_used};
+use super::hologram::PrecisionName;
 use clap::ValueEnum;
 use phasefront::{Display, Method, Sweep};
 use phasefront_lab::Result;
-use phasefront_lab::models::{self, Precision};
+use phasefront_lab::models;
 
 /// A method on RGB-D images.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -23,7 +24,8 @@ pub(crate) enum CoreMethod {
 pub(super) struct Parts<'a> {
     /// --network.
     pub(super) network: Option<&'a str>,
-    pub(super) precision: Precision,
+    /// --precision.
+    pub(super) precision: Option<PrecisionName>,
     pub(super) display: &'a Display,
     pub(super) sweep: Sweep,
     pub(super) encoder: &'a EncoderFlags,
@@ -48,6 +50,13 @@ impl CoreMethod {
             sweep,
             encoder,
         } = *parts;
+        let trained = self != CoreMethod::Sweep;
+        let with = "a --method with a network, not with sweep";
+        check_used(&[
+            ("--network", network.is_some(), trained, with),
+            ("--precision", precision.is_some(), trained, with),
+        ])?;
+        let precision = precision.map(PrecisionName::precision);
         Ok(match self {
             CoreMethod::Network => {
                 let (network, encoder) = encoder.with_network(network, precision, display)?;

@@ -23,12 +23,12 @@ pub(crate) struct MultiplexCommand {
     /// How the wave is made
     #[arg(long, value_enum, default_value_t = CoreMethod::Sweep)]
     method: CoreMethod,
-    /// A network that comes along, or an ONNX file [default: 8]
+    /// A bundled network, or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
-    /// Numbers that a network which comes along computes in
-    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
-    precision: PrecisionName,
+    /// Numbers that a bundled network computes in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     #[command(flatten)]
@@ -75,10 +75,10 @@ impl MultiplexCommand {
                 "maps are made for levels of up to 8 bits, without a carrier, a lens or a flatness map".into(),
             ));
         }
-        let frame = self.frame.read(&target.display)?;
+        let frame = self.frame.read(&target.display, self.display.is_given())?;
         let (method, encoder) = self.method.of(&Parts {
             network: self.network.as_deref(),
-            precision: self.precision.precision(),
+            precision: self.precision,
             display: &target.display,
             sweep: sweep_for(&target.display, None, None),
             encoder: &self.encoder,

@@ -29,7 +29,9 @@ impl Pack {
         let display = self.display.read()?;
         packed::declare(&self.output, &display)?;
         let images = match (&self.holograms[..], &self.colour) {
-            ([hologram], None) => packed::pack(&files::read_hologram(hologram)?, &display)?,
+            ([hologram], None) => {
+                packed::pack(&files::read_hologram(hologram)?, &display).map_err(|e| Error::file(hologram, e))?
+            }
             (_, Some(colour)) => {
                 let colour = packed::colour(colour, display.device.display.colours())?;
                 vec![self.planes(&display, colour)?]
@@ -64,12 +66,11 @@ impl Pack {
         };
         let mut maps = Vec::new();
         for path in &self.holograms {
-            let Hologram::PhaseOnly(levels, _) = files::read_hologram(path)? else {
+            let hologram = files::read_hologram(path)?;
+            display.check(&hologram).map_err(|e| Error::file(path, e))?;
+            let Hologram::PhaseOnly(levels, _) = hologram else {
                 return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
             };
-            if levels.dim().0 != display.device.display.colours() {
-                return Err(Error::file(path, "is of other colours than the display"));
-            }
             maps.push(levels.index_axis(ndarray::Axis(0), colour).to_owned());
         }
         let plan = packed::bit_planes(display, maps[0].dim(), cells)?;

@@ -1,6 +1,6 @@
 //! `phasefront refocus`: what an eye focused at z would see of a hologram file.
 
-use super::flags::OverwriteFlag;
+use super::flags::{DisplayFlags, OverwriteFlag};
 use clap::Args;
 use phasefront_lab::{Error, Result, files, output, pictures};
 use serde_json::json;
@@ -8,6 +8,9 @@ use std::path::PathBuf;
 
 /// Look at a hologram with the eye focused at z
 #[derive(Args)]
+#[command(mut_arg("display", |display| display.help(
+    "TOML file of the display that the hologram was made for, or a modulator's name [default: what the hologram says of it]"
+)))]
 pub(crate) struct Refocus {
     /// A hologram PNG, or a complex .npy with its .json
     hologram: PathBuf,
@@ -23,9 +26,8 @@ pub(crate) struct Refocus {
     /// That many views from the near end of the volume to the far one
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=1000))]
     stack: Option<u32>,
-    /// TOML file of a calibrated display, whose tables the hologram was made for, or a modulator's name
-    #[arg(long, value_name = "FILE|NAME")]
-    display: Option<String>,
+    #[command(flatten)]
+    display: DisplayFlags,
     /// Width of the pictures, pixels; their sides keep their proportion [default: the hologram's]
     #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u32).range(1..=16384))]
     width: Option<u32>,
@@ -50,9 +52,9 @@ impl Refocus {
             }
         };
         let z_m: Vec<f64> = z_mm.iter().map(|z| z / 1e3).collect();
-        let views = match &self.display {
+        let views = match self.display.read_if_given()? {
             None => hologram.views(&z_m),
-            Some(name) => hologram.views_on(&files::find_display(name)?, &z_m),
+            Some(display) => hologram.views_on(&display, &z_m),
         }
         .map_err(|e| Error::file(&self.hologram, e))?;
         let views: Vec<_> = (views.iter())

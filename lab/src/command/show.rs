@@ -22,7 +22,7 @@ pub(crate) struct Show {
     #[command(flatten)]
     display: DisplayFlags,
     /// Of holograms that take an image a colour, the one colour that is shown
-    #[arg(long, value_parser = packed::COLOURS)]
+    #[arg(long, value_parser = packed::COLOURS, requires = "display")]
     colour: Option<String>,
     /// Frames a second [default: the screen's]
     #[arg(long, value_name = "HZ")]
@@ -61,7 +61,7 @@ impl Show {
     }
 
     fn images(&self) -> Result<Vec<packed::Image>> {
-        let display = self.display.is_given().then(|| self.display.read()).transpose()?;
+        let display = self.display.read_if_given()?;
         let paths = self.frames.iter().map(|path| images_of(path));
         let mut images = Vec::new();
         for path in paths.collect::<Result<Vec<_>>>()?.concat() {
@@ -75,7 +75,7 @@ impl Show {
 
     /// The images of a hologram, or that of the one colour.
     fn packed(&self, path: &Path, display: &DisplayFile) -> Result<Vec<packed::Image>> {
-        let mut images = packed::pack(&files::read_hologram(path)?, display)?;
+        let mut images = packed::pack(&files::read_hologram(path)?, display).map_err(|e| Error::file(path, e))?;
         let Some(name) = &self.colour else {
             return Ok(images);
         };

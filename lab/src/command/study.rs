@@ -1,11 +1,10 @@
 //! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
 //! video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
 
-use super::flags::{DisplayFlags, progress_bar};
+use super::flags::{DisplayFlags, check_used, progress_bar};
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};
 use phasefront_lab::depth_study::{self, RATIO, SENSOR};
-use phasefront_lab::models::Precision;
 use phasefront_lab::output::{self, Holding};
 use phasefront_lab::plot::{self, Panel};
 use phasefront_lab::study::{self, Row, Scenes};
@@ -24,16 +23,16 @@ pub(crate) struct Study {
     /// Random scenes
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
     scenes: u16,
-    /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768
-    #[arg(long, value_name = "PX", default_value_t = 384, value_parser = clap::value_parser!(u16).range(1..=4096))]
-    size: u16,
+    /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768 [default: 384]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    size: Option<u16>,
     /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays
     /// 200]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     planes: Option<u32>,
-    /// Layers of a layered depth image in the study of planes
-    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u8).range(1..=64))]
-    ldi_layers: u8,
+    /// Layers of a layered depth image in the study of planes [default: 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    ldi_layers: Option<u8>,
     /// Seed of the first scene; the others follow
     #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 48))]
     seed: u64,
@@ -65,6 +64,28 @@ enum What {
 
 impl Study {
     pub(crate) fn run(self, json: bool) -> Result<()> {
+        let of_planes = self.what == What::Planes;
+        let of_sensor = matches!(self.what, What::Depth | What::Flicker);
+        check_used(&[
+            (
+                "--ldi-layers",
+                self.ldi_layers.is_some(),
+                of_planes,
+                "the study of planes",
+            ),
+            (
+                "--size",
+                self.size.is_some(),
+                !of_sensor,
+                "scenes without a sensor's depth",
+            ),
+            (
+                "--planes",
+                self.planes.is_some(),
+                self.what != What::Flicker,
+                "studies of exact waves",
+            ),
+        ])?;
         output::folder(&self.output, Holding::Anything)?;
         match self.what {
             What::Layers | What::Planes => {}
@@ -76,6 +97,7 @@ impl Study {
         let scenes = self.scenes()?;
         let of_layers = self.what == What::Layers;
         let planes = self.planes.unwrap_or(if of_layers { 256 } else { 8192 }) as usize;
+        let ldi_layers = self.ldi_layers.unwrap_or(5).into();
         let work = match of_layers {
             true => study::layers_work(&scenes, planes),
             false => study::planes_work(&scenes, planes),
@@ -84,13 +106,13 @@ impl Study {
         let done = |planes: usize| bar.inc(planes as u64);
         let (name, rows) = match of_layers {
             true => ("layers", study::layers(&scenes, planes, &done)?),
-            false => ("planes", study::planes(&scenes, self.ldi_layers.into(), planes, &done)?),
+            false => ("planes", study::planes(&scenes, ldi_layers, planes, &done)?),
         };
         bar.finish_and_clear();
         let finest = if of_layers { study::FINEST_LAYERS } else { planes };
         let result = json!({
             "study": name, "finest": finest, "planes": planes,
-            "ldi_layers": if of_layers { study::FINEST_LAYERS } else { self.ldi_layers.into() },
+            "ldi_layers": if of_layers { study::FINEST_LAYERS } else { ldi_layers },
             "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed, "display": scenes.display,
             "rows": rows,
         });
@@ -110,7 +132,7 @@ impl Study {
     fn scenes(&self) -> Result<Scenes> {
         Ok(Scenes {
             scenes: self.scenes.into(),
-            size: self.size.into(),
+            size: self.size.unwrap_or(384).into(),
             seed: self.seed,
             display: self.display.read_of_three()?.target.display,
         })
@@ -236,7 +258,7 @@ impl Study {
         let sweep = Method::Sweep(Sweep::for_display(&display));
         let mut methods = vec![("sweep".to_owned(), sweep)];
         for model in phasefront_models::NETWORKS {
-            let network = models::network(model.name, Precision::Int8)?;
+            let network = models::network(model.name, None)?;
             methods.push((format!("network {}", model.name), Method::trained(network)));
         }
         let scenes = usize::from(self.scenes);
@@ -268,7 +290,7 @@ impl Study {
         const FRAMES: usize = 30;
         let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
         let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
-        let method = Method::Network(models::network("8", Precision::Int8)?);
+        let method = Method::Network(models::network("8", None)?);
         let scenes = usize::from(self.scenes);
         let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
         let mut rows: Vec<flicker::Row> = Vec::new();

@@ -4,7 +4,7 @@ mod sink;
 mod source;
 
 use super::flags::{BackendFlags, DepthFlags, DisplayFlags, EncoderFlags, parse_size};
-use super::frame::SeenDepthFlags;
+use super::frame::{SeenDepthFlags, warn_of_size};
 use super::hologram::PrecisionName;
 use super::method::{CoreMethod, Parts};
 use super::request::{Before, Request};
@@ -37,7 +37,7 @@ pub(crate) struct Video {
     #[arg(long, value_name = "FILE")]
     depth_video: Option<PathBuf>,
     /// Depth of a film: the right half of its pictures, in grey
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
     depth_beside: bool,
     #[command(flatten)]
     seen: SeenDepthFlags,
@@ -52,12 +52,12 @@ pub(crate) struct Video {
     /// How the holograms are made
     #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
     method: CoreMethod,
-    /// A network that comes along (`phasefront networks` lists them), or an ONNX file [default: 8]
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
-    /// Numbers that a network which comes along computes in
-    #[arg(long, value_enum, default_value_t = PrecisionName::Int8)]
-    precision: PrecisionName,
+    /// Numbers that a bundled network computes in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
     #[command(flatten)]
     encoder: EncoderFlags,
     /// Size of the holograms [default: the first frame's colour]
@@ -194,7 +194,7 @@ impl Video {
         depth.record(&mut request);
         request.choice("--method", Some(method));
         request.name_or_file("--network", network.as_deref())?;
-        request.choice("--precision", Some(precision));
+        request.choice("--precision", Some(&precision.unwrap_or_default()));
         encoder.record(&mut request)?;
         flags.record(display, &mut request)?;
         backend.record(&mut request);
@@ -226,8 +226,12 @@ impl Video {
         rate: f64,
     ) -> Result<(SessionOptions, HologramInfo)> {
         let file = self.display.read()?;
-        let (width, height) = self.size.unwrap_or((width, height));
         let modulator = &file.target.display;
+        if self.size.is_none() {
+            let size = format!("--size {}x{}", modulator.width(), modulator.height());
+            warn_of_size((height, width), modulator, self.display.is_given(), &size);
+        }
+        let (width, height) = self.size.unwrap_or((width, height));
         if let Some(light) = &file.target.illumination
             && (height, width) != (modulator.height(), modulator.width())
         {
@@ -253,7 +257,7 @@ impl Video {
         let display = target.display.clone();
         let (method, encoder) = self.method.of(&Parts {
             network: self.network.as_deref(),
-            precision: self.precision.precision(),
+            precision: self.precision,
             display: &display,
             sweep: Sweep::for_display(&display),
             encoder: &self.encoder,
@@ -264,13 +268,9 @@ impl Video {
             BrightnessName::Steady => Brightness::Steady,
             BrightnessName::Max => Brightness::FrameMax,
         };
-        let depth = self.depth.options();
-        options.depth.range = match (depth.near_m, depth.far_m) {
-            (None, None) => DepthRange::Percentiles,
-            (Some(near_m), Some(far_m)) => DepthRange::Fixed { near_m, far_m },
-            _ => {
-                return Err(Error::Input("video needs both --near and --far, or neither".into()));
-            }
+        options.depth.range = match self.depth.range()? {
+            None => DepthRange::Percentiles,
+            Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
         };
         if let Some(device) = self.backend.device()? {
             options.backend = Backend::Gpu;

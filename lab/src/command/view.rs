@@ -1,6 +1,6 @@
 //! `phasefront view`: one HTML file to look at holograms in.
 
-use super::flags::progress_bar;
+use super::flags::{check_used, progress_bar};
 use super::hologram::{Image, Judged, Making, infos, judge};
 use clap::Args;
 use image::RgbImage;
@@ -11,6 +11,7 @@ use phasefront_lab::files::{self, DisplayFile, Hologram, HologramInfo};
 use phasefront_lab::viewer::{self, Depth, Phase, Scene};
 use phasefront_lab::{Error, Result, output};
 use serde_json::json;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Make one HTML file to look at holograms in: no server, no network
@@ -19,22 +20,23 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub(crate) struct View {
     /// Holograms (.png, or .npy with its .json), folders of `video`, pages of this command: all become one page
-    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = ["rgb", "photo", "ldi"])]
+    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = Making::NAMES)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     making: Making,
     /// Views from the near end of the volume to the far one [default: 25; 5 a frame of video]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=200))]
     views: Option<u8>,
-    /// Frames that a video is shown with, evenly chosen
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u16).range(1..=1000))]
-    frames: u16,
+    /// Frames that a video is shown with, evenly chosen [default: 24]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    frames: Option<u16>,
     /// What a hologram is called on the page [default: its file's name]
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
-    /// Size that the page keeps under, MB; its pictures are made smaller for it
-    #[arg(long, value_name = "MB", default_value_t = 5.0)]
-    max_mb: f64,
+    /// Size that the page keeps under, MB; its pictures are made smaller for it, but those of joined pages are kept
+    /// [default: 5, and the size of joined pages]
+    #[arg(long, value_name = "MB")]
+    max_mb: Option<f64>,
     /// The page
     #[arg(short, value_name = "OUT.html")]
     output: PathBuf,
@@ -43,6 +45,10 @@ pub(crate) struct View {
 /// Views of a still and of a frame of video.
 const STILL_VIEWS: u8 = 25;
 const FRAME_VIEWS: u8 = 5;
+/// Frames of a video.
+const VIDEO_FRAMES: u16 = 24;
+/// Size of a page that joins none, MB.
+const USUAL_MB: f64 = 5.0;
 /// Bytes of a page besides its views: itself, phases, depths.
 const BESIDE_VIEWS: usize = 400_000;
 /// Views that are computed at a time.
@@ -67,11 +73,13 @@ impl View {
         for path in &self.inputs {
             output::reading(path)?;
         }
-        let budget = self.max_mb * 1e6 / self.inputs.len().max(1) as f64;
+        self.check_flags()?;
+        let max_mb = self.max_mb.unwrap_or(USUAL_MB);
+        let budget = max_mb * 1e6 / self.inputs.len().max(1) as f64;
         if !(budget.is_finite() && budget > BESIDE_VIEWS as f64) {
             return Err(Error::Input(format!(
                 "--max-mb {} is too little; a hologram\'s page needs {:.1} MB at least",
-                self.max_mb,
+                max_mb,
                 BESIDE_VIEWS as f64 / 1e6
             )));
         }
@@ -89,18 +97,50 @@ impl View {
                 scenes.push(self.of_hologram(path)?.scene(budget)?);
             }
         }
-        let bytes = viewer::write(&self.output, &scenes)?;
+        let page = viewer::page(&scenes)?;
+        let mb = page.len() as f64 / 1e6;
+        if self.max_mb.is_some_and(|most| mb > most) {
+            return Err(Error::Input(format!(
+                "--max-mb {max_mb} is too little for the joined pages, whose pictures are kept: the page has {mb:.1} MB"
+            )));
+        }
+        files::write_atomically(&self.output, |file| file.write_all(page.as_bytes()))?;
+        let bytes = page.len();
         let views: usize = scenes.iter().map(|scene| scene.shown.len() + scene.field.len()).sum();
         super::print(
             json,
             &json!({"output": self.output.display().to_string(), "scenes": scenes.len(), "views": views, "bytes": bytes}),
-            format!(
-                "{}: {views} views, {:.1} MB",
-                super::name(&self.output),
-                bytes as f64 / 1e6
-            ),
+            format!("{}: {views} views, {mb:.1} MB", super::name(&self.output)),
         );
         Ok(())
+    }
+
+    /// Refuses flags that no input takes.
+    fn check_flags(&self) -> Result<()> {
+        let is_page = |path: &PathBuf| files::has_extension(path, "html");
+        let made = self.inputs.is_empty() || !self.inputs.iter().all(is_page);
+        let video = self.inputs.iter().any(|path| path.is_dir() && !is_page(path));
+        check_used(&[
+            (
+                "--views",
+                self.views.is_some(),
+                made,
+                "an image or a hologram; pages keep their views",
+            ),
+            (
+                "--title",
+                self.title.is_some(),
+                made,
+                "an image or a hologram; pages keep their titles",
+            ),
+            (
+                "--display",
+                self.making.is_for_a_display(),
+                made,
+                "an image or a hologram, not with pages alone",
+            ),
+            ("--frames", self.frames.is_some(), video, "a folder of `video`"),
+        ])
     }
 
     fn z_m(&self, display: &Display, usual: u8) -> Vec<f64> {
@@ -154,9 +194,9 @@ impl View {
 
     /// The display that a hologram file was made for.
     fn display_of(&self, info: &HologramInfo) -> Result<DisplayFile> {
-        match info.calibrated.is_empty() {
-            true => info.display_file(),
-            false => self.making.display(),
+        match self.making.display_if_given()? {
+            Some(display) => Ok(display),
+            None => info.display_file(),
         }
     }
 
@@ -199,7 +239,7 @@ impl View {
             }
         }
         all.sort();
-        let count = all.len().min(self.frames.into());
+        let count = all.len().min(self.frames.unwrap_or(VIDEO_FRAMES).into());
         let chosen: Vec<_> = (0..count).map(|i| &all[i * all.len() / count]).collect();
         let first = chosen.first().ok_or_else(|| {
             Error::file(

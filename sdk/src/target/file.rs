@@ -7,6 +7,7 @@ use super::Target;
 use crate::display::Display;
 use crate::error::{Error, Result};
 use crate::illumination::Illumination;
+use crate::keys;
 use crate::panel::{Flatness, Panel};
 use crate::registration::Registration;
 use crate::slm::Response;
@@ -68,7 +69,7 @@ impl Target {
         let length = u32::from_le_bytes(*length) as usize;
         let (text, rest) = rest.split_at_checked(length).ok_or_else(short)?;
         let text = std::str::from_utf8(text).map_err(refuse)?;
-        let header: Header = toml::from_str(text).map_err(|e| refuse(e.message().trim().replace('\n', " ")))?;
+        let header: Header = toml::from_str(text).map_err(|e| refuse(keys::message(&e)))?;
         let [rows, columns] = header.laser.unwrap_or_default();
         if rows > MOST_NODES || columns > MOST_NODES {
             return Err(refuse(format!("holds a laser's map of {columns}×{rows}")));

@@ -1,7 +1,7 @@
 //! Frames from where they come: folders, films, pipes.
 
 use super::Video;
-use crate::command::flags::{progress_bar, progress_count};
+use crate::command::flags::{check_used, progress_bar, progress_count};
 use crate::command::frame::SeenDepthFlags;
 use indicatif::ProgressBar;
 use phasefront::unstable::depth::DepthUnit;
@@ -22,6 +22,8 @@ pub(super) struct Source {
     /// (H, W) of colour and of depth of the first frame that was given.
     shapes: Option<[(usize, usize); 2]>,
     given: usize,
+    /// Fixed near and far.
+    range_m: Option<(f32, f32)>,
 }
 
 enum Input {
@@ -72,6 +74,7 @@ impl Source {
             path: flags.input.clone(),
             shapes: None,
             given: 0,
+            range_m: flags.depth.range()?,
         };
         Ok((source, shape))
     }
@@ -94,6 +97,16 @@ impl Source {
                 said(shapes),
                 said(first)
             )));
+        }
+        if let Some((near_m, far_m)) = self.range_m.filter(|_| self.given == 0) {
+            let beyond = frame.beyond(near_m, far_m);
+            if beyond > rgbd::DOUBTFULLY_CLIPPED {
+                log::warn!(
+                    "{}: {:.0} % of the depth lies before near {near_m} m or beyond far {far_m} m and is shown there; both are metres",
+                    self.name(0),
+                    100.0 * beyond
+                );
+            }
         }
         self.given += 1;
         Ok(Some(frame))
@@ -130,20 +143,28 @@ impl Source {
 
 impl Input {
     fn open(flags: &Video) -> Result<(Input, (usize, usize))> {
-        let unit = flags.depth.options().unit;
-        if flags.input.as_os_str() == "-" {
+        let unit = flags.depth.options()?.unit;
+        let is_pipe = flags.input.as_os_str() == "-";
+        let is_film = !is_pipe && film::is_film(&flags.input);
+        let is_folder = !is_pipe && !is_film;
+        let a_film = "a film, as clip.mp4";
+        check_used(&[
+            ("--pairs", flags.pairs.is_some(), is_folder, "a folder"),
+            ("--repeat", flags.repeat > 1, is_folder, "a folder"),
+            ("--invert", flags.seen.invert(), !is_pipe, "a folder or a film"),
+            ("--depth-video", flags.depth_video.is_some(), is_film, a_film),
+            ("--depth-beside", flags.depth_beside, is_film, a_film),
+            ("--depth-network", flags.seen.network().is_some(), is_film, a_film),
+        ])?;
+        if is_pipe {
+            check_range(flags, unit)?;
             return open_pipe(flags, unit);
         }
         if flags.raw.is_some() {
             return Err(Error::Input("--raw is for frames on stdin; give - as input".into()));
         }
-        if film::is_film(&flags.input) {
+        if is_film {
             return open_film(flags, unit);
-        }
-        if flags.depth_video.is_some() || flags.depth_beside || flags.seen.network().is_some() {
-            return Err(Error::Input(
-                "--depth-video, --depth-beside and --depth-network go with a film, as clip.mp4".into(),
-            ));
         }
         let Sequence {
             frames: paths,
@@ -159,6 +180,7 @@ impl Input {
         };
         // The layouts that say their unit never hold normalized depth.
         let unit = said.filter(|_| unit == DepthUnit::Normalized).unwrap_or(unit);
+        check_range(flags, unit)?;
         let folders: BTreeSet<_> = (paths.iter())
             .flat_map(|(colour, depth)| [colour.parent(), depth.parent()])
             .flatten()
@@ -214,6 +236,17 @@ impl Folder {
     }
 }
 
+/// Refuses near and far where depth of `unit` has no metres.
+fn check_range(flags: &Video, unit: DepthUnit) -> Result<()> {
+    match flags.depth.range()?.is_some() && unit == DepthUnit::Normalized {
+        true => Err(Error::Input(
+            "--near and --far are metres and normalized depth has no unit; leave them out, or name the unit by --depth-unit"
+                .into(),
+        )),
+        false => Ok(()),
+    }
+}
+
 fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
     let Some((width, height)) = flags.raw else {
         return Err(Error::Input(
@@ -236,7 +269,10 @@ fn open_pipe(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> 
 fn open_film(flags: &Video, unit: DepthUnit) -> Result<(Input, (usize, usize))> {
     let path = &flags.input;
     let depth = match (&flags.depth_video, flags.depth_beside, flags.seen.network()) {
-        (Some(depth), false, None) => FilmDepth::Film(Film::open(depth, Pixels::Grey)?),
+        (Some(depth), false, None) => {
+            check_range(flags, unit)?;
+            FilmDepth::Film(Film::open(depth, Pixels::Grey)?)
+        }
         (None, true, None) => FilmDepth::Beside,
         (None, false, Some(network)) => FilmDepth::Network {
             path: network.into(),
