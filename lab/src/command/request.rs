@@ -200,14 +200,6 @@ impl Claim {
                 "is no regular file; give a folder of its own to what is made",
             ));
         }
-        let holds_made = || names_of(folder).map(|names| names.iter().any(|name| is_made(name)));
-        if !path.exists() && holds_made()? {
-            match before {
-                Before::Refuse => return Err(already(folder)),
-                Before::Resume => return Err(unknown(folder)),
-                Before::Overwrite => {}
-            }
-        }
         let mut file = File::options()
             .read(true)
             .write(true)
@@ -232,7 +224,7 @@ impl Claim {
             ));
         }
         // Not before the lock: another run may just have ended.
-        let made = holds_made()?;
+        let made = names_of(folder)?.iter().any(|name| is_made(name));
         let resumes = before == Before::Resume && made;
         match before {
             Before::Refuse if made => return Err(already(folder)),
@@ -258,17 +250,12 @@ pub(crate) fn already(path: &Path) -> Error {
     )
 }
 
-/// Files whose flags nobody knows.
-fn unknown(folder: &Path) -> Error {
-    Error::file(
-        folder,
-        format!("holds no {FILE} that says how its files were made; --overwrite makes them anew"),
-    )
-}
-
 fn check(folder: &Path, request: &Request, earlier: Option<&Request>) -> Result<()> {
     let Some(earlier) = earlier else {
-        return Err(unknown(folder));
+        return Err(Error::file(
+            folder,
+            format!("holds an empty {FILE} beside what an earlier run made; --overwrite makes it anew"),
+        ));
     };
     match request.difference(earlier) {
         None => Ok(()),
