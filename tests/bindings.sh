@@ -1,17 +1,10 @@
-# Sourced by the tests of the bindings: the library as it ships, and the way to say that a test cannot run.
+# Sourced by tests in shell: where they build, how they install, and the library as it ships.
 # shellcheck shell=bash
 
 cache="${XDG_CACHE_HOME:-$HOME/.cache}/phasefront"
 export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-$cache/target}"
 mkdir -p "$cache"
-
-need() { command -v "$1" >/dev/null; }
-
-# Ends the test with 77: it cannot run here, and $1 says why.
-cannot() {
-    echo "$1"
-    exit 77
-}
+. "$(dirname "${BASH_SOURCE[0]}")/skip.sh"
 
 # Copies the tree to folder $1, with a history and what is not committed yet, or fails.
 copy_tree() {

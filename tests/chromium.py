@@ -98,11 +98,14 @@ class Browser:
 
 
 def chromium():
+    """Chromium's path. Installs it on Debian; ends the test where there is none."""
     names = ["chromium", "chromium-browser", "google-chrome"]
     found = next(filter(None, map(shutil.which, names)), None)
-    if found or not shutil.which("apt-get"):
-        return found
-    root = [] if os.geteuid() == 0 else ["sudo", "-n"]
-    for command in [["update"], ["install", "-y", "--no-install-recommends", "chromium"]]:
-        subprocess.run([*root, "apt-get", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    return shutil.which("chromium")
+    if not found and shutil.which("apt-get"):
+        root = [] if os.geteuid() == 0 else ["sudo", "-n"]
+        for command in [["update"], ["install", "-y", "--no-install-recommends", "chromium"]]:
+            subprocess.run([*root, "apt-get", *command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        found = shutil.which("chromium")
+    if not found:
+        raise SystemExit("Chromium is missing, and apt-get could not install it")
+    return found

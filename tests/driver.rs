@@ -1,19 +1,11 @@
-//! Tests that need a GPU, or a driver in software, are skipped where neither is there, and say so. Where
-//! `PHASEFRONT_REQUIRE_GPU` is set, they fail. In the tests of every crate (`#[path]`).
+//! What the tests of the GPU need: a GPU, or a driver in software. In the tests of every crate (`#[path]`).
 
 use std::fmt::Display;
 
-/// What was opened; none, with a line that says why, where the test is to be skipped.
-pub(crate) fn or_skip<T, E: Display>(opened: Result<T, E>) -> Option<T> {
-    const HINT: &str = "Debian's mesa-vulkan-drivers is a driver in software";
-    match opened {
-        Ok(opened) => Some(opened),
-        Err(why) if std::env::var_os("PHASEFRONT_REQUIRE_GPU").is_some() => {
-            panic!("{why} ({HINT}), and PHASEFRONT_REQUIRE_GPU is set")
-        }
-        Err(why) => {
-            println!("skipped: {why} ({HINT})");
-            None
-        }
-    }
+/// What was opened on a GPU. The test fails where there is none, and says what to install.
+#[track_caller]
+pub(crate) fn opened<T, E: Display>(result: Result<T, E>) -> T {
+    result.unwrap_or_else(|why| {
+        panic!("{why}: the tests need a GPU with its driver, or a driver in software: apt-get install mesa-vulkan-drivers libvulkan1")
+    })
 }

@@ -95,12 +95,13 @@ impl Phasefront {
         if let Some(threads) = self.threads {
             pool = pool.num_threads(threads.into());
         }
-        let pool = pool
-            .build()
+        // The command itself stays on the main thread: a system opens windows on no other.
+        pool.build_global()
             .map_err(|e| phasefront_lab::Error::Input(format!("--threads: {e}")))?;
+        let run = || self.command.run(self.threads, self.json);
         match &self.trace {
-            None => pool.install(|| self.command.run(self.threads, self.json)),
-            Some(path) => trace::traced(path, || pool.install(|| self.command.run(self.threads, self.json))),
+            None => run(),
+            Some(path) => trace::traced(path, run),
         }
     }
 }

@@ -288,3 +288,19 @@ fn an_aberration_is_searched_round_by_round() {
     assert_eq!(entries[0].red, [0.0; 5]);
     assert!(folder.fails(&search, 1).contains("--overwrite"));
 }
+
+#[test]
+fn a_rehearsal_that_cannot_end_is_refused_before_it_begins() {
+    let folder = Folder::new();
+    for (size, spot_z_mm, word) in [
+        ("144x64", "12", "frame of 144×64"),
+        ("80x48", "5.5", "no room for marks"),
+        ("144x64", "0", "focus at 0.000 mm"),
+    ] {
+        let rehearse = ["calibrate", "rehearse", "--size", size, "--spot-z-mm", spot_z_mm, "-o", "out"];
+        let said = folder.fails(&rehearse, 1);
+        assert!(said.contains(word), "{said}");
+        // Its first photographs come after this folder is made.
+        assert!(!folder.path("out").exists(), "{said}");
+    }
+}

@@ -4,6 +4,8 @@
 #[path = "../../tests/driver.rs"]
 mod driver;
 mod folder;
+#[path = "../../tests/skip.rs"]
+mod skip;
 
 use folder::Folder;
 use ndarray::{Array2, Array3, s};
@@ -355,7 +357,7 @@ fn the_object_in_focus_matches_the_sample_there_and_not_elsewhere() {
 fn real_captures_are_filled_and_shown() {
     let tum = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/tum");
     if !tum.is_dir() {
-        println!("skipped: the captured frames are not beside the project");
+        skip::or_fail("captured data", format!("{} is not there", tum.display()));
         return;
     }
     let folder = Folder::new();
@@ -952,18 +954,15 @@ fn on_gpu(folder: &Folder, arguments: &[&str]) -> std::process::Output {
         .unwrap()
 }
 
-/// The report of a command on the driver in software; none where there is no such driver, which is said.
-fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> Option<serde_json::Value> {
+/// The report of a command on the driver in software.
+fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> serde_json::Value {
     let gpu = ["--backend", "gpu", "--gpu", "llvmpipe", "--json"];
     let made = on_gpu(folder, &[arguments, &gpu].concat());
     // Drivers write to stderr where no desktop runs.
     let errors = String::from_utf8(made.stderr).unwrap();
-    if errors.contains("no GPU") {
-        driver::or_skip::<(), _>(Err(errors.trim_end()));
-        return None;
-    }
-    assert!(made.status.success(), "{errors}");
-    Some(serde_json::from_slice(&made.stdout).unwrap())
+    let succeeded = if made.status.success() { Ok(()) } else { Err(errors.trim_end()) };
+    driver::opened(succeeded.map_err(|why| why.to_owned()));
+    serde_json::from_slice(&made.stdout).unwrap()
 }
 
 /// Few levels of two pictures are more than neighbours.
@@ -983,9 +982,7 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     for more in [&usual[..], &swept] {
         folder.succeeds(&with(&[more, &["-o", "cpu.png"]].concat()));
         let arguments = with(&[more, &["-o", "gpu.png"]].concat());
-        let Some(report) = report_on_gpu(&folder, &arguments) else {
-            return;
-        };
+        let report = report_on_gpu(&folder, &arguments);
         if more.contains(&"sweep") {
             assert!(report["stage_ms"]["sweep"].is_number(), "{report}");
         } else {
@@ -1004,15 +1001,13 @@ fn a_gpu_is_measured() {
         report_on_gpu(&folder, &[&usual, more].concat())
     };
     let network = ["--layers", "8", "--precision", "int8", "--fusion", "pairs"];
-    let Some(report) = bench(&network) else {
-        return;
-    };
+    let report = bench(&network);
     let row = &report["rows"][0];
     assert_eq!(row["backend"], "gpu");
     assert!(row["total_ms"].as_f64().unwrap() > 0.0, "{report}");
     let kernels = row["kernels"].as_str().unwrap();
     assert!(kernels.contains("Pairs in 5"), "{report}");
-    let report = bench(&["--layers", "0"]).unwrap();
+    let report = bench(&["--layers", "0"]);
     assert_eq!(report["rows"].as_array().unwrap().len(), 1);
     assert_eq!(report["rows"][0]["method"], "sweep");
 }

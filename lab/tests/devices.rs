@@ -9,6 +9,7 @@ use phasefront::device::{Device, Packing};
 use phasefront_lab::files::{self, Hologram};
 use phasefront_lab::packed::{Image, Kind};
 use std::fs;
+use std::io::{BufRead, BufReader, Write, stderr};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -377,40 +378,35 @@ fn the_links_pattern_goes_through_files() {
     assert!(told.starts_with("limited range"), "{told}");
 }
 
-/// A virtual X server with one screen of 640×480, which keeps what it shows in a file.
+/// A virtual X server with one screen, which keeps in a file what it displays.
 struct Screen {
     server: Child,
     display: String,
+    size: (usize, usize),
     folder: tempfile::TempDir,
 }
 
 impl Screen {
-    /// None, with a line that says why, where there is no such server.
-    fn open() -> Option<Self> {
+    fn open((width, height): (usize, usize)) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let number = 90 + std::process::id() % 9000;
-        let display = format!(":{number}");
-        let server = Command::new("Xvfb")
-            .args([&display, "-screen", "0", "640x480x24", "-fbdir"])
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", &format!("{width}x{height}x24"), "-fbdir"])
             .arg(folder.path())
+            .stdout(Stdio::piped())
             .stderr(Stdio::null())
-            .spawn();
-        let Ok(server) = server else {
-            println!("skipped: there is no Xvfb (Debian's package xvfb)");
-            return None;
-        };
-        let screen = Screen {
+            .spawn()
+            .expect("Xvfb runs: apt-get install xvfb");
+        // Once it takes connections it prints the number of a display that was free.
+        let mut number = String::new();
+        let stdout = server.stdout.take().unwrap();
+        BufReader::new(stdout).read_line(&mut number).unwrap();
+        assert!(!number.trim().is_empty(), "the X server does not start");
+        Screen {
             server,
-            display,
+            display: format!(":{}", number.trim()),
+            size: (width, height),
             folder,
-        };
-        let socket = format!("/tmp/.X11-unix/X{number}");
-        let start = Instant::now();
-        while !Path::new(&socket).exists() {
-            assert!(start.elapsed() < Duration::from_secs(20), "the X server does not start");
-            std::thread::sleep(Duration::from_millis(50));
         }
-        Some(screen)
     }
 
     fn command(&self, folder: &Folder, arguments: &[&str]) -> Command {
@@ -419,21 +415,54 @@ impl Screen {
             .args(arguments)
             .current_dir(folder.0.path())
             .env("DISPLAY", &self.display)
-            .env_remove("WAYLAND_DISPLAY");
+            .env_remove("WAYLAND_DISPLAY")
+            .env_remove("WAYLAND_SOCKET");
         command
     }
 
-    /// Rows of red, green, blue of what it shows: a file of X's window dump.
+    /// What the command prints as JSON.
+    fn told(&self, folder: &Folder, arguments: &[&str]) -> serde_json::Value {
+        let output = self.command(folder, arguments).arg("--json").output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(
+            output.status.success(),
+            "{arguments:?}: {errors} (windows need apt-get install libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0)"
+        );
+        serde_json::from_slice(&output.stdout).unwrap()
+    }
+
+    /// Rows of red, green, blue of what it displays, from a file of X's window dump.
     fn pixels(&self) -> Vec<u8> {
         let bytes = fs::read(self.folder.path().join("Xvfb_screen0")).unwrap();
         let number = |n: usize| u32::from_be_bytes([0, 1, 2, 3].map(|i| bytes[4 * n + i])) as usize;
         // Header, its colour map of 12 bytes an entry, then lines of words, blue first.
         let (header, colours, line) = (number(0), number(19), number(12));
-        assert_eq!((number(4), number(5), number(11)), (640, 480, 32));
+        let (width, height) = self.size;
+        assert_eq!((number(4), number(5), number(11)), (width, height, 32));
         let image = &bytes[header + 12 * colours..];
-        let rows = image.chunks(line).take(480);
-        rows.flat_map(|row| row[..4 * 640].chunks(4).flat_map(|p| [p[2], p[1], p[0]]))
+        let rows = image.chunks(line).take(height);
+        rows.flat_map(|row| row[..4 * width].chunks(4).flat_map(|p| [p[2], p[1], p[0]]))
             .collect()
+    }
+
+    /// Runs `show` with these arguments until the screen has displayed each of `frames`, every pixel as it is.
+    fn displays(&self, folder: &Folder, arguments: &[&str], frames: &[&[u8]]) {
+        let arguments = [&["show", "--screen", "1", "--seconds", "60"], arguments].concat();
+        let mut player = self.command(folder, &arguments).spawn().unwrap();
+        let (start, mut seen) = (Instant::now(), vec![false; frames.len()]);
+        while seen.contains(&false) {
+            let ended = player.try_wait().unwrap();
+            assert!(ended.is_none(), "{arguments:?} ended: {ended:?}");
+            let late = start.elapsed() > Duration::from_secs(50);
+            assert!(!late, "{arguments:?}: of {} frames these were seen: {seen:?}", frames.len());
+            let pixels = self.pixels();
+            if let Some(n) = frames.iter().position(|frame| **frame == pixels) {
+                seen[n] = true;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        player.kill().unwrap();
+        player.wait().unwrap();
     }
 }
 
@@ -444,64 +473,79 @@ impl Drop for Screen {
     }
 }
 
+/// A frame in which any two neighbours differ.
+fn noise(seed: u32, (width, height): (usize, usize)) -> Image {
+    let byte = |i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 977) >> 13) as u8;
+    Image {
+        shape: (height, width),
+        bytes: (0..3 * (width * height) as u32).map(byte).collect(),
+        kind: Kind::Rgb,
+    }
+}
+
 #[test]
 fn a_screen_shows_exactly_what_it_is_given() {
-    let Some(screen) = Screen::open() else {
-        return;
-    };
+    let size = (640, 480);
+    let screen = Screen::open(size);
     let folder = Folder::new();
-    let frames = [1u32, 2].map(|seed| Image {
-        shape: (480, 640),
-        bytes: (0..3 * 640 * 480)
-            .map(|i: u32| (i.wrapping_mul(2_654_435_761).wrapping_add(seed * 977) >> 13) as u8)
-            .collect(),
-        kind: Kind::Rgb,
-    });
+    let frames = [1, 2].map(|seed| noise(seed, size));
     fs::create_dir(folder.path("frames")).unwrap();
     for (n, frame) in frames.iter().enumerate() {
         frame.write(&folder.path(&format!("frames/{n}.png"))).unwrap();
     }
-    let screens = screen.command(&folder, &["screens", "--json"]).output().unwrap();
-    if !screens.status.success() {
-        println!("skipped: {}", String::from_utf8_lossy(&screens.stderr).trim());
-        return;
-    }
-    let list: serde_json::Value = serde_json::from_slice(&screens.stdout).unwrap();
+    let list = screen.told(&folder, &["screens"]);
+    assert_eq!(list.as_array().unwrap().len(), 1);
     assert_eq!((&list[0]["width"], &list[0]["height"]), (&640.into(), &480.into()));
 
-    // One frame, then both at 5 a second: what stands there is one of them, whole, and each is seen.
-    for shown in [&frames[..1], &frames] {
-        let path = if shown.len() == 1 { "frames/0.png" } else { "frames" };
-        let arguments = ["show", path, "--screen", "1", "--seconds", "60", "--rate", "5"];
-        let mut player = screen.command(&folder, &arguments).spawn().unwrap();
-        let (start, mut seen) = (Instant::now(), vec![false; shown.len()]);
-        while seen.contains(&false) {
-            assert!(
-                start.elapsed() < Duration::from_secs(50),
-                "{} frames are not seen",
-                shown.len()
-            );
-            let pixels = screen.pixels();
-            if let Some(n) = shown.iter().position(|frame| frame.bytes == pixels) {
-                seen[n] = true;
-            }
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        player.kill().unwrap();
-        player.wait().unwrap();
-    }
+    // One frame, then both at 5 a second: what is displayed is one of them, whole, and each is seen.
+    let [first, second] = frames.each_ref().map(|frame| &frame.bytes[..]);
+    screen.displays(&folder, &["frames/0.png"], &[first]);
+    screen.displays(&folder, &["frames", "--rate", "5"], &[first, second]);
 
-    // The pattern of the link arrives as it is, and a screen that is not there is named.
+    // A smaller frame lies in the middle with black around it.
+    let small = noise(3, (200, 100));
+    small.write(&folder.path("small.png")).unwrap();
+    let mut around = vec![0; 3 * 640 * 480];
+    for (y, row) in small.bytes.chunks(3 * 200).enumerate() {
+        around[3 * ((190 + y) * 640 + 220)..][..row.len()].copy_from_slice(row);
+    }
+    screen.displays(&folder, &["small.png"], &[&around]);
+
+    // The pattern of the link arrives as it is.
     folder.succeeds(&["link", "pattern", "--size", "640x480", "-o", "pattern.png"]);
-    let errors = screen
-        .command(&folder, &["show", "pattern.png", "--screen", "2"])
-        .output()
-        .unwrap();
-    assert!(String::from_utf8_lossy(&errors.stderr).contains("no screen 2"));
-    let large = screen.command(
-        &folder,
-        &["show", "frames/0.png", "--screen", "1", "--seconds", "0.1", "--json"],
-    );
-    let told: serde_json::Value = serde_json::from_slice(&{ large }.output().unwrap().stdout).unwrap();
+    let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
+    screen.displays(&folder, &["pattern.png"], &[&pattern]);
+
+    let told = screen.told(&folder, &["show", "frames/0.png", "--seconds", "0.1"]);
     assert_eq!(told["screen"]["width"], 640);
+    let line = format!("640×480: all {} pixels of 4 frames read back exactly, and of 200×100 amid black", 640 * 480);
+    // Past the test harness, which keeps what passing tests print.
+    writeln!(stderr(), "{line}").unwrap();
+}
+
+#[test]
+fn what_a_screen_cannot_show_is_refused() {
+    let screen = Screen::open((320, 240));
+    let folder = Folder::new();
+    noise(1, (320, 240)).write(&folder.path("fits.png")).unwrap();
+    noise(1, (321, 240)).write(&folder.path("wide.png")).unwrap();
+    noise(1, (320, 241)).write(&folder.path("high.png")).unwrap();
+    for (arguments, word) in [
+        (["show", "fits.png", "--screen", "2"], "there is no screen 2; there are 1"),
+        (["show", "fits.png", "--screen", "0"], "there is no screen 0; there are 1"),
+        (["show", "wide.png", "--screen", "1"], "frames of 321×240 do not fit screen 1 of 320×240"),
+        (["show", "high.png", "--screen", "1"], "frames of 320×241 do not fit screen 1 of 320×240"),
+    ] {
+        let refused = screen.command(&folder, &arguments).output().unwrap();
+        let errors = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(1), "{errors}");
+        assert!(errors.contains(word) && errors.lines().count() == 1, "{errors}");
+    }
+    // Without a desktop too.
+    for arguments in [&["screens"][..], &["show", "fits.png"]] {
+        let refused = screen.command(&folder, arguments).env_remove("DISPLAY").output().unwrap();
+        let errors = String::from_utf8_lossy(&refused.stderr);
+        assert_eq!(refused.status.code(), Some(1), "{errors}");
+        assert!(errors.contains("no desktop") && errors.lines().count() == 1, "{errors}");
+    }
 }

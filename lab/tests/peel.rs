@@ -9,9 +9,8 @@ use std::sync::Arc;
 use phasefront_lab::ldi::Ldi;
 use phasefront_lab::scene::{DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference};
 
-/// A peeler, or none where there is no GPU and no software driver.
-fn peeler() -> Option<DepthPeeler> {
-    driver::or_skip(DepthPeeler::new())
+fn peeler() -> DepthPeeler {
+    driver::opened(DepthPeeler::new())
 }
 
 /// Depth and colour.
@@ -51,7 +50,7 @@ fn wall(x: [f32; 2], d: f32, rgb: [f32; 3]) -> Mesh {
 
 #[test]
 fn random_scenes_are_the_references_but_for_single_pixels() {
-    let Some(peeler) = peeler() else { return };
+    let peeler = peeler();
     for (seed, (height, width)) in [
         (1, (96, 80)),
         (2, (61, 47)),
@@ -75,7 +74,7 @@ fn random_scenes_are_the_references_but_for_single_pixels() {
 
 #[test]
 fn simple_scenes_are_the_references_exactly() {
-    let Some(peeler) = peeler() else { return };
+    let peeler = peeler();
     let same = |meshes: Vec<Mesh>| {
         let scene = Scene { meshes };
         let expected = render_ldi_reference(&scene, 9, 14, 3).unwrap();
@@ -106,7 +105,7 @@ fn simple_scenes_are_the_references_exactly() {
 
 #[test]
 fn what_does_not_fit_is_refused() {
-    let Some(peeler) = peeler() else { return };
+    let peeler = peeler();
     let scene = Scene {
         meshes: vec![wall([0., 9.], 0.5, [1.0; 3])],
     };

@@ -2,6 +2,9 @@
 //! beside the truth. And on a frame that a camera took: no seams between tiles.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../tests/skip.rs"]
+mod skip;
+
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
@@ -131,7 +134,7 @@ fn captured(folder: &Path) -> RgbdFrame {
 fn a_captured_frame_has_no_seams_between_tiles() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/redwood");
     if !folder.exists() {
-        eprintln!("skipped: {} is not there", folder.display());
+        skip::or_fail("captured data", format!("{} is not there", folder.display()));
         return;
     }
     let frame = captured(&folder);

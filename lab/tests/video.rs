@@ -1,6 +1,9 @@
 //! `phasefront video`: folders and pipes, one by one and live; every frame answered or reported dropped.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../tests/skip.rs"]
+mod skip;
+
 use phasefront_lab::files::{self, Hologram};
 use serde_json::Value;
 use std::io::Write;
@@ -252,7 +255,7 @@ fn depth_beyond_near_and_far_and_another_size_are_told_of() {
 fn a_captured_sequence_runs_as_video_and_live() {
     let redwood = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/redwood");
     let Some(input) = redwood.to_str().filter(|_| redwood.exists()) else {
-        eprintln!("skipped: no captured sequence beside the project");
+        skip::or_fail("captured data", format!("{} is not there", redwood.display()));
         return;
     };
     let size = ["--depth-unit", "mm", "--size", "320x240"];
@@ -346,18 +349,6 @@ fn a_run_that_was_killed_is_taken_up_and_gives_the_same_files() {
     }
 }
 
-fn has_ffmpeg() -> bool {
-    let found = Command::new("ffmpeg")
-        .arg("-version")
-        .stdout(Stdio::null())
-        .status()
-        .is_ok_and(|s| s.success());
-    if !found {
-        eprintln!("skipped: ffmpeg is not installed");
-    }
-    found
-}
-
 /// Makes `path` of `from`: a film of pictures, or pictures of a film.
 fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
     let made = Command::new("ffmpeg")
@@ -368,14 +359,11 @@ fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
         .args(codec)
         .arg(path)
         .status();
-    assert!(made.unwrap().success());
+    assert!(made.expect("ffmpeg runs: apt-get install ffmpeg").success());
 }
 
 #[test]
 fn films_go_in_and_come_out() {
-    if !has_ffmpeg() {
-        return;
-    }
     let (dir, input) = folder(5);
     let at = |name: &str| dir.path().join(name);
     let text = |path: &Path| path.to_str().unwrap().to_owned();

@@ -42,7 +42,7 @@ mod watch;
 pub use crate::brightness::Past;
 pub use chain::{ChainOptions, Float, Fusion, GpuNetworkPlan};
 #[cfg(test)]
-pub(crate) use device::testing::or_skip;
+pub(crate) use device::testing::opened;
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
 pub use peak::Peak;

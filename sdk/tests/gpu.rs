@@ -4,6 +4,8 @@
 
 #[path = "../../tests/driver.rs"]
 mod driver;
+#[path = "../../tests/skip.rs"]
+mod skip;
 mod network_models;
 
 use ndarray::{Array2, Array3};
@@ -19,8 +21,8 @@ use phasefront::unstable::network::{Isa, reference};
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Method, Network, RgbdFrame, Sweep};
 use std::sync::{Arc, OnceLock};
 
-/// The device of all tests; none where there is no driver, which the test says.
-fn device() -> Option<Arc<Device>> {
+/// The device of all tests.
+fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Result<Arc<Device>, gpu::GpuError>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
         let software = DeviceOptions {
@@ -30,7 +32,7 @@ fn device() -> Option<Arc<Device>> {
         let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
         opened.map(Arc::new)
     });
-    driver::or_skip(opened.as_ref()).cloned()
+    driver::opened(opened.as_ref()).clone()
 }
 
 fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
@@ -42,7 +44,7 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
 }
 
 fn run(network: &Network, options: ChainOptions, (h, w): (usize, usize), input: &[f32]) -> Vec<f32> {
-    let device = device().unwrap();
+    let device = device();
     let plan = GpuNetworkPlan::new(&device, network, h, w, options).unwrap();
     let mut output = vec![f32::NAN; 6 * h * w];
     plan.run(input, &mut output).unwrap();
@@ -53,7 +55,7 @@ const SIZES: [(usize, usize); 3] = [(1, 1), (7, 33), (47, 61)];
 
 #[test]
 fn chains_in_f32_and_f16_agree_with_the_definition() {
-    let Some(device) = device() else { return };
+    let device = device();
     let models = [
         Model::new(2, 8),
         Model {
@@ -97,7 +99,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
                 (Float::F16, Fusion::Pairs, 0.02),
             ] {
                 if float == Float::F16 && !device.has_half() {
-                    println!("skipped: {device:?} has no 16-bit floating point");
+                    skip::or_fail("16-bit floats", format!("{device:?} has none"));
                     continue;
                 }
                 let options = ChainOptions { float, fusion };
@@ -120,7 +122,7 @@ fn chains_in_f32_and_f16_agree_with_the_definition() {
 /// The sizes of phones' frames, against the kernels of the CPU.
 #[test]
 fn chains_of_whole_frames_agree_with_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     for (model, float, tolerance) in [
         (Model::new(5, 8), Float::F32, 1e-4),
         (Model::new(5, 8), Float::F16, 0.02),
@@ -128,7 +130,7 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
         (Model::int8(5, 16).halved(), Float::F32, 0.0),
     ] {
         if float == Float::F16 && !device.has_half() {
-            println!("skipped: {device:?} has no 16-bit floating point");
+            skip::or_fail("16-bit floats", format!("{device:?} has none"));
             continue;
         }
         let network = Network::from_onnx(&model.bytes()).unwrap();
@@ -265,7 +267,7 @@ fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table of cases")]
 fn whole_frames_are_those_of_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let (int8, f32) = (int8_network(), f32_network());
     let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
     let linear = Response::linear(8).unwrap();
@@ -354,7 +356,7 @@ fn whole_frames_are_those_of_the_cpu() {
 /// Swept to the midpoint and propagated, and swept on to the modulator; seeded networks in all numbers.
 #[test]
 fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let display = Display::from_toml("volume_depth_mm = 5").unwrap();
     let usual = Sweep::for_display(&display);
     let plain = Sweep {
@@ -474,7 +476,7 @@ impl Sensor {
 
 #[test]
 fn images_of_cameras_are_read_as_on_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let network = int8_network();
     // Odd, so that rows of 16-bit depth do not begin at words.
     let (h, w) = (33, 45);
@@ -532,7 +534,7 @@ fn images_of_cameras_are_read_as_on_the_cpu() {
 
 #[test]
 fn a_pre_filter_network_filters_as_on_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let tanh = Model {
         inputs: 6,
         input: "field",
@@ -590,7 +592,7 @@ fn a_pre_filter_network_filters_as_on_the_cpu() {
 
 #[test]
 fn several_frames_fly_and_each_has_its_own_levels() {
-    let Some(device) = device() else { return };
+    let device = device();
     let network = int8_network();
     let (h, w) = (33, 45);
     let display = Display::default();
@@ -637,7 +639,7 @@ fn several_frames_fly_and_each_has_its_own_levels() {
 #[test]
 #[expect(clippy::too_many_lines, reason = "what an app does, from its shader to its picture")]
 fn an_app_shows_the_texture_itself() {
-    let Some(device) = device() else { return };
+    let device = device();
     let (h, w) = (33, 45);
     let display = Display::default();
     let method = Method::Network(int8_network());
@@ -754,7 +756,7 @@ fn an_app_shows_the_texture_itself() {
 
 #[test]
 fn networks_that_read_the_place_or_squares_of_pixels_are_those_of_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let of_place = Model {
         inputs: 6,
         input: "rgbdxy",
@@ -780,7 +782,7 @@ fn networks_that_read_the_place_or_squares_of_pixels_are_those_of_the_cpu() {
 
 #[test]
 fn a_calibrated_display_gets_the_levels_of_the_cpu() {
-    let Some(device) = device() else { return };
+    let device = device();
     let (h, w) = (47, 61);
     let network = int8_network();
     let beam = Array3::from_shape_fn((3, 5, 7), |(c, y, x)| {
@@ -818,7 +820,7 @@ fn a_calibrated_display_gets_the_levels_of_the_cpu() {
 
 #[test]
 fn a_device_is_tried_out_before_it_is_used() {
-    let Some(device) = device() else { return };
+    let device = device();
     let (int8, f32) = (int8_network(), f32_network());
     for network in [&int8, &f32] {
         let display = Display::default().with_offset_m(5e-3).unwrap();

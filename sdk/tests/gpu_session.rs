@@ -39,9 +39,7 @@ fn differing(levels: &[u8], expected: &[u8], far: f64) -> f64 {
 #[test]
 fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
     let plain = options(W, H);
-    let Some(gpu) = on_gpu(plain.clone()) else {
-        return;
-    };
+    let gpu = on_gpu(plain.clone());
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     for brightness in [Brightness::Steady, Brightness::Fixed(0.9), Brightness::FrameMax] {
@@ -86,9 +84,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     let mut plain = options(W, H);
     let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
     plain.ladder[0].method = Method::Network(Arc::new(network));
-    let Some(gpu) = on_gpu(plain.clone()) else {
-        return;
-    };
+    let gpu = on_gpu(plain.clone());
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = frame(7, &scene, &metres);
@@ -116,9 +112,7 @@ fn sweeps_are_those_of_the_cpu() {
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
         plain.ladder[0].method = method;
-        let Some(mut gpu) = on_gpu(plain.clone()) else {
-            return;
-        };
+        let mut gpu = on_gpu(plain.clone());
         gpu.gpu.chain.float = Float::F32;
         let cpu = Session::new(plain.clone(), RunningMode::Image).unwrap();
         let gpu = Session::new(gpu, RunningMode::Image).unwrap();
@@ -137,9 +131,7 @@ fn sweeps_are_those_of_the_cpu() {
 #[test]
 fn cameras_may_change_their_format() {
     let plain = options(W, H);
-    let Some(gpu) = on_gpu(plain.clone()) else {
-        return;
-    };
+    let gpu = on_gpu(plain.clone());
     let cpu = Session::new(plain, RunningMode::Image).unwrap();
     let gpu = Session::new(gpu, RunningMode::Image).unwrap();
     let turned = Orientation {
@@ -165,9 +157,7 @@ fn cameras_may_change_their_format() {
 #[test]
 fn video_is_as_steady_as_on_the_cpu() {
     let plain = options(W, H);
-    let Some(gpu) = on_gpu(plain.clone()) else {
-        return;
-    };
+    let gpu = on_gpu(plain.clone());
     let cpu = Session::new(plain, RunningMode::Video).unwrap();
     let gpu = Session::new(gpu, RunningMode::Video).unwrap();
     let mut scales = Vec::new();
@@ -214,9 +204,7 @@ fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
 /// The device goes in mid-stream, again and again: frames on it fail as lost, all others are answered.
 #[test]
 fn a_live_session_outlives_its_device() {
-    let Some(options) = on_gpu(options(W, H)) else {
-        return;
-    };
+    let options = on_gpu(options(W, H));
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
     let session = Session::new(options, RunningMode::Live(Box::new(listener))).unwrap();
@@ -272,41 +260,39 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     missing.backend = Backend::Gpu;
     missing.gpu.device.name = Some("no such card".into());
     let mut cases = vec![(missing, "no GPU")];
-    if let Some(gpu) = on_gpu(options(W, H)) {
-        let mut sweep = gpu.clone();
-        sweep.ladder[0].method = Method::Sweep(Sweep {
-            taps: 31,
-            ..Sweep::for_display(&sweep.target.display)
-        });
-        cases.push((sweep, "31 taps"));
-        let mut either = gpu.clone();
-        let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
-        let sweep = Sweep::for_display(&either.target.display);
-        either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
-        cases.push((either, "sharpness"));
-        let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
-        let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
-        (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
-        cases.push((ten, "8 bits"));
-        let text = "width = 64\nheight = 48\noffset_mm = 2\nwavelengths_nm = [532]";
-        let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
-        (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
-        cases.push((one, "one laser"));
-        // A line that no workgroup's memory holds.
-        let mut long = gpu.clone();
-        let text = "width = 9000\nheight = 4\noffset_mm = 2";
-        long.target.display = Display::from_toml(text).unwrap();
-        (long.ladder[0].height, long.ladder[0].width) = (4, 9000);
-        cases.push((long, "workgroup"));
-        if let Some(mut half) = on_gpu(options(W, H)) {
-            let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
-            half.ladder[0].method = Method::Network(Arc::new(network));
-            half.gpu.chain.float = Float::F16;
-            let device = phasefront::unstable::gpu::Device::open(&half.gpu.device).unwrap();
-            if !device.has_half() {
-                cases.push((half, "shader-f16"));
-            }
-        }
+    let gpu = on_gpu(options(W, H));
+    let mut sweep = gpu.clone();
+    sweep.ladder[0].method = Method::Sweep(Sweep {
+        taps: 31,
+        ..Sweep::for_display(&sweep.target.display)
+    });
+    cases.push((sweep, "31 taps"));
+    let mut either = gpu.clone();
+    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    let sweep = Sweep::for_display(&either.target.display);
+    either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
+    cases.push((either, "sharpness"));
+    let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
+    let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
+    (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
+    cases.push((ten, "8 bits"));
+    let text = "width = 64\nheight = 48\noffset_mm = 2\nwavelengths_nm = [532]";
+    let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
+    (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
+    cases.push((one, "one laser"));
+    // A line that no workgroup's memory holds.
+    let mut long = gpu.clone();
+    let text = "width = 9000\nheight = 4\noffset_mm = 2";
+    long.target.display = Display::from_toml(text).unwrap();
+    (long.ladder[0].height, long.ladder[0].width) = (4, 9000);
+    cases.push((long, "workgroup"));
+    let mut half = gpu.clone();
+    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    half.ladder[0].method = Method::Network(Arc::new(network));
+    half.gpu.chain.float = Float::F16;
+    let device = phasefront::unstable::gpu::Device::open(&half.gpu.device).unwrap();
+    if !device.has_half() {
+        cases.push((half, "shader-f16"));
     }
     for (options, word) in cases {
         let expected = cpu(options.clone());
@@ -328,9 +314,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
 /// A ladder whose rungs lie on the GPU and on the CPU.
 #[test]
 fn rungs_say_where_they_are_computed() {
-    let Some(mut options) = on_gpu(options(W, H)) else {
-        return;
-    };
+    let mut options = on_gpu(options(W, H));
     let mut low = options.ladder[0].clone();
     low.backend = Some(Backend::Cpu);
     (low.height, low.width) = (H / 2, W / 2);
@@ -357,9 +341,7 @@ fn rungs_say_where_they_are_computed() {
 
 #[test]
 fn sessions_close_at_any_moment() {
-    let Some(options) = on_gpu(options(W, H)) else {
-        return;
-    };
+    let options = on_gpu(options(W, H));
     for round in 0..6 {
         let closed = Arc::new(AtomicBool::new(false));
         let (sender, events) = mpsc::channel();

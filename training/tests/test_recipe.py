@@ -76,8 +76,7 @@ def test_what_there_is_not_is_named(tmp_path, changes, words):
 
 
 def test_all_of_it_from_nothing(tmp_path):
-    if not COMMAND.exists():
-        pytest.skip(f"the command is not built: {COMMAND}")
+    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
     few = settings(tmp_path, networks=("rgbd-8", "rgbd-15-wide"), hours=0.002, training=("--f32", "--crop", "48"))
     assert recipe.run(few, lambda arguments: main(list(arguments))) == len(list(recipe.steps(few)))
     for name in ("rgbd-8.onnx", "rgbd-8-int8.onnx", "rgbd-8.md"):

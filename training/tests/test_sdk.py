@@ -37,8 +37,7 @@ def networks():
 
 @pytest.mark.parametrize("precision", ["f32", "int8"])
 def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
-    if not COMMAND.exists():
-        pytest.skip(f"the command is not built: {COMMAND}")
+    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
     display, (hologram, prefilter) = Display(), networks()
     height, width = 60, 83
     y, x = np.mgrid[:height, :width]
@@ -78,8 +77,7 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
 
 
 def test_what_is_visible_by_waves_is_the_labs(tmp_path):
-    if not COMMAND.exists():
-        pytest.skip(f"the command is not built: {COMMAND}")
+    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
     size = ["--scenes", "1", "--size", "61", "--planes", "23", "--ldi-layers", "1"]
     subprocess.run([COMMAND, "dataset", *size, "-o", tmp_path / "data"], check=True)
     manifest = Manifest.read(tmp_path / "data")

@@ -3,6 +3,7 @@ import stat
 import sys
 
 import pytest
+import ray
 
 from phasefront_training import shards
 from phasefront_training.__main__ import main
@@ -35,7 +36,6 @@ def command(tmp_path):
 
 @pytest.fixture(scope="module")
 def cluster():
-    ray = pytest.importorskip("ray", reason="Ray is not installed: pip install './training[ray]'")
     ray.init(address="local", num_cpus=2, include_dashboard=False, log_to_driver=False)
     yield
     ray.shutdown()

@@ -1,12 +1,15 @@
 import json
 import pathlib
+import sys
 
 import numpy
 import pytest
 
 import phasefront
 
-SUITE = pathlib.Path(__file__).parents[3] / "tests" / "conformance"
+TESTS = pathlib.Path(__file__).parents[3] / "tests"
+SUITE = TESTS / "conformance"
+sys.path.append(str(TESTS))  # skips.py
 
 
 @pytest.fixture(scope="session")

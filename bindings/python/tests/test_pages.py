@@ -6,6 +6,8 @@ import re
 import subprocess
 import sys
 
+import nbclient
+import nbformat
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
@@ -64,7 +66,6 @@ def test_the_conventions_reconstruct_a_hologram(tmp_path, monkeypatch):
 
 
 def test_a_type_checker_follows_the_pages(tmp_path):
-    pytest.importorskip("mypy")
     for i, code in enumerate(snippets(GUIDE) + snippets(ROOT / "README.md")):
         (tmp_path / f"snippet_{i}.py").write_text(code)
     wrong = "import phasefront\nphasefront.session_options(dark='much', no_option=1)\nphasefront.Display(width='1')\n"
@@ -77,9 +78,6 @@ def test_a_type_checker_follows_the_pages(tmp_path):
 
 
 def test_the_notebook_runs(tmp_path, monkeypatch):
-    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    pytest.importorskip("matplotlib")
     monkeypatch.setenv("PYTHONSAFEPATH", "1")
     monkeypatch.setenv("MPLCONFIGDIR", str(tmp_path))
     notebook = nbformat.read(NOTEBOOK, as_version=4)

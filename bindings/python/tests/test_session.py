@@ -3,10 +3,12 @@
 import gc
 import os
 import signal
+import sys
 import threading
 
 import numpy
 import pytest
+import skips
 from conftest import still
 
 import phasefront
@@ -304,9 +306,11 @@ def test_arrays_of_two_gibibytes_are_refused():
             Frame(colour, depth)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_in_a_fork_what_is_the_parents_is_refused_and_what_is_new_works(options):
+    if not hasattr(os, "fork"):
+        skips.or_fail("fork", f"{sys.platform} forks no processes")
+        return
     live = Session(options, RunningMode.LIVE_STREAM, lambda _: None)
     with live, Session(options) as session:
         hologram = session.process(still())

@@ -13,6 +13,7 @@ use super::table::{self, Entry};
 use super::{COLOURS, laser};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::output;
 use crate::scene::dice::Dice;
 use crate::simulated_display::SimulatedDisplay;
 use ndarray::{Array2, Array3, Axis, s, stack};
@@ -85,6 +86,11 @@ pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)
         simulated: SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
         progress,
     };
+    // The search for aberrations comes last and would fail there.
+    for colour in 0..COLOURS.len() {
+        spot::levels(&Target::from(display), colour, rehearsal.spot_z_m, MIDDLE, &[0.0; 5])?;
+    }
+    output::make_folder(folder)?;
     let curves = stage.curves()?;
     let per_pixel = lut::compact(&curves)?;
     table::write_per_pixel(&folder.join("table.pfp"), &per_pixel)?;
@@ -162,7 +168,7 @@ impl Stage<'_> {
         let mut curves = Vec::new();
         for colour in 0..COLOURS.len() {
             let captures = self.captures(colour);
-            captures.as_deref().map_or(Ok(()), make)?;
+            captures.as_deref().map_or(Ok(()), output::make_folder)?;
             let shoot = |k: usize| -> Result<Photograph> {
                 let frame = self.pattern.frame(k as u8);
                 let frame = frame.view();
@@ -336,10 +342,6 @@ impl Stage<'_> {
         }
         Ok(())
     }
-}
-
-fn make(folder: &Path) -> Result<()> {
-    std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, format!("cannot be made: {e}")))
 }
 
 fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {

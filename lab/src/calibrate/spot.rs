@@ -130,10 +130,10 @@ pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coe
     let part = zernike::sub_hologram(side, side, pitch_m, wavelength_m, distance_m, a)?;
     let corner = |at: f64, n: usize| ((at * n as f64) as usize).checked_sub(radius);
     let (Some(left), Some(top)) = (corner(place[0], width), corner(place[1], height)) else {
-        return Err(outside(place, side));
+        return Err(outside(place, side, (width, height)));
     };
     if left + side > width || top + side > height {
-        return Err(outside(place, side));
+        return Err(outside(place, side, (width, height)));
     }
     let first = colour * height * width;
     let mut levels = Array2::zeros((height, width));
@@ -149,9 +149,9 @@ pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coe
     Ok(levels)
 }
 
-fn outside([x, y]: [f64; 2], side: usize) -> Error {
+fn outside([x, y]: [f64; 2], side: usize, (width, height): (usize, usize)) -> Error {
     Error::Input(format!(
-        "a sub-hologram of {side} pixels does not fit around ({x}, {y}) of the frame; a z nearer to the modulator or a place nearer to the middle is needed"
+        "a sub-hologram of {side} pixels does not fit around ({x}, {y}) of a frame of {width}×{height}; a larger frame, a z nearer to the modulator or a place nearer to the middle is needed"
     ))
 }
 

@@ -543,7 +543,6 @@ impl Rehearse {
             keep_captures: self.captures,
         };
         output::folder(&self.output, self.overwrite.holding())?;
-        output::make_folder(&self.output)?;
         let bar = progress_bar(0, "photographs and rows");
         let outcome = rehearse::run(&rehearsal, &self.output, &|done, of| {
             bar.set_length(of as u64);

@@ -1,6 +1,9 @@
 //! Every instruction set of this processor against a chain computed plainly, frame-wide, from the definition.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../../tests/skip.rs"]
+mod skip;
+
 use phasefront_kernels::*;
 
 /// With whole blocks of pixels, of which no kernel may step out: 128 and 192.
@@ -590,6 +593,22 @@ fn chains_of_few_filters_leave_amx_alone() {
         let (isa, first) = (Isa::int8_for(filters), Isa::int8()[0]);
         assert!(Isa::int8().contains(&isa));
         assert_eq!(isa != first, first == Isa::Amx && filters == 8);
+    }
+}
+
+/// No other test here has run their kernels.
+#[test]
+fn instruction_sets_that_this_processor_lacks_are_noted() {
+    let of_architecture: &[Isa] = if cfg!(target_arch = "x86_64") {
+        &[Isa::Avx2, Isa::Avx512, Isa::Avx512Vnni, Isa::Amx]
+    } else if cfg!(target_arch = "aarch64") {
+        &[Isa::Neon, Isa::NeonDotprod, Isa::NeonI8mm]
+    } else {
+        &[]
+    };
+    let here = [Isa::int8(), Isa::f32()].concat();
+    for isa in of_architecture.iter().filter(|isa| !here.contains(isa)) {
+        skip::or_fail("instruction sets", format!("this processor lacks {isa}"));
     }
 }
 

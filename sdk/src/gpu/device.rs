@@ -309,7 +309,7 @@ pub(crate) fn one_line(error: impl std::fmt::Display) -> String {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::testing::{or_skip, software};
+    use super::testing::{opened, skip, software};
     use super::*;
 
     #[test]
@@ -333,9 +333,7 @@ mod tests {
             },
             ..Default::default()
         };
-        let Some(device) = or_skip(Device::open_with(&software(), &little)) else {
-            return;
-        };
+        let device = opened(Device::open_with(&software(), &little));
         assert!(!device.has_half() && !device.features().timestamps);
         let refused = device.buffer("a frame", 1 << 21).unwrap_err();
         assert!(refused.to_string().contains("a frame of 2 MB"), "{refused}");
@@ -359,9 +357,7 @@ mod tests {
         };
         // Drivers in software do not heed what memory there is.
         let opened = Device::open_with(&DeviceOptions::default(), &little);
-        let Some(device) = or_skip(opened.or_else(|_| Device::open_with(&software(), &little))) else {
-            return;
-        };
+        let device = opened(opened.or_else(|_| Device::open_with(&software(), &little)));
         let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;
         let taken = device.guarded(|| {
             // More than a hundredth of any machine's memory.
@@ -369,7 +365,7 @@ mod tests {
             all.collect::<Result<Vec<_>>>()
         });
         if taken.is_ok() {
-            println!("skipped: {device:?} does not heed how much memory there is");
+            skip::or_fail("memory limits", format!("{device:?} gives more memory than there is"));
             return;
         }
         assert!(matches!(taken, Err(GpuError::OutOfMemory(_))), "{taken:?}");
@@ -391,9 +387,7 @@ mod tests {
 
     #[test]
     fn a_device_that_hangs_is_given_up() {
-        let Some(mut device) = or_skip(Device::open(&software())) else {
-            return;
-        };
+        let mut device = opened(Device::open(&software()));
         device.patience = Duration::from_millis(1);
         let source = "
             @group(0) @binding(0) var<storage, read_write> result: array<u32>;
@@ -418,9 +412,7 @@ mod tests {
 
     #[test]
     fn an_app_computes_on_its_own_device() {
-        let Some(adapter) = or_skip(adapter(software().name.as_deref(), None)) else {
-            return;
-        };
+        let adapter = opened(adapter(software().name.as_deref(), None));
         let descriptor = wgpu::DeviceDescriptor {
             required_features: adapter.features() & Device::wanted(),
             required_limits: adapter.limits(),

@@ -195,7 +195,7 @@ fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> R
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::device::Allowed;
-    use super::super::device::testing::{or_skip, software};
+    use super::super::device::testing::{opened, software};
     use super::super::{ChainOptions, Float};
     use super::*;
     use crate::brightness::Brightness;
@@ -229,9 +229,7 @@ mod tests {
 
     #[test]
     fn a_lost_device_costs_the_frames_in_flight_and_no_more() {
-        let Some(mut renderer) = or_skip(Renderer::new(None, software(), job(&network()))) else {
-            return;
-        };
+        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
         assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
         let frame = frame();
         let bytes = Frame::of(&frame);
@@ -273,9 +271,7 @@ mod tests {
 
     #[test]
     fn a_device_that_is_lost_again_and_again_is_of_no_use() {
-        let Some(mut renderer) = or_skip(Renderer::new(None, software(), job(&network()))) else {
-            return;
-        };
+        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
         renderer.losses = ATTEMPTS;
         renderer.reason = Some(GpuError::Lost("pulled out".into()));
         renderer.release();
@@ -297,9 +293,7 @@ mod tests {
             },
             ..Default::default()
         };
-        let Some(device) = or_skip(Device::open_with(&software(), &little)) else {
-            return;
-        };
+        let device = opened(Device::open_with(&software(), &little));
         let device = Arc::new(device);
         let bytes = include_bytes!("../../../models/rgbd-8.onnx");
         let network = Arc::new(Network::from_onnx(bytes).unwrap());

@@ -154,7 +154,7 @@ impl OnGpu {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::gpu::or_skip;
+    use crate::gpu::opened;
     use crate::{Display, Method, Network, RgbdFrame};
     use ndarray::{Array2, Array3};
     use std::time::Duration;
@@ -167,9 +167,7 @@ mod tests {
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);
         options.gpu.device.name = Some("llvmpipe".into());
-        let Some(mut gpu) = or_skip(OnGpu::new(&options, &options.ladder[0], None)) else {
-            return;
-        };
+        let mut gpu = opened(OnGpu::new(&options, &options.ladder[0], None));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
         let mut brightness = BrightnessTracker::default();

@@ -77,19 +77,14 @@ fn header(programs: &[u8], info: &wgpu::AdapterInfo) -> [u8; HEADER] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::super::testing::{or_skip, software};
+    use super::super::testing::{opened, software};
     use super::super::{Device, DeviceOptions};
     use super::*;
 
-    /// The device with what is kept, where there is one that lets programs be kept.
-    fn device(programs: Option<Vec<u8>>) -> Option<Device> {
+    /// A driver in software with what was kept; it lets programs be kept.
+    fn device(programs: Option<Vec<u8>>) -> Device {
         let options = DeviceOptions { programs, ..software() };
-        let device = or_skip(Device::open(&options))?;
-        if device.programs().is_none() {
-            println!("skipped: {device:?} keeps its programs itself");
-            return None;
-        }
-        Some(device)
+        opened(Device::open(&options))
     }
 
     /// Runs a program that writes a seven.
@@ -111,19 +106,19 @@ mod tests {
 
     #[test]
     fn programs_are_kept_from_run_to_run() {
-        let Some(first) = device(None) else { return };
+        let first = device(None);
         let before = first.programs().unwrap();
         assert_eq!(seven(&first), [7, 0, 0, 0]);
         let programs = first.programs().unwrap();
         assert!(programs.len() >= before.len());
-        let second = device(Some(programs)).unwrap();
+        let second = device(Some(programs));
         assert_eq!(second.programs_refused(), None);
         assert_eq!(seven(&second), [7, 0, 0, 0]);
     }
 
     #[test]
     fn what_is_not_as_it_was_never_reaches_the_driver() {
-        let Some(first) = device(None) else { return };
+        let first = device(None);
         seven(&first);
         let programs = first.programs().unwrap();
         let changed = |at: usize| {
@@ -147,7 +142,7 @@ mod tests {
             ("longer", longer, "damaged"),
         ];
         for (name, kept, word) in cases {
-            let device = device(Some(kept)).unwrap();
+            let device = device(Some(kept));
             let why = device.programs_refused().unwrap_or("taken");
             assert!(why.contains(word), "{name}: {why}");
             assert_eq!(seven(&device), [7, 0, 0, 0], "{name}");
@@ -156,7 +151,7 @@ mod tests {
 
     #[test]
     fn each_damaged_byte_is_found() {
-        let Some(device) = device(None) else { return };
+        let device = device(None);
         let info = device.inner.adapter_info();
         let programs: Vec<u8> = (0..=255).collect();
         let sealed = seal(&programs, &info);

@@ -3,21 +3,23 @@
 
 #[path = "../../../../tests/driver.rs"]
 mod driver;
+#[path = "../../../../tests/skip.rs"]
+pub(crate) mod skip;
 
 use super::super::Result;
 use super::{Device, DeviceOptions};
-pub(crate) use driver::or_skip;
+pub(crate) use driver::opened;
 use num_complex::Complex32;
 use std::sync::{Arc, OnceLock};
 
-/// The device of all tests: a GPU, or a driver in software; none where there is neither, which is said.
-pub(crate) fn device() -> Option<Arc<Device>> {
+/// The device of all tests: a GPU, or a driver in software.
+pub(crate) fn device() -> Arc<Device> {
     static DEVICE: OnceLock<Result<Arc<Device>>> = OnceLock::new();
     let opened = DEVICE.get_or_init(|| {
         let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software()));
         opened.map(Arc::new)
     });
-    or_skip(opened.as_ref()).cloned()
+    driver::opened(opened.as_ref()).clone()
 }
 
 pub(crate) fn software() -> DeviceOptions {

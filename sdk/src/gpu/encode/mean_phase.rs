@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn the_mean_phase_is_that_of_the_cpu() {
-        let Some(device) = device() else { return };
+        let device = device();
         // Sums of parts, as the last layer leaves them.
         for parts in [1, 7, 1000] {
             let mut sums = field(parts);

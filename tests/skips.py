@@ -1,0 +1,71 @@
+"""What tests in Python do where something is missing. As a program: checks that no test passes over by itself what is
+missing, and that tests/expected-skips names nothing that no test asks for.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LIST = ROOT / "tests/expected-skips"
+# The helpers that all tests share.
+SHARED = {"tests/skip.rs", "tests/skip.sh", "tests/skips.py"}
+ENDINGS = {"", ".rs", ".py", ".sh", ".js", ".mjs", ".ts", ".kt", ".swift", ".c", ".cpp", ".cs"}
+FORBIDDEN = re.compile(
+    r"""["'`]skipped[: ]|pytest\.skip|importorskip|mark\.skip|skipif|skipTest|unittest\.skip|\b(?:test|it|describe)\.skip\(
+    |XCTSkip|\bassume(?:True|False|That)|\bAssumptions\b|@(?:Enabled|Disabled)(?:If|On|For)|@Disabled|@Ignore|\#\[ignore
+    |Assert\.(?:Ignore|Inconclusive)|\b(?:exit|return)[ (]77\b""",
+    re.VERBOSE,
+)
+# In Rust tests: to print something and leave.
+LEAVES = re.compile(r"println!\([^;]*\);\s*(?:return|continue)\b")
+
+
+def expected():
+    """Of each name the steps that may lack it and why, as the list has them."""
+    rows = (line.split("|") for line in LIST.read_text("utf-8").splitlines() if line and not line.startswith("#"))
+    return {name.strip(): ([step.strip() for step in steps.split(",")], why.strip()) for name, steps, why in rows}
+
+
+def or_fail(what, why):
+    """Notes that a test, or a part of it, does not run because `what` is missing, for tests/run to report. Raises
+    AssertionError where the list does not name it; `why` then says how to get it."""
+    assert what in expected(), f"{what} is missing ({why}), and tests/expected-skips does not name it"
+    print(f"skipped: {what}: {why}")
+    if path := os.environ.get("PHASEFRONT_SKIPS"):
+        with open(path, "a", encoding="utf-8") as file:
+            file.write(f"{what}\t{why}\n")
+
+
+def faults(name, text):
+    """The lines of a file that pass over what is missing by themselves."""
+    found = list(FORBIDDEN.finditer(text))
+    if name.endswith(".rs") and "/tests/" in name:
+        found += LEAVES.finditer(text)
+    for match in found:
+        yield f"{name}:{text.count(chr(10), 0, match.start()) + 1}: {' '.join(match.group().split())}: see tests/expected-skips"
+
+
+def main():
+    listed = subprocess.run(["git", "ls-files", "-z", "-c", "-o", "--exclude-standard"], cwd=ROOT, capture_output=True, check=True)
+    names = sorted(set(listed.stdout.decode().strip("\0").split("\0")) - SHARED)
+    # A release is tried on one's own machine, and tells there what it did not try.
+    names = [n for n in names if Path(n).suffix in ENDINGS and not n.startswith(("docs/", "release/")) and (ROOT / n).is_file()]
+    texts = {name: (ROOT / name).read_text("utf-8", errors="replace") for name in names}
+    wrong = [fault for name, text in texts.items() for fault in faults(name, text)]
+    texts |= {name: (ROOT / name).read_text("utf-8") for name in SHARED}
+    steps = set(re.findall(r"^ *step '([^']+)'", texts["tests/run"], re.MULTILINE))
+    for name, (mine, _) in expected().items():
+        wrong += [f"tests/expected-skips: {name}: tests/run has no step {step!r}" for step in mine if step not in steps]
+        asked = re.compile(rf"or_fail\(?\s*[\"']?{re.escape(name)}\b")
+        if not any(asked.search(text) for text in texts.values()):
+            wrong.append(f"tests/expected-skips: no test asks for {name!r}")
+    print(*wrong, sep="\n", end="\n" if wrong else "")
+    print(f"{len(texts)} files, {len(expected())} names, {len(wrong)} faults")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
