@@ -18,7 +18,11 @@ pub(crate) fn or_fail(what: &str, why: impl Display) {
     // Past the test harness, which keeps what passing tests print.
     let _ = writeln!(stderr(), "skipped: {what}: {why}");
     if let Some(list) = std::env::var_os("PHASEFRONT_SKIPS") {
-        let mut list = OpenOptions::new().append(true).create(true).open(list).expect("PHASEFRONT_SKIPS names a file");
+        let mut list = OpenOptions::new()
+            .append(true)
+            .create(true)
+            .open(list)
+            .expect("PHASEFRONT_SKIPS names a file");
         let line = format!("{what}\t{why}\n");
         list.write_all(line.as_bytes()).expect("a skip is noted");
     }

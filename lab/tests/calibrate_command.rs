@@ -297,7 +297,16 @@ fn a_rehearsal_that_cannot_end_is_refused_before_it_begins() {
         ("80x48", "5.5", "no room for marks"),
         ("144x64", "0", "focus at 0.000 mm"),
     ] {
-        let rehearse = ["calibrate", "rehearse", "--size", size, "--spot-z-mm", spot_z_mm, "-o", "out"];
+        let rehearse = [
+            "calibrate",
+            "rehearse",
+            "--size",
+            size,
+            "--spot-z-mm",
+            spot_z_mm,
+            "-o",
+            "out",
+        ];
         let said = folder.fails(&rehearse, 1);
         assert!(said.contains(word), "{said}");
         // Its first photographs come after this folder is made.

@@ -960,7 +960,11 @@ fn report_on_gpu(folder: &Folder, arguments: &[&str]) -> serde_json::Value {
     let made = on_gpu(folder, &[arguments, &gpu].concat());
     // Drivers write to stderr where no desktop runs.
     let errors = String::from_utf8(made.stderr).unwrap();
-    let succeeded = if made.status.success() { Ok(()) } else { Err(errors.trim_end()) };
+    let succeeded = if made.status.success() {
+        Ok(())
+    } else {
+        Err(errors.trim_end())
+    };
     driver::opened(succeeded.map_err(|why| why.to_owned()));
     serde_json::from_slice(&made.stdout).unwrap()
 }

@@ -390,7 +390,14 @@ impl Screen {
     fn open((width, height): (usize, usize)) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", &format!("{width}x{height}x24"), "-fbdir"])
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                &format!("{width}x{height}x24"),
+                "-fbdir",
+            ])
             .arg(folder.path())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -454,7 +461,11 @@ impl Screen {
             let ended = player.try_wait().unwrap();
             assert!(ended.is_none(), "{arguments:?} ended: {ended:?}");
             let late = start.elapsed() > Duration::from_secs(50);
-            assert!(!late, "{arguments:?}: of {} frames these were seen: {seen:?}", frames.len());
+            assert!(
+                !late,
+                "{arguments:?}: of {} frames these were seen: {seen:?}",
+                frames.len()
+            );
             let pixels = self.pixels();
             if let Some(n) = frames.iter().position(|frame| **frame == pixels) {
                 seen[n] = true;
@@ -518,7 +529,10 @@ fn a_screen_shows_exactly_what_it_is_given() {
 
     let told = screen.told(&folder, &["show", "frames/0.png", "--seconds", "0.1"]);
     assert_eq!(told["screen"]["width"], 640);
-    let line = format!("640×480: all {} pixels of 4 frames read back exactly, and of 200×100 amid black", 640 * 480);
+    let line = format!(
+        "640×480: all {} pixels of 4 frames read back exactly, and of 200×100 amid black",
+        640 * 480
+    );
     // Past the test harness, which keeps what passing tests print.
     writeln!(stderr(), "{line}").unwrap();
 }
@@ -531,10 +545,22 @@ fn what_a_screen_cannot_show_is_refused() {
     noise(1, (321, 240)).write(&folder.path("wide.png")).unwrap();
     noise(1, (320, 241)).write(&folder.path("high.png")).unwrap();
     for (arguments, word) in [
-        (["show", "fits.png", "--screen", "2"], "there is no screen 2; there are 1"),
-        (["show", "fits.png", "--screen", "0"], "there is no screen 0; there are 1"),
-        (["show", "wide.png", "--screen", "1"], "frames of 321×240 do not fit screen 1 of 320×240"),
-        (["show", "high.png", "--screen", "1"], "frames of 320×241 do not fit screen 1 of 320×240"),
+        (
+            ["show", "fits.png", "--screen", "2"],
+            "there is no screen 2; there are 1",
+        ),
+        (
+            ["show", "fits.png", "--screen", "0"],
+            "there is no screen 0; there are 1",
+        ),
+        (
+            ["show", "wide.png", "--screen", "1"],
+            "frames of 321×240 do not fit screen 1 of 320×240",
+        ),
+        (
+            ["show", "high.png", "--screen", "1"],
+            "frames of 320×241 do not fit screen 1 of 320×240",
+        ),
     ] {
         let refused = screen.command(&folder, &arguments).output().unwrap();
         let errors = String::from_utf8_lossy(&refused.stderr);
@@ -543,7 +569,11 @@ fn what_a_screen_cannot_show_is_refused() {
     }
     // Without a desktop too.
     for arguments in [&["screens"][..], &["show", "fits.png"]] {
-        let refused = screen.command(&folder, arguments).env_remove("DISPLAY").output().unwrap();
+        let refused = screen
+            .command(&folder, arguments)
+            .env_remove("DISPLAY")
+            .output()
+            .unwrap();
         let errors = String::from_utf8_lossy(&refused.stderr);
         assert_eq!(refused.status.code(), Some(1), "{errors}");
         assert!(errors.contains("no desktop") && errors.lines().count() == 1, "{errors}");

@@ -4,9 +4,9 @@
 
 #[path = "../../tests/driver.rs"]
 mod driver;
+mod network_models;
 #[path = "../../tests/skip.rs"]
 mod skip;
-mod network_models;
 
 use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
