@@ -12,6 +12,8 @@ fn main() -> ExitCode {
     let command = command::Phasefront::parse();
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
+        // It warns of what a modulator's desktop lacks, as a size in millimetres.
+        .filter_module("winit", log::LevelFilter::Error)
         .parse_default_env()
         .format(|out, record| {
             let level = record.level().as_str().to_lowercase();
