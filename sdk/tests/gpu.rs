@@ -151,9 +151,6 @@ fn chains_of_whole_frames_agree_with_the_cpu() {
 
 #[test]
 fn chains_in_int8_have_the_bits_of_the_cpu() {
-    if device().is_none() {
-        return;
-    }
     let models = [
         Model::int8(2, 8),
         Model::int8(3, 24),
