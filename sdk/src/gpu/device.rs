@@ -356,8 +356,8 @@ mod tests {
             ..Default::default()
         };
         // Drivers in software do not heed what memory there is.
-        let opened = Device::open_with(&DeviceOptions::default(), &little);
-        let device = opened(opened.or_else(|_| Device::open_with(&software(), &little)));
+        let hardware = Device::open_with(&DeviceOptions::default(), &little);
+        let device = opened(hardware.or_else(|_| Device::open_with(&software(), &little)));
         let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;
         let taken = device.guarded(|| {
             // More than a hundredth of any machine's memory.
