@@ -302,6 +302,10 @@ fn what_a_screen_cannot_show_is_refused() {
         let said = server.refusal(&folder, &["show", name, "--screen", screen], &server.display);
         assert!(said.contains(words), "{said}");
     }
+    for flag in ["--rate", "--seconds"] {
+        let said = folder.fails(&["show", "fits.png", flag, "0"], 1);
+        assert!(said.contains(&format!("{flag} 0: it must lie above 0")), "{said}");
+    }
     // Without a desktop too.
     for arguments in [&["screens"][..], &["show", "fits.png"]] {
         for display in ["", ":60000"] {
