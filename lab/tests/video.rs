@@ -718,9 +718,6 @@ fn what_ffmpeg_complains_about_stops_nothing() {
 
 #[test]
 fn films_have_any_names_and_are_films_alone() {
-    if !has_ffmpeg() {
-        return;
-    }
     let (dir, input) = folder(2);
     let at = |name: &str| dir.path().join(name);
     film(
@@ -771,9 +768,6 @@ fn films_have_any_names_and_are_films_alone() {
 
 #[test]
 fn films_replace_no_file_unasked() {
-    if !has_ffmpeg() {
-        return;
-    }
     let (dir, input) = folder(2);
     let at = |name: &str| dir.path().join(name);
     let out = at("x.mp4").to_str().unwrap().to_owned();
