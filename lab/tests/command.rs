@@ -712,6 +712,18 @@ fn a_flag_that_would_change_nothing_is_refused() {
         ("bench --fusion pairs", "--backend gpu"),
         ("bench --layers 0 --precision int8", "a network"),
         ("study layers --ldi-layers 3 -o study", "the study of planes"),
+        (
+            "study layers --offset-mm 3 -o study",
+            "--offset-mm goes with holograms at the modulator",
+        ),
+        (
+            "occlusion --offset-mm 3 -o study",
+            "--offset-mm goes with holograms at the modulator",
+        ),
+        (
+            "study displays --display santec-slm-200 -o study",
+            "has displays of its own",
+        ),
         ("study flicker --size 64 -o study", "scenes without a sensor's depth"),
         ("view there.png --frames 3 -o v.html", "a folder of `video`"),
     ];

@@ -75,7 +75,7 @@ pub(crate) struct Lut {
 impl Lut {
     fn run(self, json: bool) -> Result<()> {
         self.check_outputs()?;
-        let display = self.display.read_of_three()?.target.display;
+        let display = self.display.read_of_midpoint()?.target.display;
         let pattern = Pattern::new(display.height(), display.width())?;
         match (&self.patterns, &self.captures, &self.output) {
             (Some(folder), ..) => {
@@ -206,7 +206,7 @@ impl Laser {
     fn run(self, json: bool) -> Result<()> {
         output::new_file(&self.output, &["png"], self.overwrite.is_given())?;
         reading_captures(&self.captures)?;
-        let display = self.display.read_of_three()?.target.display;
+        let display = self.display.read_of_midpoint()?.target.display;
         let shape = (display.height(), display.width());
         let pattern = Pattern::new(shape.0, shape.1)?;
         let (mut maps, mut left) = (Vec::new(), Vec::new());

@@ -42,6 +42,17 @@ impl DisplayFlags {
         request.display(name.as_deref(), display)
     }
 
+    /// Of a command that knows red, green and blue alone, and no offset.
+    pub(crate) fn read_of_midpoint(&self) -> Result<DisplayFile> {
+        check_used(&[(
+            "--offset-mm",
+            self.offset_mm.is_some(),
+            false,
+            "holograms at the modulator",
+        )])?;
+        self.read_of_three()
+    }
+
     /// Of a command that knows red, green and blue alone.
     pub(crate) fn read_of_three(&self) -> Result<DisplayFile> {
         let file = self.read()?;

@@ -36,7 +36,7 @@ pub(crate) struct Occlusion {
 impl Occlusion {
     pub(crate) fn run(self, json: bool) -> Result<()> {
         output::folder(&self.output, Holding::Anything)?;
-        let display = self.display.read_of_three()?.target.display;
+        let display = self.display.read_of_midpoint()?.target.display;
         let ldi = match &self.ldi {
             Some(dir) => Ldi::read(dir)?,
             None => occlusion::two_bars(),

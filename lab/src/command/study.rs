@@ -68,6 +68,12 @@ impl Study {
         let of_sensor = matches!(self.what, What::Depth | What::Flicker);
         check_used(&[
             (
+                "--display",
+                self.display.is_given(),
+                self.what != What::Displays,
+                "studies of one display, `displays` has displays of its own",
+            ),
+            (
                 "--ldi-layers",
                 self.ldi_layers.is_some(),
                 of_planes,
@@ -134,7 +140,7 @@ impl Study {
             scenes: self.scenes.into(),
             size: self.size.unwrap_or(384).into(),
             seed: self.seed,
-            display: self.display.read_of_three()?.target.display,
+            display: self.display.read_of_midpoint()?.target.display,
         })
     }
 
@@ -253,7 +259,7 @@ impl Study {
     }
 
     fn depth(&self, json: bool) -> Result<()> {
-        let display = self.display.read_of_three()?.target.display;
+        let display = self.display.read_of_midpoint()?.target.display;
         let planes = self.planes.unwrap_or(256) as usize;
         let sweep = Method::Sweep(Sweep::for_display(&display));
         let mut methods = vec![("sweep".to_owned(), sweep)];
