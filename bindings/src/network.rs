@@ -1,6 +1,8 @@
 //! Networks: from a file, from bytes, or built in.
 
 use crate::error::{PhasefrontError, guard};
+use phasefront::unstable::file;
+use std::path::Path;
 use std::sync::Arc;
 
 /// A hologram network. Immutable; one serves many sessions.
@@ -127,7 +129,7 @@ impl Network {
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let onnx = std::fs::read(&path)
+            let onnx = file::read(Path::new(&path), file::MOST_NETWORK)
                 .map_err(|e| PhasefrontError::File(format!("the network {path} cannot be read: {e}")))?;
             Self::from_bytes(&onnx)
         })

@@ -3,6 +3,8 @@
 use crate::display::Display;
 use crate::error::{PhasefrontError, guard};
 use phasefront::target::Response;
+use phasefront::unstable::file;
+use std::path::Path;
 use std::sync::Arc;
 
 /// What holograms are made for: a display and, where it is calibrated, what its modulator answers to a phase, its
@@ -67,7 +69,7 @@ impl Target {
     #[uniffi::constructor]
     pub fn from_file(path: String) -> Result<Arc<Self>, PhasefrontError> {
         guard(|| {
-            let file = std::fs::read(&path)
+            let file = file::read(Path::new(&path), file::MOST_TARGET)
                 .map_err(|e| PhasefrontError::File(format!("the calibration {path} cannot be read: {e}")))?;
             Self::from_bytes(&file)
         })

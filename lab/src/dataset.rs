@@ -17,15 +17,16 @@ use crate::corrected::Correction;
 use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files;
+use crate::input;
 use crate::ldi::{Ldi, LdiLayer};
 use crate::npy;
-use crate::output;
 use crate::scene::Texture;
 use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
+use phasefront::unstable::file;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
@@ -171,8 +172,7 @@ impl Manifest {
     /// No manifest, or one that is not of this format.
     pub fn read(dir: &Path) -> Result<Self> {
         let path = dir.join("manifest.json");
-        output::reading(&path)?;
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
+        let text = input::text(&path)?;
         let manifest: Manifest = serde_json::from_str(&text).map_err(|e| Error::file(&path, e))?;
         if manifest.format != FORMAT {
             return Err(Error::file(
@@ -321,7 +321,7 @@ const ARRAYS: [&str; 3] = ["rgb.npy", "depth.npy", "hologram.npy"];
 
 /// Whether there is a whole pair: what a full disk or a lost write left is none.
 fn is_whole(path: &Path) -> bool {
-    let archive = File::open(path).map(|file| ZipArchive::new(BufReader::new(file)));
+    let archive = file::open(path, u64::MAX).map(|file| ZipArchive::new(BufReader::new(file)));
     matches!(archive, Ok(Ok(archive)) if ARRAYS.iter().all(|name| archive.index_for_name(name).is_some()))
 }
 
@@ -348,7 +348,7 @@ fn array_bytes(
 /// A pair that is not there, damaged, or of another shape than the manifest says.
 pub fn read_pair(manifest: &Manifest, dir: &Path, index: usize) -> Result<Pair> {
     let path = Manifest::pair_path(dir, index);
-    let file = File::open(&path).map_err(|e| {
+    let file = file::open(&path, u64::MAX).map_err(|e| {
         Error::file(
             &path,
             format!("{e}; `phasefront dataset` into the same folder completes the data set"),

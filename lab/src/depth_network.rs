@@ -5,13 +5,18 @@
 //! Where the size is left open, the picture nearly keeps its proportions at about [`USUAL_SIDE`], in multiples of
 //! [`MULTIPLE`].
 
+mod bounds;
+
 use crate::error::{Error, Result};
+use crate::input::{self, MOST_DEPTH_NETWORK};
 use crate::output;
+use crate::quiet;
 use image::imageops::{self, FilterType};
 use image::{Rgb, Rgb32FImage};
 use ndarray::{Array2, ArrayView3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_hir::infer::Factoid;
 use tract_onnx::tract_hir::internal::DimLike;
@@ -171,27 +176,22 @@ impl DepthNetwork {
     /// Reads the ONNX file at `path`, for pictures of (H, W) = `picture`.
     ///
     /// # Errors
-    /// A file that is no such network.
+    /// A file that is no such network, or one that would take too much memory or time.
     pub fn open(path: &Path, picture: (usize, usize)) -> Result<Self> {
         output::reading(path)?;
         let refuse = |why: String| Error::file(path, why);
-        if !path.is_file() {
+        if !path.exists() {
             return Err(refuse(
                 "there is no such file; --depth-network takes an ONNX file".into(),
             ));
         }
-        let load = || tract_onnx::onnx().model_for_path(path);
-        let model = load().map_err(|why| refuse(format!("is no ONNX file that tract reads: {}", one_line(&why))))?;
-        let input = Input::read(&model, picture).map_err(refuse)?;
-        let plan = || -> TractResult<_> {
-            let outputs = model.output_outlets()?[..1].to_vec();
-            model
-                .with_input_fact(0, input.fact())?
-                .with_output_outlets(&outputs)?
-                .into_optimized()?
-                .into_runnable()
-        };
-        let plan = plan().map_err(|why| Error::file(path, format!("tract does not run it: {}", one_line(&why))))?;
+        let file = input::bytes(path, MOST_DEPTH_NETWORK)?;
+        // tract panics on what it did not expect.
+        let planned = quiet::caught(|| {
+            let proto = bounds::messages(&file, path)?;
+            plan(&proto, path, picture)
+        });
+        let (input, plan) = planned.map_err(panicked).and_then(|planned| planned).map_err(refuse)?;
         Ok(DepthNetwork {
             path: path.into(),
             input,
@@ -210,9 +210,48 @@ impl DepthNetwork {
             let results = self.plan.run(tvec!(self.input.tensor(rgb, colours)?.into()))?;
             Ok(results[0].clone().into_tensor())
         };
-        let output = run().map_err(|why| refuse(format!("tract does not run it: {}", one_line(&why))))?;
-        plane(&output).map_err(refuse)
+        let output = quiet::caught(run).map_err(|why| refuse(panicked(why)))?;
+        plane(&output.map_err(|why| refuse(not_run(&why)))?).map_err(refuse)
     }
+}
+
+fn plan(
+    proto: &ModelProto,
+    path: &Path,
+    picture: (usize, usize),
+) -> std::result::Result<(Input, Arc<TypedRunnableModel>), String> {
+    let folder = path.parent().and_then(Path::to_str).unwrap_or_default();
+    let parsed = (tract_onnx::onnx().parse(proto, Some(folder)))
+        .map_err(|why| format!("is no ONNX file that tract reads: {}", one_line(&why)))?;
+    if let Some(name) = parsed.unresolved_inputs.first() {
+        return Err(format!("reads {name}, which no node gives"));
+    }
+    let model = parsed.model;
+    let input = Input::read(&model, picture)?;
+    let plan = || -> TractResult<_> {
+        let outlets = model.output_outlets()?;
+        let outputs = outlets
+            .get(..1)
+            .ok_or_else(|| TractError::msg("it has no output"))?
+            .to_vec();
+        let mut model = (model.with_input_fact(0, input.fact())?).with_output_outlets(&outputs)?;
+        bounds::analyse(&mut model)?;
+        let model = model.into_typed()?;
+        bounds::check_sizes(&model)?;
+        let model = model.into_optimized()?;
+        bounds::check_sizes(&model)?;
+        model.into_runnable()
+    };
+    let plan = plan().map_err(|why| not_run(&why))?;
+    Ok((input, plan))
+}
+
+fn not_run(why: &TractError) -> String {
+    format!("tract does not run it: {}", one_line(why))
+}
+
+fn panicked(why: String) -> String {
+    format!("tract does not run it: it fails with: {why}")
 }
 
 /// The one plane of `output`, whose other axes must have length 1.

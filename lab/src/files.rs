@@ -2,22 +2,24 @@
 //! sets [`crate::dataset`]'s.
 
 use crate::calibrate::table::{self, AberrationFile};
+use crate::decode::{self, Reading};
 use crate::error::{Error, Result};
+use crate::input::{self, MOST_ARRAY, MOST_PICTURE};
 use crate::npy;
 pub use crate::output::write_atomically;
 use crate::output::{self, Pending};
 use crate::panel_file;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
-use ndarray::{Array2, Array3, ArrayView3, Ix2, Ix3};
+use image::{DynamicImage, RgbImage};
+use ndarray::{Array3, ArrayView3, Ix3};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::device::Device;
 use phasefront::target::Response;
+use phasefront::unstable::file;
 use phasefront::unstable::keys;
 use phasefront::{Display, Target};
 use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::io::{BufRead, BufReader, Cursor, Seek, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -48,11 +50,50 @@ pub struct HologramInfo {
     pub calibrated: Vec<String>,
 }
 
+/// What full light may stand for: an amplitude of a field that was made of amplitudes up to 1.
+const SCALES: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
+/// Most characters of an encoder's name and of a key of a display's file.
+const MOST_NAME: usize = 64;
+
 impl HologramInfo {
     /// The text chunk that a PNG carries of it.
     fn chunk(&self, path: &Path) -> Result<(&'static str, String)> {
         let text = serde_json::to_string(self).map_err(|e| Error::file(path, e))?;
         Ok((PNG_CHUNK, text))
+    }
+
+    /// Checks what a file says.
+    ///
+    /// # Errors
+    /// Values that no hologram of ours has.
+    fn check(&self) -> Result<()> {
+        let refuse = |why: String| Err(Error::Input(why));
+        if let Some(scale) = self.scale
+            && !SCALES.contains(&scale)
+        {
+            return refuse(format!(
+                "scale is {scale}; it must lie in {:e}..={:e}",
+                SCALES.start(),
+                SCALES.end()
+            ));
+        }
+        if let Some(name) = (self.encoder.iter().chain(&self.calibrated)).find(|name| name.len() > MOST_NAME) {
+            return refuse(format!("a name has {} bytes; {MOST_NAME} are the most", name.len()));
+        }
+        if let Some(lut) = &self.lut {
+            lut_of(lut)?;
+        }
+        if let Some(turns) = &self.levels_turns {
+            let bits = self.display.bits();
+            if bits > 8 || turns.len() != 1 << bits {
+                return refuse(format!(
+                    "levels_turns has {} levels for a display of {bits} bits; up to 8 bits it has one for each level",
+                    turns.len()
+                ));
+            }
+            Response::of_turns(turns)?;
+        }
+        Ok(())
     }
 
     /// The display as far as this says it.
@@ -131,57 +172,29 @@ pub enum Hologram {
     Complex(Array3<Complex32>, HologramInfo),
 }
 
-/// Most pixels of an image that is read, 8192²: over two 8K frames.
-pub const MOST_PIXELS: u64 = 1 << 26;
+pub use crate::decode::{COLOUR_FORMATS, DEPTH_FORMATS, MOST_PIXELS};
+pub use crate::depth_file::read_depth;
 
-/// The image in `bytes`.
-///
-/// # Errors
-/// What is not a whole PNG or JPEG, or has over [`MOST_PIXELS`].
-pub(crate) fn decode(bytes: &[u8]) -> std::result::Result<DynamicImage, String> {
-    decode_from(ImageReader::new(Cursor::new(bytes)).with_guessed_format())
-}
-
-fn decode_from<R: BufRead + Seek>(
-    reader: std::io::Result<ImageReader<R>>,
-) -> std::result::Result<DynamicImage, String> {
-    let reader = reader.map_err(|e| format!("cannot be read: {e}"))?;
-    if !matches!(
-        reader.format(),
-        Some(ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Bmp)
-    ) {
-        return Err("is not a PNG, JPEG or BMP image".into());
-    }
-    let broken = |e| format!("is not a whole PNG, JPEG or BMP image: {e}");
-    let mut decoder = reader.into_decoder().map_err(broken)?;
-    let (width, height) = decoder.dimensions();
-    // A small file may hold a large image.
-    if u64::from(width) * u64::from(height) > MOST_PIXELS {
-        return Err(format!(
-            "has {width}×{height} pixels; {MOST_PIXELS} in all are the most"
-        ));
-    }
-    decoder.set_limits(image::Limits::default()).map_err(broken)?;
-    DynamicImage::from_decoder(decoder).map_err(broken)
-}
-
+/// The picture in the file at `path`, upright.
 pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
-    output::reading(path)?;
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    decode_from(reader).map_err(|e| Error::file(path, e))
+    decode::open_picture(path, Reading::UPRIGHT).map(|(image, _)| image)
 }
 
-/// The amplitudes of an image, (3, H, W) in \[0, 1]. Grey images have three equal colours; alpha is left out.
+/// The amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images have three equal colours; alpha is left out.
 ///
 /// # Errors
-/// A file that is missing, cut short, or not a PNG or JPEG.
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
 pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
-    let image = open_image(path)?;
+    open_image(path).map(amplitudes)
+}
+
+/// The amplitudes of `image`, (3, H, W) in \[0, 1].
+pub(crate) fn amplitudes(image: DynamicImage) -> Array3<f32> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let amplitudes =
         |at: &dyn Fn(usize) -> f32| Array3::from_shape_fn((3, height, width), |(c, y, x)| at(3 * (y * width + x) + c));
     // Not by way of floats: that would be all of it twice.
-    Ok(match image {
+    match image {
         DynamicImage::ImageLuma16(_)
         | DynamicImage::ImageLumaA16(_)
         | DynamicImage::ImageRgb16(_)
@@ -193,83 +206,26 @@ pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
             let pixels = image.into_rgb8().into_raw();
             amplitudes(&|i| f32::from(pixels[i]) / 255.0)
         }
-    })
+    }
 }
 
-/// The (H, W) of an image and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is left out.
+/// The (H, W) of an image, upright, and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is
+/// left out.
 ///
 /// # Errors
-/// A file that is missing, cut short, or not a PNG or JPEG.
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
 pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
     let image = open_image(path)?.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize);
     Ok((shape, image.into_raw()))
 }
 
-/// The numbers of a depth image, (H, W), as they stand in a grey PNG of 8 or 16 bits or a 2D `.npy`. For
-/// `normalized` depth whole numbers are divided by the largest their type holds.
+/// The bytes of a regular file of at most 2 GiB.
 ///
 /// # Errors
-/// A file that is missing, cut short, or of another kind.
-pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
-    if has_extension(path, "npy") {
-        return read_depth_npy(path, normalized);
-    }
-    let image = open_image(path)?;
-    let over = |most: f32| if normalized { most } else { 1.0 };
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let values: Vec<f32> = match image {
-        DynamicImage::ImageLuma8(grey) => {
-            let over = over(255.0);
-            grey.into_raw().into_iter().map(|v| f32::from(v) / over).collect()
-        }
-        DynamicImage::ImageLuma16(grey) => {
-            let over = over(65535.0);
-            grey.into_raw().into_iter().map(|v| f32::from(v) / over).collect()
-        }
-        other => {
-            return Err(Error::file(
-                path,
-                format!(
-                    "holds {:?} pixels; depth must be a grey PNG of 8 or 16 bits or a .npy",
-                    other.color()
-                ),
-            ));
-        }
-    };
-    Array2::from_shape_vec((height, width), values).map_err(|e| Error::file(path, e))
-}
-
-fn read_depth_npy(path: &Path, normalized: bool) -> Result<Array2<f32>> {
-    let file = read_file(path)?;
-    let over = |most: f32| if normalized { most } else { 1.0 };
-    if let Ok(depth) = npy::read::<f32, Ix2>(&file) {
-        return Ok(depth);
-    }
-    if let Ok(depth) = npy::read::<f64, Ix2>(&file) {
-        return Ok(depth.mapv(|v| v as f32));
-    }
-    if let Ok(depth) = npy::read::<u16, Ix2>(&file) {
-        return Ok(depth.mapv(|v| f32::from(v) / over(65535.0)));
-    }
-    npy::read::<u8, Ix2>(&file)
-        .map(|depth| depth.mapv(|v| f32::from(v) / over(255.0)))
-        .map_err(|_| {
-            Error::file(
-                path,
-                "is not a whole .npy of shape (H, W) and type float32, float64, uint16 or uint8",
-            )
-        })
-}
-
-/// The bytes of a regular file: what never ends, as a device, is not begun.
+/// An output of this command; a file that is missing, not regular or larger.
 pub fn read_file(path: &Path) -> Result<Vec<u8>> {
-    output::reading(path)?;
-    let refuse = |e: std::io::Error| Error::file(path, format!("cannot be read: {e}"));
-    if !std::fs::metadata(path).map_err(refuse)?.is_file() {
-        return Err(Error::file(path, "is no regular file"));
-    }
-    std::fs::read(path).map_err(refuse)
+    input::bytes(path, MOST_ARRAY)
 }
 
 /// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG; what is over 1 is white, and one laser's are grey.
@@ -459,8 +415,8 @@ fn beside(path: &Path) -> Result<PathBuf> {
     if beside.is_file() {
         // Ours has a table of 1024 entries at most.
         let is_small = std::fs::metadata(&beside).is_ok_and(|about| about.len() < 1 << 20);
-        let is_ours = is_small
-            && (std::fs::read(&beside)).is_ok_and(|bytes| serde_json::from_slice::<HologramInfo>(&bytes).is_ok());
+        let is_ours =
+            is_small && file::read_text(&beside).is_ok_and(|text| serde_json::from_str::<HologramInfo>(&text).is_ok());
         if !is_ours {
             let npy = path.display();
             return Err(Error::file(
@@ -478,13 +434,14 @@ fn beside(path: &Path) -> Result<PathBuf> {
 /// A file that is missing or cut short, or an image that is no hologram of ours.
 pub fn read_hologram(path: &Path) -> Result<Hologram> {
     if has_extension(path, "npy") {
-        let field = npy::read::<Complex32, Ix3>(&read_file(path)?)
+        let field = npy::read::<Complex32, Ix3>(&input::bytes(path, MOST_ARRAY)?)
             .map_err(|e| Error::file(path, format!("is not a whole complex64 .npy of shape (C, H, W): {e}")))?;
         let beside = path.with_extension("json");
         output::reading(&beside)?;
-        let text = std::fs::read_to_string(&beside)
+        let text = file::read_text(&beside)
             .map_err(|e| Error::file(&beside, format!("is needed beside {}: {e}", path.display())))?;
         let info: HologramInfo = serde_json::from_str(&text).map_err(|e| Error::file(&beside, e))?;
+        info.check().map_err(|e| Error::file(&beside, e))?;
         let colours = info.display.colours();
         if field.dim().0 != colours || field.is_empty() {
             return Err(Error::file(
@@ -500,31 +457,45 @@ pub fn read_hologram(path: &Path) -> Result<Hologram> {
             "carries no `phasefront` text chunk; it must be a hologram PNG as written by `phasefront hologram`",
         )
     })?;
-    let image = open_image(path)?;
+    levels_of(open_image(path)?, &info)
+        .map(|levels| levels.hologram(info))
+        .map_err(|why| Error::file(path, why))
+}
+
+/// The levels that `image` holds.
+fn levels_of(image: DynamicImage, info: &HologramInfo) -> std::result::Result<Levels, String> {
     let (width, height) = (image.width() as usize, image.height() as usize);
     let shape @ (colours, ..) = (info.display.colours(), height, width);
     let at = |(c, y, x): (usize, usize, usize)| colours * (y * width + x) + c;
-    let bytes = |bytes: Vec<u8>| Array3::from_shape_fn(shape, |place| bytes[at(place)]);
-    let words = match (image, colours) {
-        (DynamicImage::ImageRgb8(image), 3) => return Ok(Hologram::PhaseOnly(bytes(image.into_raw()), info)),
-        (DynamicImage::ImageLuma8(image), 1) => return Ok(Hologram::PhaseOnly(bytes(image.into_raw()), info)),
-        (DynamicImage::ImageRgb16(image), 3) => image.into_raw(),
-        (DynamicImage::ImageLuma16(image), 1) => image.into_raw(),
-        (_, 1) => return Err(Error::file(path, "is not a grey image of levels, as one laser has")),
-        _ => return Err(Error::file(path, "is not an RGB image of levels")),
+    let levels = match (image, colours) {
+        (DynamicImage::ImageRgb8(image), 3) => bytes_of(image.into_raw(), shape, at),
+        (DynamicImage::ImageLuma8(image), 1) => bytes_of(image.into_raw(), shape, at),
+        (DynamicImage::ImageRgb16(image), 3) => words_of(image.into_raw(), shape, at),
+        (DynamicImage::ImageLuma16(image), 1) => words_of(image.into_raw(), shape, at),
+        (_, 1) => return Err("is not a grey image of levels, as one laser has".into()),
+        _ => return Err("is not an RGB image of levels".into()),
     };
-    let most = words.iter().copied().max().unwrap_or_default();
+    let most = match &levels {
+        Levels::Bytes(levels) => levels.iter().copied().max().unwrap_or_default().into(),
+        Levels::Words(levels) => levels.iter().copied().max().unwrap_or_default(),
+    };
     if u32::from(most) >> info.display.bits() != 0 {
-        return Err(Error::file(
-            path,
-            format!(
-                "holds a level of {most}, over the {} bits that it says",
-                info.display.bits()
-            ),
+        return Err(format!(
+            "holds a level of {most}, over the {} bits that it says",
+            info.display.bits()
         ));
     }
-    let levels = Array3::from_shape_fn(shape, |place| words[at(place)]);
-    Ok(Hologram::Words(levels, info))
+    Ok(levels)
+}
+
+type Place = (usize, usize, usize);
+
+fn bytes_of(levels: Vec<u8>, shape: Place, at: impl Fn(Place) -> usize) -> Levels {
+    Levels::Bytes(Array3::from_shape_fn(shape, |place| levels[at(place)]))
+}
+
+fn words_of(levels: Vec<u16>, shape: Place, at: impl Fn(Place) -> usize) -> Levels {
+    Levels::Words(Array3::from_shape_fn(shape, |place| levels[at(place)]))
 }
 
 /// The [`HologramInfo`] that a PNG carries, `None` where the file is another image.
@@ -533,7 +504,8 @@ fn read_info(path: &Path) -> Result<Option<HologramInfo>> {
         return Ok(None);
     };
     serde_json::from_str(&text)
-        .map(Some)
+        .map_err(|e| Error::Input(e.to_string()))
+        .and_then(|info: HologramInfo| info.check().map(|()| Some(info)))
         .map_err(|e| Error::file(path, format!("its `{PNG_CHUNK}` text chunk is broken: {e}")))
 }
 
@@ -549,9 +521,8 @@ pub fn read_made_of(path: &Path) -> Result<Option<(String, Option<f32>)>> {
 
 /// The text chunk called `name` of a PNG, `None` where it has none or is no PNG.
 fn read_text(path: &Path, name: &str) -> Result<Option<String>> {
-    output::reading(path)?;
-    let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-    let Ok(reader) = png::Decoder::new(BufReader::new(file)).read_info() else {
+    let file = input::open(path, MOST_PICTURE)?;
+    let Ok(reader) = png::Decoder::new(file).read_info() else {
         return Ok(None);
     };
     let chunks = &reader.info().uncompressed_latin1_text;
@@ -747,11 +718,7 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 /// # Errors
 /// A file that is missing or says what cannot be.
 pub fn read_display(path: &Path) -> Result<DisplayFile> {
-    let read = |path: &Path| {
-        output::reading(path)?;
-        std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))
-    };
-    let text = read(path)?;
+    let text = input::text(path)?;
     let mut table: toml::Table =
         toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
     check_keys(path, &table)?;
@@ -768,7 +735,8 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let lut = match lut_path {
         None => None,
         Some(path) => {
-            let levels: std::result::Result<Vec<u8>, _> = read(&path)?.split_whitespace().map(str::parse).collect();
+            let levels: std::result::Result<Vec<u8>, _> =
+                input::text(&path)?.split_whitespace().map(str::parse).collect();
             let levels = levels.map_err(|e| Error::file(&path, format!("holds what is no level of 0..=255: {e}")))?;
             let lut = lut_of(&levels).map_err(|e| Error::file(&path, e))?;
             let most = lut.into_iter().max().unwrap_or_default();

@@ -1,6 +1,7 @@
 //! GPUs for the command: which one, and what was compiled for it, kept from run to run.
 
 use crate::error::Error;
+use phasefront::unstable::file;
 use phasefront::unstable::gpu::{Device, DeviceOptions};
 use std::io::Write;
 use std::path::PathBuf;
@@ -18,7 +19,7 @@ impl From<phasefront::unstable::gpu::GpuError> for Error {
 pub fn options(name: Option<&str>) -> DeviceOptions {
     DeviceOptions {
         name: name.map(str::to_owned),
-        programs: programs().and_then(|path| std::fs::read(path).ok()),
+        programs: programs().and_then(|path| file::read(&path, file::MOST_TARGET).ok()),
     }
 }
 

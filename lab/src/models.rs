@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::output;
 use phasefront::Network;
+use phasefront::unstable::file;
 use phasefront_models::NETWORKS;
 pub use phasefront_models::Precision;
 use std::path::Path;
@@ -55,7 +56,7 @@ pub fn network(name: &str, precision: Option<Precision>) -> Result<Arc<Network>>
     }
     let path = Path::new(name);
     output::reading(path)?;
-    let bytes = std::fs::read(path).map_err(|e| unknown(path, name, &e))?;
+    let bytes = file::read(path, file::MOST_NETWORK).map_err(|e| unknown(path, name, &e))?;
     if precision.is_some() {
         return Err(Error::file(
             path,

@@ -14,7 +14,7 @@
 
 use crate::error::{Error, Result};
 use crate::files::{has_extension, open_image};
-use crate::output;
+use crate::input::{self, MOST_PICTURE};
 use image::DynamicImage;
 use phasefront::Target;
 use phasefront::target::{Flatness, Registration};
@@ -131,8 +131,8 @@ fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
 }
 
 fn read_csv(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
-    output::reading(path)?;
-    let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let text =
+        String::from_utf8(input::bytes(path, MOST_PICTURE)?).map_err(|_| Error::file(path, "is not text in UTF-8"))?;
     let mut turns = Vec::new();
     let mut width = None;
     let lines = text

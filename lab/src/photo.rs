@@ -7,15 +7,14 @@
 //! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, as
 //! portraits have it: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
 
+use crate::decode::{self, Reading};
 use crate::error::{Error, Result};
-use crate::output;
+use crate::files;
+use crate::input::{self, MOST_PHOTO};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
-use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageReader};
 use ndarray::{Array2, Array3};
 use roxmltree::{Document, Node};
-use std::io::Cursor;
 use std::path::Path;
 
 /// The namespace of GDepth.
@@ -28,8 +27,8 @@ const XMP: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
 const EXTENDED_XMP: &[u8] = b"http://ns.adobe.com/xmp/extension/\0";
 /// The GUID, the length of the whole, and the offset of this part, before each part of extended XMP.
 const EXTENDED_HEAD: usize = 32 + 4 + 4;
-/// The most that extended XMP may say that it is long.
-const MOST_XMP: usize = 1 << 28;
+/// Most marks (`<`, `"`, `'`) in XMP: elements and attributes take far more memory than their characters.
+const MOST_MARKS: usize = 1 << 15;
 
 /// What the numbers of a photo's depth mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,55 +71,32 @@ impl Photo {
 /// # Errors
 /// A file that is missing or broken, or has no depth that is understood; the reason says what can be done.
 pub fn read(path: &Path) -> Result<Photo> {
-    output::reading(path)?;
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let bytes = input::bytes(path, MOST_PHOTO)?;
     of_bytes(&bytes).map_err(|why| Error::file(path, why))
 }
 
 fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
-    if is_heic(bytes) {
-        return Err("is HEIC, which is not read here; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert".into());
+    if let Some(why) = decode::unread_container(bytes) {
+        return Err(why.into());
     }
     if !bytes.starts_with(&[0xFF, 0xD8]) {
         return Err("is no JPEG; --photo takes a JPEG with depth inside, other pictures go to --rgb with --depth or --depth-network".into());
     }
-    let (colour, orientation) = decode(bytes, "the photo")?;
+    let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
     let found = Xmp::read(bytes)?.depth(bytes)?;
-    let (mut depth, _) = decode(&found.image, "the depth inside")?;
+    // It lies as the photo is stored, whatever it says itself.
+    let depth = decode::picture_of(&found.image, Reading::AS_STORED);
+    let (mut depth, _) = depth.map_err(|why| format!("the depth inside {why}"))?;
     depth.apply_orientation(orientation);
-    let rgb = colour.into_rgb32f();
-    let (width, height) = (rgb.width() as usize, rgb.height() as usize);
-    let pixels = rgb.into_raw();
     let grey = depth.into_luma16();
     let (w, h) = (grey.width() as usize, grey.height() as usize);
     let grey = grey.into_raw().into_iter().map(|v| f32::from(v) / 65535.0);
     Ok(Photo {
-        rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
-            pixels[3 * (y * width + x) + c].clamp(0.0, 1.0)
-        }),
+        rgb: files::amplitudes(colour),
         depth: Array2::from_shape_vec((h, w), grey.collect()).map_err(|e| e.to_string())?,
         range: found.range,
         range_m: found.range_m,
     })
-}
-
-/// Whether this is an ISO base media file of HEIF's brands.
-fn is_heic(bytes: &[u8]) -> bool {
-    const BRANDS: [&[u8]; 6] = [b"heic", b"heix", b"hevc", b"heim", b"mif1", b"msf1"];
-    bytes.get(4..8) == Some(b"ftyp") && bytes.get(8..12).is_some_and(|brand| BRANDS.contains(&brand))
-}
-
-/// An upright image, and how it was turned.
-fn decode(bytes: &[u8], what: &str) -> std::result::Result<(DynamicImage, Orientation), String> {
-    let broken = |e: &dyn std::fmt::Display| format!("{what} is not a whole PNG or JPEG image: {e}");
-    let reader = ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|e| broken(&e))?;
-    let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
-    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut image = DynamicImage::from_decoder(decoder).map_err(|e| broken(&e))?;
-    image.apply_orientation(orientation);
-    Ok((image, orientation))
 }
 
 /// A depth image that was found, still encoded.
@@ -159,7 +135,6 @@ impl Xmp {
     }
 
     fn depth(&self, jpeg: &[u8]) -> std::result::Result<Found, String> {
-        let parse = |text| Document::parse(text).map_err(|e| format!("its XMP is broken: {e}"));
         let main = parse(&self.main)?;
         let extended = self.extended.as_deref().map(parse).transpose()?;
         let documents: Vec<_> = std::iter::once(&main).chain(&extended).collect();
@@ -217,6 +192,15 @@ impl Found {
     }
 }
 
+/// What XMP says.
+fn parse(text: &str) -> std::result::Result<Document<'_>, String> {
+    let marks = text.bytes().filter(|byte| matches!(byte, b'<' | b'"' | b'\''));
+    if marks.count() > MOST_MARKS {
+        return Err(format!("its XMP has over {MOST_MARKS} elements and attributes"));
+    }
+    Document::parse(text).map_err(|e| format!("its XMP is broken: {e}"))
+}
+
 /// What the APP1 segments before the picture's own data hold.
 fn app1_segments(jpeg: &[u8]) -> Vec<&[u8]> {
     const APP1: u8 = 0xE1;
@@ -238,25 +222,31 @@ fn app1_segments(jpeg: &[u8]) -> Vec<&[u8]> {
 
 /// The extended XMP that `main` names, of its parts.
 fn extended(main: &str, parts: &[&[u8]]) -> std::result::Result<String, String> {
-    let mut text = Vec::new();
-    let mut got = 0;
+    let head = |part: &[u8]| -> Option<(usize, usize)> {
+        let number = |at: usize| Some(u32::from_be_bytes(*part.get(at..)?.first_chunk()?) as usize);
+        Some((number(32)?, number(36)?))
+    };
+    let mut named = Vec::new();
     for part in parts {
-        let head: &[u8; EXTENDED_HEAD] = part.first_chunk().ok_or("a part of its extended XMP is cut short")?;
-        let number = |at: usize| u32::from_be_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]) as usize;
-        if !std::str::from_utf8(&head[..32]).is_ok_and(|guid| main.contains(guid)) {
-            continue;
+        let (guid, _) = (part.split_at_checked(32)).ok_or("a part of its extended XMP is cut short")?;
+        if std::str::from_utf8(guid).is_ok_and(|guid| main.contains(guid)) {
+            let (length, offset) = head(part).ok_or("a part of its extended XMP is cut short")?;
+            named.push((length, offset, &part[EXTENDED_HEAD..]));
         }
-        let (length, offset) = (number(32), number(36));
-        let part = &part[EXTENDED_HEAD..];
-        if length > MOST_XMP || offset.saturating_add(part.len()) > length {
-            return Err("its extended XMP does not fit together".into());
-        }
-        text.resize(length, 0);
-        text[offset..offset + part.len()].copy_from_slice(part);
-        got += part.len();
     }
-    if got < text.len() {
-        return Err(format!("of its extended XMP {got} of {} bytes are there", text.len()));
+    let got: usize = named.iter().map(|(_, _, part)| part.len()).sum();
+    let length = named.first().map_or(0, |(length, ..)| *length);
+    // Before there is memory for it: a part may say any length.
+    if got < length {
+        return Err(format!("of its extended XMP {got} of {length} bytes are there"));
+    }
+    let mut text = vec![0; length];
+    for (said, offset, part) in named {
+        let place = text.get_mut(offset..).and_then(|rest| rest.get_mut(..part.len()));
+        let place = place
+            .filter(|_| said == length)
+            .ok_or("its extended XMP does not fit together")?;
+        place.copy_from_slice(part);
     }
     String::from_utf8(text).map_err(|_| "its extended XMP is no UTF-8".into())
 }

@@ -1,8 +1,11 @@
 //! An RGB-D frame from its files: colour and depth brought to one shape, depth normalized.
 
+use crate::decode::{self, Reading};
+use crate::depth_file::{self, DepthFile};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::fit::Placement;
+use image::metadata::Orientation;
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
 use phasefront::unstable::depth::refine::Refiner;
@@ -31,9 +34,18 @@ pub struct DepthOptions {
 /// # Errors
 /// Files that cannot be read, or that do not belong together.
 pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result<RgbdFrame> {
-    let rgb = files::read_rgb(rgb_path)?;
+    let (image, orientation) = decode::open_picture(rgb_path, Reading::UPRIGHT)?;
+    let rgb = files::amplitudes(image);
     let normalized = options.unit == DepthUnit::Normalized;
-    let mut readings = files::read_depth(depth_path, normalized)?;
+    let file = depth_file::read(depth_path, normalized)?;
+    let (_, height, width) = rgb.dim();
+    if is_turned_alone(depth_path, &file, orientation, (height, width))? {
+        log::warn!(
+            "{}: is taken as it is, upright; the colour's Exif data turn the colour: {orientation:?}",
+            depth_path.display()
+        );
+    }
+    let mut readings = file.depth;
     if normalized && let Some(bad) = readings.iter().find(|v| v.is_infinite()) {
         return Err(Error::file(
             depth_path,
@@ -43,12 +55,9 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
     if normalized && let Some(doubt) = doubt(&readings) {
         log::warn!("{}: {doubt}", depth_path.display());
     }
-    let (_, height, width) = rgb.dim();
     let (depth_height, depth_width) = readings.dim();
     if (depth_height, depth_width) != (height, width) {
-        let cross = |a: usize, b: usize| a as f64 * b as f64;
-        let ratio = cross(width, depth_height) / cross(height, depth_width);
-        if (ratio - 1.0).abs() > ASPECT_TOLERANCE || ratio.is_nan() {
+        if !has_aspect((depth_height, depth_width), (height, width)) {
             return Err(Error::file(
                 depth_path,
                 format!(
@@ -80,6 +89,40 @@ pub fn read(rgb_path: &Path, depth_path: &Path, options: DepthOptions) -> Result
         );
     }
     RgbdFrame::new(rgb, normalized.depth).map_err(|e| Error::file(rgb_path, e))
+}
+
+/// Whether two shapes, (H, W), are of one aspect ratio.
+fn has_aspect((h, w): (usize, usize), (height, width): (usize, usize)) -> bool {
+    let cross = |a: usize, b: usize| a as f64 * b as f64;
+    let ratio = cross(width, h) / cross(height, w);
+    (ratio - 1.0).abs() <= ASPECT_TOLERANCE
+}
+
+/// Whether Exif data turned colour of (H, W) = `shape` and not its depth, and both shapes fit all the same.
+///
+/// # Errors
+/// Depth that fits the colour only as it is stored.
+pub(crate) fn is_turned_alone(
+    depth_path: &Path,
+    depth: &DepthFile,
+    colour: Orientation,
+    (height, width): (usize, usize),
+) -> Result<bool> {
+    if colour == Orientation::NoTransforms || depth.orientation != Orientation::NoTransforms {
+        return Ok(false);
+    }
+    let shape = depth.depth.dim();
+    let fits = has_aspect(shape, (height, width));
+    if !fits && decode::swaps_sides(colour) && has_aspect(shape, (width, height)) {
+        return Err(Error::file(
+            depth_path,
+            format!(
+                "depth is {}×{}, as the colour is stored, but the colour's Exif data turn it to {width}×{height}; turn the depth alike, or remove the colour's orientation (exiftool -Orientation= -overwrite_original)",
+                shape.1, shape.0
+            ),
+        ));
+    }
+    Ok(fits)
 }
 
 /// What makes it doubtful that `depth` is normalized, if anything does.

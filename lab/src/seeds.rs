@@ -10,12 +10,14 @@ use crate::dataset::{self, Manifest};
 use crate::depth_study::{Degradation, RATIO, degrade, refine};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::input::{self, MOST_ARRAY};
 use crate::ldi::depth_of_code;
 use crate::npy;
 use crate::scene::dice::Dice;
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, Ix3, concatenate, s};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
+use phasefront::unstable::file;
 use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{RgbdFrame, Sweep};
 use rayon::prelude::*;
@@ -60,7 +62,7 @@ pub fn make(
             ),
         ));
     }
-    match std::fs::read(&place) {
+    match file::read(&place, file::MOST_TEXT) {
         Ok(bytes) => {
             if serde_json::from_slice::<serde_json::Value>(&bytes).ok() != Some(description) {
                 return Err(Error::file(
@@ -75,15 +77,15 @@ pub fn make(
     }
     let plan = SweepPlan::new(manifest.size, manifest.size, &manifest.display, sweep, 0.0)?;
     (0..manifest.scenes).into_par_iter().try_for_each(|index| {
-        let file = |what: &str| -> PathBuf { dir.join(format!("{what}_{index:06}.npy")) };
-        let (depths, seeds) = (file("depth"), file("seed"));
+        let file_of = |what: &str| -> PathBuf { dir.join(format!("{what}_{index:06}.npy")) };
+        let (depths, seeds) = (file_of("depth"), file_of("seed"));
         if depths.exists() && !seeds.exists() {
             let pair = dataset::read_pair(manifest, data, index)?;
             let colour = crate::evaluate::visible_rgb(&pair.ldi);
             let mut depths = read_depths(&depths, manifest.size)?;
             if refined > 0 {
                 let more = refined_depths(depths.slice(s![0, .., ..]), &colour, index, refined)?;
-                files::write_atomically(&file("refined"), |file| {
+                files::write_atomically(&file_of("refined"), |file| {
                     more.write_npy(file).map_err(std::io::Error::other)
                 })?;
                 depths = concatenate![Axis(0), depths, more];
@@ -97,7 +99,7 @@ pub fn make(
 }
 
 fn read_depths(path: &Path, size: usize) -> Result<Array3<u16>> {
-    let depths = npy::read::<u16, Ix3>(&files::read_file(path)?).map_err(|e| Error::file(path, e))?;
+    let depths = npy::read::<u16, Ix3>(&input::bytes(path, MOST_ARRAY)?).map_err(|e| Error::file(path, e))?;
     match depths.dim() {
         (_, height, width) if (height, width) == (size, size) => Ok(depths),
         (_, height, width) => Err(Error::file(

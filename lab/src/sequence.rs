@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::input;
 use crate::video;
 use image::{ImageDecoder, ImageReader};
 use phasefront::unstable::depth::DepthUnit;
@@ -269,7 +270,7 @@ fn tum(dir: &Path) -> Result<Sequence> {
 /// Lines of a time in seconds and a file's name, `#` before what is said of them.
 fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
     let path = dir.join(list);
-    let text = std::fs::read_to_string(&path).map_err(|e| Error::file(&path, format!("cannot be read: {e}")))?;
+    let text = input::text(&path)?;
     let lines = text
         .lines()
         .map(str::trim)

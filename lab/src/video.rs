@@ -1,8 +1,10 @@
 //! RGB-D video: frames from a folder or a pipe, as a camera would give them.
 
+use crate::decode::{self, Reading};
+use crate::depth_file;
 use crate::error::{Error, Result};
-use crate::files;
 use crate::fingerprint::Fingerprint;
+use crate::rgbd;
 use ndarray::Array2;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::unstable::depth::DepthUnit;
@@ -182,9 +184,13 @@ pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
 /// # Errors
 /// Files that cannot be read.
 pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoFrame> {
-    let (colour_shape, bytes) = files::read_rgb_bytes(colour)?;
+    let (image, orientation) = decode::open_picture(colour, Reading::UPRIGHT)?;
+    let colour_shape = (image.height() as usize, image.width() as usize);
+    let bytes = image.into_rgb8().into_raw();
     let normalized = unit == DepthUnit::Normalized;
-    let readings = files::read_depth(depth, normalized)?;
+    let file = depth_file::read(depth, normalized)?;
+    rgbd::is_turned_alone(depth, &file, orientation, colour_shape)?;
+    let readings = file.depth;
     if normalized && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d)) {
         return Err(Error::file(
             depth,

@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::output;
+use crate::input::{self, MOST_ARRAY};
 use crate::pictures;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -240,8 +240,8 @@ pub fn write(path: &Path, scenes: &[Scene]) -> Result<usize> {
 /// A file that is missing or another page; one without scenes, or with scenes that [`write()`] never makes, as with
 /// pictures that are elsewhere.
 pub fn read(path: &Path) -> Result<Vec<Scene>> {
-    output::reading(path)?;
-    let page = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let page = String::from_utf8(input::bytes(path, MOST_ARRAY)?)
+        .map_err(|_| Error::file(path, "is no page that `phasefront view` made"))?;
     let json = page
         .split_once(SCENES_FROM)
         .and_then(|(_, rest)| Some(rest.split_once(SCENES_TO)?.0));

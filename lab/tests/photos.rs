@@ -200,7 +200,36 @@ fn photos_that_cannot_be_used_get_one_line() {
     ]
     .concat();
     let broken = |data: &str| jpeg(&[app1(&gdepth(&format!(r#"GDepth:Data="{data}""#)))]);
+    // A few bytes that would be 17 GB, and a few that would be 4.
+    let gif = [&b"GIF89a"[..], &[0xFF; 4], &[0x80, 0, 0], &[0; 30]].concat();
+    let mut png = Vec::new();
+    let mut encoder = png::Encoder::new(&mut png, 1 << 15, (1 << 11) + 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::One);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&vec![0; (1 << 12) * ((1 << 11) + 1)]).unwrap();
+    writer.finish().unwrap();
+    let long = [GUID.as_bytes(), &u32::MAX.to_be_bytes(), &[0; 4], b"short"].concat();
+    let long = app1(&[&b"http://ns.adobe.com/xmp/extension/\0"[..], &long].concat());
+    let marks = "<a/>".repeat(1 << 16);
+    let marks = self::extended(marks.as_bytes(), 60_000);
     let cases = [
+        (
+            "gif.jpg",
+            broken(&STANDARD.encode(gif)),
+            "the depth inside is not a picture",
+        ),
+        ("png.jpg", broken(&STANDARD.encode(png)), "67108864 in all are the most"),
+        (
+            "long.jpg",
+            jpeg(&[extended.clone(), long]),
+            "4294967295 bytes are there",
+        ),
+        (
+            "marks.jpg",
+            jpeg(&[&[extended.clone()], &marks[..]].concat()),
+            "elements and attributes",
+        ),
         ("heic.jpg", heic, "heif-convert"),
         ("text.jpg", b"nothing".to_vec(), "is no JPEG"),
         ("plain.jpg", jpeg(&[]), "--depth-network"),
@@ -211,7 +240,7 @@ fn photos_that_cannot_be_used_get_one_line() {
         ),
         ("xml.jpg", jpeg(&[app1(&xmp("<rdf:Desc"))]), "XMP is broken"),
         ("base.jpg", broken("!!!!"), "no base64"),
-        ("image.jpg", broken("AAAAAAAA"), "the depth inside is not a whole PNG"),
+        ("image.jpg", broken("AAAAAAAA"), "the depth inside is not a picture"),
         ("empty.jpg", broken(""), "the depth inside"),
         ("data.jpg", jpeg(&[app1(&gdepth(""))]), "no Data"),
         (

@@ -80,6 +80,7 @@ pub mod device;
 mod display;
 mod encode;
 mod error;
+mod file;
 mod frame;
 #[cfg(feature = "gpu")]
 mod gpu;

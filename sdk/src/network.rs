@@ -6,7 +6,7 @@
 //! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
 //! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
-mod bounds;
+pub mod bounds;
 pub mod chain;
 mod filter;
 mod fused;

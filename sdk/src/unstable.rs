@@ -14,6 +14,10 @@ pub mod error {
     pub use crate::caught::caught;
     pub use crate::error::Line;
 }
+/// Bounded reading of files.
+pub mod file {
+    pub use crate::file::*;
+}
 /// Camera images to amplitudes.
 pub mod frame {
     pub use crate::frame::*;

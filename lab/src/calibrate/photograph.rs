@@ -2,15 +2,11 @@
 //!
 //! A camera's tone curve must be off (its raw file, developed linearly): nothing here can undo one.
 
+use crate::decode::{self, Reading};
 use crate::error::{Error, Result};
-use crate::files::{has_extension, write_atomically};
-use crate::output;
-use image::{DynamicImage, ImageReader};
-use std::fs::File;
-use std::io::BufReader;
+use crate::files::write_atomically;
+use image::DynamicImage;
 use std::path::Path;
-use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
 
 /// The most pixels of a photograph: 200 megapixels.
 const MOST_PIXELS: u64 = 200_000_000;
@@ -37,19 +33,11 @@ impl Photograph {
     /// # Errors
     /// A file that is missing, cut short, of another kind, or over 200 megapixels.
     pub fn read(path: &Path, colour: usize) -> Result<Self> {
-        output::reading(path)?;
-        if has_extension(path, "tif") || has_extension(path, "tiff") {
-            return Self::read_tiff(path, colour);
-        }
-        let mut reader = ImageReader::open(path)
-            .and_then(ImageReader::with_guessed_format)
-            .map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        let mut limits = image::Limits::default();
-        limits.max_alloc = Some(8 * MOST_PIXELS);
-        reader.limits(limits);
-        let image = reader
-            .decode()
-            .map_err(|e| Error::file(path, format!("is not a whole PNG or TIFF image: {e}")))?;
+        let how = Reading {
+            most_pixels: MOST_PIXELS,
+            ..Reading::AS_STORED
+        };
+        let (image, _) = decode::open_picture(path, how)?;
         let (height, width) = (image.height() as usize, image.width() as usize);
         let eight = |bytes: Vec<u8>, channels: usize| {
             let values = every(bytes, channels, colour, u16::from);
@@ -70,34 +58,6 @@ impl Photograph {
         Ok(Photograph {
             height,
             width,
-            values,
-            full,
-        })
-    }
-
-    fn read_tiff(path: &Path, colour: usize) -> Result<Self> {
-        let file = File::open(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
-        let broken = |e: tiff::TiffError| Error::file(path, format!("is not a whole TIFF image: {e}"));
-        let mut limits = Limits::default();
-        limits.decoding_buffer_size = 8 * MOST_PIXELS as usize;
-        let mut decoder = Decoder::new(BufReader::new(file)).map_err(broken)?.with_limits(limits);
-        let (width, height) = decoder.dimensions().map_err(broken)?;
-        let colours = decoder.colortype().map_err(broken)?;
-        let channels = match colours {
-            ColorType::Gray(8 | 16) => 1,
-            ColorType::GrayA(8 | 16) => 2,
-            ColorType::RGB(8 | 16) => 3,
-            ColorType::RGBA(8 | 16) => 4,
-            other => return Err(kind(path, &other)),
-        };
-        let (values, full) = match decoder.read_image().map_err(broken)? {
-            DecodingResult::U8(v) => (every(v, channels, colour, u16::from), 255),
-            DecodingResult::U16(v) => (every(v, channels, colour, |v| v), 65535),
-            _ => return Err(kind(path, &colours)),
-        };
-        Ok(Photograph {
-            height: height as usize,
-            width: width as usize,
             values,
             full,
         })
@@ -224,7 +184,7 @@ mod tests {
     fn tiff_is_read_and_of_colour_one_channel() {
         let dir = tempfile::tempdir().unwrap();
         let grey = dir.path().join("g.tif");
-        let encoder = |path: &Path| tiff::encoder::TiffEncoder::new(File::create(path).unwrap());
+        let encoder = |path: &Path| tiff::encoder::TiffEncoder::new(std::fs::File::create(path).unwrap());
         let p = ramp(65535);
         encoder(&grey)
             .unwrap()

@@ -20,7 +20,7 @@
 use crate::corrected::spatial::SpatialAberrations;
 use crate::error::{Error, Result};
 use crate::files::{self, open_image, write_atomically};
-use crate::output;
+use crate::input::{self, MOST_ARRAY};
 use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::Display;
@@ -36,8 +36,7 @@ use std::path::Path;
 /// # Errors
 /// A file that is missing or no such table.
 pub fn read_per_pixel(path: &Path) -> Result<PerPixel> {
-    output::reading(path)?;
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let bytes = input::bytes(path, MOST_ARRAY)?;
     PerPixel::from_bytes(&bytes).map_err(|e| Error::file(path, e))
 }
 
@@ -224,8 +223,7 @@ impl AberrationFile {
 /// # Errors
 /// A file that is missing, or not of this kind.
 pub fn read_entries(path: &Path) -> Result<Vec<Entry>> {
-    output::reading(path)?;
-    let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, format!("cannot be read: {e}")))?;
+    let text = input::text(path)?;
     let parsed: AberrationToml = toml::from_str(&text).map_err(|e| Error::file(path, keys::message(&e)))?;
     Ok(parsed.at)
 }

@@ -4,6 +4,7 @@ use super::flags::{DisplayFlags, OverwriteFlag, parse_size, progress_bar};
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
 use phasefront::Display;
+use phasefront::unstable::file;
 use phasefront_lab::calibrate::lut::{self, Refusal};
 use phasefront_lab::calibrate::pattern::{DARK, PATTERNS, Pattern};
 use phasefront_lab::calibrate::photograph::Photograph;
@@ -358,8 +359,7 @@ impl Aberration {
             }
             true => {
                 output::reading(&state)?;
-                let text =
-                    std::fs::read_to_string(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
+                let text = file::read_text(&state).map_err(|e| Error::file(&state, format!("cannot be read: {e}")))?;
                 let now: SearchFile = serde_json::from_str(&text).map_err(|e| Error::file(&state, e))?;
                 if (now.z_mm, now.colour, now.at) != (self.z_mm, self.colour, self.at) {
                     return Err(Error::file(

@@ -7,6 +7,7 @@ use clap::{Args, ValueEnum};
 use ndarray::{Array2, Array3};
 use phasefront::{Display, RgbdFrame};
 use phasefront_lab::depth_network::{Colours, DepthNetwork};
+use phasefront_lab::files::{COLOUR_FORMATS, DEPTH_FORMATS};
 use phasefront_lab::fit::{Fit, Placement};
 use phasefront_lab::photo;
 use phasefront_lab::{Error, Result, files, rgbd, sequence};
@@ -15,11 +16,15 @@ use std::path::{Path, PathBuf};
 /// An RGB-D image, what its depth means, and how it lies on the modulator.
 #[derive(Default, Args)]
 pub(crate) struct FrameFlags {
-    /// Colour image, PNG or JPEG; or a folder of them
-    #[arg(long, value_name = "FILE", conflicts_with = "photo")]
+    #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))]
     rgb: Option<PathBuf>,
-    /// Depth image: grey PNG of 8 or 16 bits, or .npy; or a folder of them, with the names of those of --rgb
-    #[arg(long, value_name = "FILE", requires = "rgb", conflicts_with = "depth_network")]
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "rgb",
+        conflicts_with = "depth_network",
+        help = format!("Depth image: {DEPTH_FORMATS}; or a folder of them, with the names of those of --rgb")
+    )]
     depth: Option<PathBuf>,
     /// A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them
     #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]

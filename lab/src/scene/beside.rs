@@ -6,8 +6,9 @@ use std::path::{Path, PathBuf};
 use image::DynamicImage;
 
 use super::model::MAX_MODEL_BYTES;
-use crate::files;
+use crate::decode::{self, Reading};
 use crate::output;
+use phasefront::unstable::file;
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -54,7 +55,9 @@ impl Beside {
         output::reading(&path).map_err(|e| e.to_string())?;
         self.left = (self.left.checked_sub(about.len()))
             .ok_or_else(|| format!("with {name} it names files of over {MAX_MODEL_BYTES} bytes in all"))?;
-        std::fs::read(&path).map(Some).map_err(|e| format!("{name}: {e}"))
+        file::read(&path, about.len())
+            .map(Some)
+            .map_err(|e| format!("{name}: {e}"))
     }
 
     /// The bytes of the file `name`.
@@ -63,9 +66,9 @@ impl Beside {
             .ok_or_else(|| format!("{name}: there is no such file"))
     }
 
-    /// Width, height and RGBA texels of a PNG or JPEG; of 16 bits the upper 8.
+    /// Width, height and RGBA texels of a picture, as they are stored; of 16 bits the upper 8.
     pub(super) fn texels(&mut self, bytes: &[u8]) -> Result<(usize, usize, Vec<[u8; 4]>)> {
-        let image = files::decode(bytes)?;
+        let image = decode::picture_of(bytes, Reading::AS_STORED)?.0;
         let (width, height) = (image.width() as usize, image.height() as usize);
         self.texels_left = (self.texels_left.checked_sub(width * height)).ok_or_else(|| {
             format!("pictures of over {MAX_TEXELS} pixels in all, each counted for each colouring of it")

@@ -11,8 +11,9 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
 
 use super::beside::Beside;
-use super::model::{MAX_MODEL_TRIANGLES, Part, check_count};
+use super::model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
 use super::{Texture, texture};
+use phasefront::unstable::file;
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -24,7 +25,7 @@ const GAMMA: f64 = 2.2;
 
 /// The parts of the file's default scene, or of its first.
 pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
-    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    let bytes = file::read(path, MAX_MODEL_BYTES).map_err(|e| e.to_string())?;
     check_length(&bytes)?;
     let unchecked = Gltf::from_slice_without_validation(&bytes).map_err(|e| one_line(&e))?;
     check_names(unchecked.as_json())?;

@@ -1,16 +1,17 @@
 //! Wavefront OBJ files, their MTL files and pictures, as [`Part`]s.
 
 use std::cell::RefCell;
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 use std::sync::Arc;
 
 use tobj::{LoadOptions, Material};
 
+use phasefront::unstable::file;
+
 use super::Texture;
 use super::beside::Beside;
-use super::model::{Part, check_count};
+use super::model::{MAX_MODEL_BYTES, Part, check_count};
 
 type Result<T> = std::result::Result<T, String>;
 
@@ -21,7 +22,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<Part>> {
         ignore_points: true,
         ignore_lines: true,
     };
-    let mut obj = BufReader::new(File::open(path).map_err(|e| e.to_string())?);
+    let mut obj = BufReader::new(file::open(path, MAX_MODEL_BYTES).map_err(|e| e.to_string())?);
     let beside = RefCell::new(Beside::new(path)?);
     let library = |name: &Path| {
         let name = name.to_string_lossy().replace('\\', "/");

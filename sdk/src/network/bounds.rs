@@ -1,13 +1,12 @@
 //! What a file may make the library allocate, said before it is read: a message of two bytes becomes hundreds in
 //! memory, so that it is messages that are counted.
 
+use crate::file::MOST_NETWORK;
 use crate::{Error, Result};
 
-/// Most bytes of a file.
-pub(super) const MAX_BYTES: usize = 1 << 28;
 /// Most messages and strings in one: nodes, attributes, tensors, types, their names. Those of a chain of 256 layers in
 /// int8 are fewer.
-pub(super) const MAX_PARTS: usize = 1 << 17;
+pub const MAX_PARTS: usize = 1 << 17;
 /// How deep messages may lie in one another; a chain's lie 8 deep.
 const MAX_DEPTH: usize = 16;
 
@@ -50,14 +49,21 @@ impl Message {
 /// # Errors
 /// [`Error::Network`] with the bound.
 pub(super) fn check(file: &[u8]) -> Result<()> {
-    if file.len() > MAX_BYTES {
+    if file.len() as u64 > MOST_NETWORK {
         return Err(Error::Network(format!(
-            "the file has {} bytes; {MAX_BYTES} are the most",
+            "the file has {} bytes; {MOST_NETWORK} are the most",
             file.len()
         )));
     }
-    let mut parts = 0;
-    count(file, Message::Model, 0, &mut parts)
+    check_parts(file)
+}
+
+/// Checks that the parts of an ONNX file are not too many.
+///
+/// # Errors
+/// [`Error::Network`] with the bound.
+pub fn check_parts(file: &[u8]) -> Result<()> {
+    count(file, Message::Model, 0, &mut 0)
 }
 
 fn count(mut bytes: &[u8], message: Message, depth: usize, parts: &mut usize) -> Result<()> {
@@ -79,13 +85,13 @@ fn count(mut bytes: &[u8], message: Message, depth: usize, parts: &mut usize) ->
                 *parts += 1;
                 if *parts > MAX_PARTS {
                     return Err(Error::Network(format!(
-                        "the file has over {MAX_PARTS} parts (nodes, attributes, tensors, names); a hologram network has fewer"
+                        "the file has over {MAX_PARTS} parts (nodes, attributes, tensors, names); a network has fewer"
                     )));
                 }
                 if let Some(field) = message.field(number) {
                     if depth == MAX_DEPTH {
                         return Err(Error::Network(format!(
-                            "the file's parts lie over {MAX_DEPTH} deep in one another; a hologram network is a plain chain"
+                            "the file's parts lie over {MAX_DEPTH} deep in one another; a network's lie less deep"
                         )));
                     }
                     count(part, field, depth + 1, parts)?;

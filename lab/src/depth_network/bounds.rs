@@ -1,0 +1,243 @@
+//! What a depth network may make tract allocate and compute, checked before it does: a file of a few bytes may name a
+//! tensor of any size.
+
+use phasefront::unstable::network::bounds;
+use std::path::Path;
+use tract_onnx::pb::ModelProto;
+use tract_onnx::prelude::*;
+use tract_onnx::tract_core::internal::Cost;
+use tract_onnx::tract_hir::infer::{Factoid, InferenceOp};
+
+/// Most nodes of a network; the largest that are public have some thousands.
+const MOST_NODES: usize = 1 << 13;
+/// Most bytes of one tensor.
+const MOST_TENSOR: u64 = 1 << 30;
+/// Most bytes of all tensors that are needed at one time.
+const MOST_LIVE: u64 = 1 << 32;
+/// Most bytes that a node may make of constants whose size tract learns only by computing.
+const MOST_UNKNOWN: u64 = 1 << 16;
+/// Most products that are summed for one picture: some minutes.
+const MOST_PRODUCTS: u64 = 1 << 44;
+/// How often the sizes are gone through: what a later node says of an earlier one is rarely needed, and once.
+const MOST_PASSES: usize = 8;
+
+/// The messages of `file`, where they are not too many, and what lies in other files is in the same folder.
+///
+/// # Errors
+/// Too many parts or nodes; branches and loops; other files that cannot be read.
+pub(super) fn messages(file: &[u8], path: &Path) -> std::result::Result<ModelProto, String> {
+    bounds::check_parts(file).map_err(|why| why.to_string())?;
+    let proto: ModelProto = prost_message(file)?;
+    let graph = proto.graph.as_ref().ok_or("is no ONNX file: it holds no graph")?;
+    if graph.node.len() > MOST_NODES {
+        return Err(format!(
+            "has {} nodes; {MOST_NODES} are the most for a depth network",
+            graph.node.len()
+        ));
+    }
+    for node in &graph.node {
+        if node.attribute.iter().any(|a| a.g.is_some() || !a.graphs.is_empty()) {
+            return Err(format!(
+                "holds a branch or a loop, node '{}' ({}); export it without, for a picture of a fixed size",
+                node.name, node.op_type
+            ));
+        }
+    }
+    let attributes = graph.node.iter().flat_map(|node| &node.attribute);
+    let tensors = attributes.flat_map(|a| a.t.iter().chain(&a.tensors));
+    let mut total = 0;
+    for entry in (graph.initializer.iter().chain(tensors)).flat_map(|tensor| &tensor.external_data) {
+        if entry.key == "location" {
+            let beside = path.with_file_name(&entry.value);
+            let about = beside
+                .metadata()
+                .map_err(|e| format!("its weights are in {}: {e}", beside.display()))?;
+            if !about.is_file() {
+                return Err(format!(
+                    "its weights are in {}, which is not a regular file",
+                    beside.display()
+                ));
+            }
+        }
+        if entry.key == "length" {
+            total += entry.value.parse::<u64>().unwrap_or(u64::MAX).min(MOST_LIVE + 1);
+        }
+        if total > MOST_LIVE {
+            return Err(format!("its weights have over {MOST_LIVE} bytes"));
+        }
+    }
+    Ok(proto)
+}
+
+fn prost_message(file: &[u8]) -> std::result::Result<ModelProto, String> {
+    let decoded = tract_onnx::onnx().proto_model_for_read(&mut &*file);
+    decoded.map_err(|why| format!("is no ONNX file that tract reads: {}", super::one_line(&why)))
+}
+
+/// What is known of the model's tensors, as tract's own analysis finds it, but with each size checked before a constant
+/// of it is made.
+///
+/// # Errors
+/// A tensor that is too large, and what tract refuses.
+pub(super) fn analyse(model: &mut InferenceModel) -> TractResult<()> {
+    for node in model.nodes() {
+        for output in &node.outputs {
+            check(&node.name, &output.fact)?;
+        }
+    }
+    let mut order = model.eval_order()?;
+    // tract analyses what no output needs as well.
+    order.extend((0..model.nodes().len()).filter({
+        let needed: std::collections::HashSet<usize> = order.iter().copied().collect();
+        move |node| !needed.contains(node)
+    }));
+    for _ in 0..MOST_PASSES {
+        let mut is_known = true;
+        for &node in &order {
+            is_known &= !analyse_node(model, node)?;
+        }
+        if is_known {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Whether something was learned from one node.
+fn analyse_node(model: &mut InferenceModel, id: usize) -> TractResult<bool> {
+    let node = model.node(id);
+    let name = format!("{} ({})", node.name, node.op.name());
+    let observed = node.op.observe_outlets(model, node)?;
+    let facts = |outlets: &[OutletId]| -> TractResult<TVec<InferenceFact>> {
+        outlets.iter().map(|o| model.outlet_fact(*o).cloned()).collect()
+    };
+    let places: Vec<OutletId> = (0..node.outputs.len()).map(|slot| OutletId::new(id, slot)).collect();
+    let (inputs, outputs, seen) = (facts(&node.inputs)?, facts(&places)?, facts(&observed)?);
+    let from = node.inputs.clone();
+
+    // Sizes alone, on a copy; then what tract makes of it, which computes constants.
+    let mut op: Box<dyn InferenceOp> = node.op.clone();
+    let (known_inputs, sizes, _) =
+        op.infer_facts(inputs.iter().collect(), outputs.iter().collect(), seen.iter().collect())?;
+    let mut is_size_known = true;
+    for fact in known_inputs.iter().chain(&sizes) {
+        is_size_known &= check(&name, fact)?.is_some();
+    }
+    let given: Option<Vec<u64>> = known_inputs
+        .iter()
+        .map(|fact| {
+            fact.value
+                .concretize()
+                .map(|value| (value.volume() * value.datum_type().size_of()) as u64)
+        })
+        .collect();
+    if let Some(given) = given
+        && !is_size_known
+        && given.iter().sum::<u64>() > MOST_UNKNOWN
+    {
+        bail(format!("node {name} makes a constant of unknown size"))?;
+    }
+    let (inputs, outputs, seen) =
+        model
+            .node_mut(id)
+            .op
+            .infer(inputs.iter().collect(), outputs.iter().collect(), seen.iter().collect())?;
+    let learned = (from.iter().zip(inputs))
+        .chain(places.iter().zip(outputs))
+        .chain(observed.iter().zip(seen));
+    let mut is_new = false;
+    for (outlet, fact) in learned {
+        let before = model.outlet_fact(*outlet)?;
+        let unified = fact.unify(before)?;
+        if unified != *before {
+            check(&name, &unified)?;
+            model.set_outlet_fact(*outlet, unified)?;
+            is_new = true;
+        }
+    }
+    Ok(is_new)
+}
+
+/// The bytes of a tensor, none where its size is not known yet.
+fn check(node: &str, fact: &InferenceFact) -> TractResult<Option<u64>> {
+    let mut bytes = fact.datum_type.concretize().map_or(8, |kind| kind.size_of()) as u64;
+    let mut is_known = !fact.shape.is_open();
+    for dim in fact.shape.dims() {
+        match dim.concretize().map(|dim| dim.to_i64()) {
+            Some(Ok(side)) => match u64::try_from(side) {
+                Ok(side) => bytes = bytes.saturating_mul(side),
+                Err(_) => bail(format!("node {node} has a tensor with a side of {side}"))?,
+            },
+            _ => is_known = false,
+        }
+    }
+    if is_known && bytes > MOST_TENSOR {
+        too_large(node, bytes)?;
+    }
+    Ok(is_known.then_some(bytes))
+}
+
+fn too_large(node: &str, bytes: u64) -> TractResult<()> {
+    bail(format!(
+        "node {node} has a tensor of {bytes} bytes; {MOST_TENSOR} are the most"
+    ))
+}
+
+fn bail(why: String) -> TractResult<()> {
+    Err(TractError::msg(why))
+}
+
+/// Checks the sizes of all tensors of `model`, what of them is needed at one time, and its products.
+///
+/// # Errors
+/// What is over a bound, or a size that depends on the picture.
+pub(super) fn check_sizes(model: &TypedModel) -> TractResult<()> {
+    let order = model.eval_order()?;
+    let mut last = vec![0; model.nodes().len()];
+    for (time, &id) in order.iter().enumerate() {
+        last[id] = time;
+        for input in &model.node(id).inputs {
+            last[input.node] = time;
+        }
+    }
+    let bytes_of = |id: usize| -> TractResult<u64> {
+        let node = model.node(id);
+        let mut sum = 0;
+        for output in &node.outputs {
+            let name = format!("{} ({})", node.name, node.op.name());
+            let Ok(bytes) = output.fact.mem_size().to_i64() else {
+                bail(format!("the size of node {name} depends on what the picture shows"))?;
+                continue;
+            };
+            let bytes = u64::try_from(bytes).unwrap_or(u64::MAX);
+            if bytes > MOST_TENSOR {
+                too_large(&name, bytes)?;
+            }
+            sum += bytes;
+        }
+        Ok(sum)
+    };
+    let mut ends = vec![Vec::new(); order.len()];
+    let (mut live, mut products) = (0u64, 0u64);
+    for (time, &id) in order.iter().enumerate() {
+        let bytes = bytes_of(id)?;
+        live += bytes;
+        ends[last[id]].push(bytes);
+        if live > MOST_LIVE {
+            bail(format!("it needs over {MOST_LIVE} bytes at one time"))?;
+        }
+        live -= ends[time].iter().sum::<u64>();
+        let node = model.node(id);
+        let facts = model.node_input_facts(id)?;
+        for (cost, count) in node.op.cost(&facts)? {
+            if matches!(cost, Cost::FMA(_) | Cost::Div(_)) {
+                let count = count.to_i64().ok().and_then(|count| u64::try_from(count).ok());
+                products = products.saturating_add(count.unwrap_or(u64::MAX));
+            }
+        }
+        if products > MOST_PRODUCTS {
+            bail(format!("it sums over {MOST_PRODUCTS} products for one picture"))?;
+        }
+    }
+    Ok(())
+}

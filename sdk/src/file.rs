@@ -1,0 +1,103 @@
+//! Files that others name. Only regular files are opened, and only up to a size: a path from outside may lead to a
+//! device that never ends, to a pipe that waits, or to a file that memory does not hold.
+
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read, Result};
+use std::path::Path;
+
+/// Most bytes of a network's file.
+pub const MOST_NETWORK: u64 = 1 << 28;
+/// Most bytes of a calibration: its tables for the largest modulator fit.
+pub const MOST_TARGET: u64 = 1 << 30;
+/// Most bytes of a text that people write, as a display's TOML.
+pub const MOST_TEXT: u64 = 1 << 24;
+
+/// Opens a regular file of at most `most` bytes.
+///
+/// # Errors
+/// What the system says; another kind of file; a larger one.
+pub fn open(path: &Path, most: u64) -> Result<File> {
+    // Before it is opened: opening a pipe waits for its writer.
+    check(&std::fs::metadata(path)?, most)?;
+    let file = File::open(path)?;
+    // Once more, of what was opened: the name may lead elsewhere now.
+    check(&file.metadata()?, most)?;
+    Ok(file)
+}
+
+fn check(about: &std::fs::Metadata, most: u64) -> Result<()> {
+    if !about.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    if about.len() > most {
+        return Err(too_large(&about.len().to_string(), most));
+    }
+    Ok(())
+}
+
+fn too_large(bytes: &str, most: u64) -> Error {
+    Error::new(
+        ErrorKind::InvalidInput,
+        format!("it has {bytes} bytes; {most} are the most"),
+    )
+}
+
+/// The bytes of a regular file of at most `most` bytes.
+///
+/// # Errors
+/// As [`open`].
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let file = open(path, most)?;
+    let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
+    // Files of `/proc` say that they have no bytes, and others may still grow.
+    file.take(most + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most {
+        return Err(too_large(&format!("over {most}"), most));
+    }
+    Ok(bytes)
+}
+
+/// The text of a regular file of at most [`MOST_TEXT`] bytes.
+///
+/// # Errors
+/// As [`open`]; bytes that are not UTF-8.
+pub fn read_text(path: &Path) -> Result<String> {
+    String::from_utf8(read(path, MOST_TEXT)?).map_err(|_| Error::new(ErrorKind::InvalidData, "it is not text in UTF-8"))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// A name in the folder for temporary files that no other process takes.
+    fn place(name: &str) -> std::path::PathBuf {
+        std::env::temp_dir().join(format!("phasefront-file-{}-{name}", std::process::id()))
+    }
+
+    #[test]
+    fn only_regular_files_up_to_a_size_are_read() {
+        let path = place("four");
+        std::fs::write(&path, b"four").unwrap();
+        assert_eq!(read(&path, 4).unwrap(), b"four");
+        assert_eq!(read_text(&path).unwrap(), "four");
+        let why = read(&path, 3).unwrap_err().to_string();
+        assert_eq!(why, "it has 4 bytes; 3 are the most");
+        std::fs::write(&path, b"\xff").unwrap();
+        assert!(read_text(&path).unwrap_err().to_string().contains("UTF-8"));
+        std::fs::remove_file(&path).unwrap();
+        assert!(read(&path, 4).is_err());
+        let why = read(&std::env::temp_dir(), 4).unwrap_err().to_string();
+        assert!(why.contains("not a regular file"), "{why}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn devices_and_files_without_a_length_are_bounded() {
+        let why = read(Path::new("/dev/zero"), 4).unwrap_err().to_string();
+        assert!(why.contains("not a regular file"), "{why}");
+        // It says that it has 0 bytes.
+        let why = read(Path::new("/proc/cpuinfo"), 4).unwrap_err().to_string();
+        assert_eq!(why, "it has over 4 bytes; 4 are the most");
+    }
+}
