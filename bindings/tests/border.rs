@@ -42,3 +42,18 @@ fn every_exported_call_is_guarded() {
     }
     assert!(calls > 30, "{calls} calls were found");
 }
+
+#[cfg(unix)]
+#[test]
+fn only_regular_files_are_read() {
+    use phasefront_ffi::{Network, Target};
+    let device = || "/dev/zero".to_owned();
+    let refusals = [
+        Network::from_file(device()).unwrap_err(),
+        Target::from_file(device()).unwrap_err(),
+    ];
+    for why in refusals {
+        let why = why.to_string();
+        assert!(why.contains("/dev/zero") && why.contains("not a regular file"), "{why}");
+    }
+}

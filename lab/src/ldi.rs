@@ -505,7 +505,7 @@ mod tests {
         restore();
         let bytes = fs::read(dir.join("layer_1.png")).unwrap();
         fs::write(dir.join("layer_1.png"), &bytes[..bytes.len() / 2]).unwrap();
-        assert_refused(&dir, "layer_1.png", "not a whole PNG");
+        assert_refused(&dir, "layer_1.png", "not a whole picture");
         restore();
         image::GrayImage::new(3, 3).save(dir.join("depth_0.png")).unwrap();
         assert_refused(&dir, "depth_0.png", "3x3 pixels, but its layer has 7x5");
