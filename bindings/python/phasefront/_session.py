@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import TracebackType
@@ -165,6 +166,8 @@ class Session:
     ):
         self._purpose = Purpose(options.target, options.encoding)
         self._raw = _ffi.RawSession(options, mode, None if listener is None else _Listener(listener, self._purpose))
+        # Also when Python exits: later the session's thread could not call it any more, which aborts the process.
+        weakref.finalize(self, self._raw.shut_down)
 
     def process(self, frame: Frame) -> Hologram:
         """The hologram of `frame`, in an image or a video session. Waits for it; other Python threads run meanwhile.

@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+import subprocess
 import sys
 import threading
 
@@ -183,6 +184,19 @@ def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
                 events.wait(i + 1)
         assert session.statistics().listener_failures == 3
         assert [type(event) for event in events.all] == [Made] * 3
+
+
+LEFT_OPEN = """
+import phasefront
+options = phasefront.session_options(target=phasefront.Display(width=48, height=36))
+session = phasefront.Session(options, phasefront.RunningMode.LIVE_STREAM, print)
+"""
+
+
+def test_a_live_stream_that_is_left_open_ends_with_python():
+    """Its thread calls Python as it ends, which aborts a process whose interpreter is gone."""
+    run = subprocess.run([sys.executable, "-P", "-c", LEFT_OPEN], capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stderr) == (0, "")
 
 
 def test_a_listener_may_call_its_session(options):
