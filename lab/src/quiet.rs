@@ -1,7 +1,6 @@
 //! Panics of other crates on broken files, as errors.
 
 use std::cell::Cell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Once;
 
 thread_local! {
@@ -21,15 +20,9 @@ pub(crate) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
         }));
     });
     let before = IS_QUIET.replace(true);
-    let done = catch_unwind(AssertUnwindSafe(work));
+    let done = phasefront::unstable::error::caught(work);
     IS_QUIET.set(before);
-    done.map_err(|payload| {
-        let said = (payload.downcast_ref::<&str>().map(|said| (*said).to_owned()))
-            .or_else(|| payload.downcast_ref::<String>().cloned());
-        // Dropping what was thrown may panic once more.
-        std::mem::forget(payload);
-        said.unwrap_or_else(|| "a panic without a message".into())
-    })
+    done
 }
 
 #[cfg(test)]

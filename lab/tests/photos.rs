@@ -157,7 +157,7 @@ fn each_kind_of_photo_gives_its_depth_and_becomes_a_hologram() {
         let call = ["hologram", "--photo", name, "--display", "display.toml", "-o", "h.png"];
         folder.succeeds(&call);
         assert_eq!(files::read_hologram(&folder.path("h.png")).unwrap().shape(), (64, 64));
-        folder.succeeds(&[&call[..], &["--near", "0.6", "--far", "2", "--fit", "cover"]].concat());
+        folder.succeeds(&[&call[..], &["--near", "0.52", "--far", "2", "--fit", "cover"]].concat());
     }
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 /// The rooms, from the ground up. `input` and `unstable` only hand on what the others have.
 const ROOMS: &[&str] = &[
     "error",
+    "caught",
     "file",
     "keys",
     "cancel",
