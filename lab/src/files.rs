@@ -601,24 +601,24 @@ impl DisplayFile {
         let same_lasers = theirs.colours() == ours.colours()
             && (theirs.wavelengths_m().iter().zip(ours.wavelengths_m())).all(|(a, b)| near(*a, *b));
         let same_offset = (theirs.offset_m() - ours.offset_m()).abs() < 1e-8;
-        let says: [(bool, &dyn Fn(&Display) -> String); 4] = [
-            (theirs.bits() == ours.bits() || !of_levels, &bits),
-            (same_lasers, &lasers),
-            (near(theirs.pitch_m(), ours.pitch_m()), &pitch),
-            (same_offset, &offset),
+        let differs = [
+            (of_levels && theirs.bits() != ours.bits(), bits(theirs), bits(ours)),
+            (!same_lasers, lasers(theirs), lasers(ours)),
+            (!near(theirs.pitch_m(), ours.pitch_m()), pitch(theirs), pitch(ours)),
+            (!same_offset, offset(theirs), offset(ours)),
         ];
-        let list = |of: &Display| {
-            let parts = says.iter().filter(|(same, _)| !same).map(|(_, say)| say(of));
-            parts.collect::<Vec<_>>().join(", ")
-        };
-        match says.iter().all(|(same, _)| *same) {
-            true => Ok(()),
-            false => Err(Error::Input(format!(
-                "the hologram is for {}, the display has {}; make it with this --display, or give the display and the --offset-mm that it was made for",
-                list(theirs),
-                list(ours)
-            ))),
+        let (theirs, ours): (Vec<_>, Vec<_>) = differs
+            .into_iter()
+            .filter_map(|(differs, theirs, ours)| differs.then_some((theirs, ours)))
+            .unzip();
+        if theirs.is_empty() {
+            return Ok(());
         }
+        Err(Error::Input(format!(
+            "the hologram is for {}, the display has {}; make it with this --display, or give the display and the --offset-mm that it was made for",
+            theirs.join(", "),
+            ours.join(", ")
+        )))
     }
 
     /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
