@@ -246,10 +246,8 @@ fn what_is_wrong_is_one_line() {
     }
 }
 
-#[test]
-fn a_hologram_is_for_the_display_that_it_was_made_for() {
-    let folder = Folder::new();
-    frame(&folder, (64, 48));
+/// Writes the files of a display and of displays that differ from it.
+fn write_displays(folder: &Folder) {
     for (name, text) in [
         ("own", ""),
         ("near", "pitch_um = 8.000001\nwavelengths_nm = [638.000001, 520, 450]\n"),
@@ -263,6 +261,13 @@ fn a_hologram_is_for_the_display_that_it_was_made_for() {
     }
     let levels: Vec<_> = (0..256).map(|level: u16| (255 - level).to_string()).collect();
     fs::write(folder.path("lut.txt"), levels.join(" ")).unwrap();
+}
+
+#[test]
+fn a_hologram_is_for_the_display_that_it_was_made_for() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    write_displays(&folder);
     let make = "hologram --rgb rgb.png --depth depth.png --method sweep --planes 4 --display own.toml";
     let call = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
     let succeeds = |line: &str| {
