@@ -311,142 +311,78 @@ fn a_description_that_is_not_a_holograms_is_kept() {
     );
 }
 
+/// Calls whose outputs cannot be, and a word of what they are told.
+const BAD_OUTPUTS: &[(&str, &str)] = &[
+    (
+        "hologram --rgb none.png --depth none.png -o missing/h.png",
+        "there is no folder missing",
+    ),
+    ("hologram --rgb none.png --depth none.png -o h.jpg", ".png"),
+    (
+        "hologram --rgb none.png --depth none.png -o h.png --complex missing/h.npy",
+        "there is no folder missing",
+    ),
+    (
+        "hologram --rgb none.png --depth none.png -o h.png --complex h.png",
+        ".npy",
+    ),
+    ("refocus none.png --z-mm 0 -o v.tif", ".webp"),
+    (
+        "refocus none.png --z-mm 0 -o missing/v.png",
+        "there is no folder missing",
+    ),
+    ("refocus none.png --stack 2 -o v.png", "a folder"),
+    ("refocus none.png --stack 2 -o full", "--overwrite"),
+    (
+        "refocus none.png --stack 2 -o missing/v.gif",
+        "there is no folder missing",
+    ),
+    ("view none.png -o v.htm", ".html"),
+    ("view none.png -o missing/v.html", "there is no folder missing"),
+    (
+        "judge --rgb none.png --depth none.png -o missing/v.html",
+        "there is no folder missing",
+    ),
+    ("scene --model none.obj -o full", "--overwrite"),
+    ("dataset --scenes 1 --display none.toml -o full", "manifest.json"),
+    ("seeds none -o full/mine.txt", "is a file"),
+    (
+        "bench --network none.onnx --plot missing/b.svg",
+        "there is no folder missing",
+    ),
+    ("occlusion --ldi none -o full/mine.txt", "is a file"),
+    ("evaluate none --method rgb --pictures full", "--overwrite"),
+    ("study layers --display none.toml -o full/mine.txt", "is a file"),
+    ("multiplex --rgb none.png --depth none.png -o full", "--overwrite"),
+    ("multiplex --rgb none.png --depth none.png --packed p.bmp", ".png"),
+    ("pack none.png -o missing/f.png", "there is no folder missing"),
+    ("pack none.png -o f.bmp", ".png"),
+    ("unpack none.png -o f.bmp", ".png"),
+    ("link pattern -o missing/f.png", "there is no folder missing"),
+    ("calibrate lut --patterns full --display none.toml", "--overwrite"),
+    ("calibrate lut --captures none -o full/mine.txt", "--overwrite"),
+    ("calibrate lut --captures none -o t.pfp --report full", "--overwrite"),
+    ("calibrate laser none -o l.jpg", ".png"),
+    ("calibrate pack --display none.toml -o full/mine.txt", "--overwrite"),
+    ("calibrate rehearse -o full", "--overwrite"),
+    (
+        "calibrate aberration none --z-mm 1 --colour red -o missing/a.toml",
+        "there is no folder missing",
+    ),
+    (
+        "compare none.png none.png --trace missing/t.json",
+        "there is no folder missing",
+    ),
+];
+
 /// What is wrong with an output is told before an input is looked at, so before anything is computed.
 #[test]
 fn outputs_are_checked_before_any_work() {
     let folder = Folder::new();
     fs::create_dir(folder.path("full")).unwrap();
     fs::write(folder.path("full/mine.txt"), "mine").unwrap();
-    let frame = ["hologram", "--rgb", "none.png", "--depth", "none.png", "-o"];
-    let calls: &[(&[&str], &str)] = &[
-        (&with(&frame, &["missing/h.png"]), "there is no folder missing"),
-        (&with(&frame, &["h.jpg"]), ".png"),
-        (
-            &with(&frame, &["h.png", "--complex", "missing/h.npy"]),
-            "there is no folder missing",
-        ),
-        (&with(&frame, &["h.png", "--complex", "h.png"]), ".npy"),
-        (&["refocus", "none.png", "--z-mm", "0", "-o", "v.tif"], ".webp"),
-        (
-            &["refocus", "none.png", "--z-mm", "0", "-o", "missing/v.png"],
-            "there is no folder missing",
-        ),
-        (&["refocus", "none.png", "--stack", "2", "-o", "v.png"], "a folder"),
-        (&["refocus", "none.png", "--stack", "2", "-o", "full"], "--overwrite"),
-        (
-            &["refocus", "none.png", "--stack", "2", "-o", "missing/v.gif"],
-            "there is no folder missing",
-        ),
-        (&["view", "none.png", "-o", "v.htm"], ".html"),
-        (
-            &["view", "none.png", "-o", "missing/v.html"],
-            "there is no folder missing",
-        ),
-        (
-            &[
-                "judge",
-                "--rgb",
-                "none.png",
-                "--depth",
-                "none.png",
-                "-o",
-                "missing/v.html",
-            ],
-            "there is no folder missing",
-        ),
-        (&["scene", "--model", "none.obj", "-o", "full"], "--overwrite"),
-        (
-            &["dataset", "--scenes", "1", "--display", "none.toml", "-o", "full"],
-            "manifest.json",
-        ),
-        (&["seeds", "none", "-o", "full/mine.txt"], "is a file"),
-        (
-            &["bench", "--network", "none.onnx", "--plot", "missing/b.svg"],
-            "there is no folder missing",
-        ),
-        (&["occlusion", "--ldi", "none", "-o", "full/mine.txt"], "is a file"),
-        (
-            &["evaluate", "none", "--method", "rgb", "--pictures", "full"],
-            "--overwrite",
-        ),
-        (
-            &["study", "layers", "--display", "none.toml", "-o", "full/mine.txt"],
-            "is a file",
-        ),
-        (
-            &["multiplex", "--rgb", "none.png", "--depth", "none.png", "-o", "full"],
-            "--overwrite",
-        ),
-        (
-            &[
-                "multiplex",
-                "--rgb",
-                "none.png",
-                "--depth",
-                "none.png",
-                "--packed",
-                "p.bmp",
-            ],
-            ".png",
-        ),
-        (
-            &["pack", "none.png", "-o", "missing/f.png"],
-            "there is no folder missing",
-        ),
-        (&["pack", "none.png", "-o", "f.bmp"], ".png"),
-        (&["unpack", "none.png", "-o", "f.bmp"], ".png"),
-        (
-            &["link", "pattern", "-o", "missing/f.png"],
-            "there is no folder missing",
-        ),
-        (
-            &["calibrate", "lut", "--patterns", "full", "--display", "none.toml"],
-            "--overwrite",
-        ),
-        (
-            &["calibrate", "lut", "--captures", "none", "-o", "full/mine.txt"],
-            "--overwrite",
-        ),
-        (
-            &[
-                "calibrate",
-                "lut",
-                "--captures",
-                "none",
-                "-o",
-                "t.pfp",
-                "--report",
-                "full",
-            ],
-            "--overwrite",
-        ),
-        (&["calibrate", "laser", "none", "-o", "l.jpg"], ".png"),
-        (
-            &["calibrate", "pack", "--display", "none.toml", "-o", "full/mine.txt"],
-            "--overwrite",
-        ),
-        (&["calibrate", "rehearse", "-o", "full"], "--overwrite"),
-        (
-            &[
-                "calibrate",
-                "aberration",
-                "none",
-                "--z-mm",
-                "1",
-                "--colour",
-                "red",
-                "-o",
-                "missing/a.toml",
-            ],
-            "there is no folder missing",
-        ),
-        (
-            &["compare", "none.png", "none.png", "--trace", "missing/t.json"],
-            "there is no folder missing",
-        ),
-    ];
-    for (call, word) in calls {
-        refuses(&folder, call, &[word]);
+    for (call, word) in BAD_OUTPUTS {
+        refuses(&folder, &call.split(' ').collect::<Vec<_>>(), &[word]);
     }
 }
 

@@ -227,7 +227,7 @@ fn photos_that_cannot_be_used_get_one_line() {
         ),
         (
             "marks.jpg",
-            jpeg(&[&[extended.clone()], &marks[..]].concat()),
+            jpeg(&[std::slice::from_ref(&extended), &marks[..]].concat()),
             "elements and attributes",
         ),
         ("heic.jpg", heic, "heif-convert"),

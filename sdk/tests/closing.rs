@@ -52,7 +52,7 @@ fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
         session
     };
     // What is made once is there.
-    (still(), live());
+    drop((still(), live()));
     let before = HELD.load(Ordering::Relaxed);
     let sessions = [still(), live()];
     let open = HELD.load(Ordering::Relaxed) - before;

@@ -136,7 +136,8 @@ fn calling_back() {
                     view.preview(0.0, 8, 8, &mut rgba),
                 ];
                 calling.set_quality(Quality::Fixed(0)).unwrap();
-                (calling.pause(), calling.resume());
+                calling.pause();
+                calling.resume();
                 assert_eq!(calling.statistics().submitted, 2);
                 telling.lock().unwrap().extend(refusals);
             });

@@ -421,6 +421,31 @@ fn a_replay_is_refused_where_a_frame_is() {
     assert_eq!((s.dropped.reset, s.failed, s.pending), (1, 0, 0));
 }
 
+/// How many frames up to `last` were made, superseded and, of the time 7, dropped in a pause.
+fn burst(events: &mpsc::Receiver<Event>, last: u64) -> (u64, u64, u64) {
+    let (mut done, mut superseded, mut paused) = (0, 0, 0);
+    loop {
+        match events.recv().unwrap() {
+            Event::Hologram(hologram) => {
+                done += 1;
+                if hologram.timestamp_ns() == last {
+                    break;
+                }
+            }
+            Event::Dropped {
+                reason: DropReason::Superseded,
+                ..
+            } => superseded += 1,
+            Event::Dropped {
+                timestamp_ns: 7,
+                reason: DropReason::Paused,
+            } => paused += 1,
+            other => panic!("{other:?}"),
+        }
+    }
+    (done, superseded, paused)
+}
+
 #[test]
 fn a_live_session_answers_or_drops_every_frame() {
     let scene = Scene::new(H, W, 10);
@@ -467,26 +492,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     for timestamp in 8..=last {
         session.submit(&frame(timestamp, &scene, &metres)).unwrap();
     }
-    let (mut done, mut superseded, mut paused) = (0, 0, 0);
-    loop {
-        match events.recv().unwrap() {
-            Event::Hologram(hologram) => {
-                done += 1;
-                if hologram.timestamp_ns() == last {
-                    break;
-                }
-            }
-            Event::Dropped {
-                reason: DropReason::Superseded,
-                ..
-            } => superseded += 1,
-            Event::Dropped {
-                timestamp_ns: 7,
-                reason: DropReason::Paused,
-            } => paused += 1,
-            other => panic!("{other:?}"),
-        }
-    }
+    let (done, superseded, paused) = burst(&events, last);
     assert_eq!((done + superseded, paused), (93, 1));
     session.reset();
     session.submit(&frame(1, &scene, &metres)).unwrap();
