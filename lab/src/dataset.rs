@@ -20,7 +20,7 @@ use crate::files;
 use crate::input;
 use crate::ldi::{Ldi, LdiLayer};
 use crate::npy;
-use crate::scene::Texture;
+use crate::scene::{Scene, Texture};
 use crate::{corrected, scene, sm_lbm};
 use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::NpzWriter;
@@ -78,6 +78,12 @@ pub enum Look {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         textures: Option<String>,
     },
+    /// Of every kind: [`scene::varied_scene`].
+    Varied {
+        /// As of [`Look::Photographs`].
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        textures: Option<String>,
+    },
 }
 
 impl Look {
@@ -87,11 +93,37 @@ impl Look {
 
     /// Like photographs, with these on surfaces.
     pub fn photographs(textures: &[Texture]) -> Self {
-        let fingerprint = || format!("{:016x}", scene::fingerprint(textures));
-        Self::Photographs {
-            textures: (!textures.is_empty()).then(fingerprint),
+        let textures = fingerprint(textures);
+        Self::Photographs { textures }
+    }
+
+    /// Of every kind, with these photographs on some surfaces.
+    pub fn varied(textures: &[Texture]) -> Self {
+        let textures = fingerprint(textures);
+        Self::Varied { textures }
+    }
+
+    /// Whether `textures` are the photographs that it names.
+    fn names(&self, textures: &[Texture]) -> bool {
+        match self {
+            Self::Objects => textures.is_empty(),
+            Self::Photographs { textures: named } | Self::Varied { textures: named } => *named == fingerprint(textures),
         }
     }
+
+    /// The scene of `seed` for a frame of `size` x `size` pixels.
+    fn scene(&self, seed: u64, size: usize, textures: &[Texture]) -> Scene {
+        match self {
+            Self::Objects => scene::random_scene(seed, size, size),
+            Self::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
+            Self::Varied { .. } => scene::varied_scene(seed, size, size, textures),
+        }
+    }
+}
+
+/// The [`scene::fingerprint`] of photographs in hexadecimal, if there are any.
+fn fingerprint(textures: &[Texture]) -> Option<String> {
+    (!textures.is_empty()).then(|| format!("{:016x}", scene::fingerprint(textures)))
 }
 
 /// Half-open ranges of pair indices.
@@ -219,8 +251,7 @@ pub fn make(
     (shard, shards): (usize, usize),
     made: &(dyn Fn() + Sync),
 ) -> Result<()> {
-    let plain = manifest.look == Look::Objects && textures.is_empty();
-    if !plain && manifest.look != Look::photographs(textures) {
+    if !manifest.look.names(textures) {
         return Err(Error::Input(
             "the photographs for surfaces are not those of the data set".into(),
         ));
@@ -258,12 +289,8 @@ pub fn make(
         let path = Manifest::pair_path(dir, index);
         if !is_whole(&path) {
             let (seed, size) = (manifest.scene_seed(index), manifest.size);
-            let scene = match manifest.look {
-                Look::Objects => scene::random_scene(seed, size, size),
-                Look::Photographs { .. } => scene::natural_scene(seed, size, size, textures),
-            };
-            let ldi =
-                scene::render_ldi_reference(&scene, manifest.size, manifest.size, manifest.ldi_layers)?.quantized();
+            let scene = manifest.look.scene(seed, size, textures);
+            let ldi = scene::render_ldi_reference(&scene, size, size, manifest.ldi_layers)?.quantized();
             let quiet = |_: usize, _: usize| {};
             let hologram = match &ground_truth {
                 GroundTruth::Plain => sm_lbm::hologram(&ldi, display, planes, &quiet)?,
@@ -427,6 +454,19 @@ mod tests {
     }
 
     #[test]
+    fn a_varied_set_says_so_and_holds_varied_scenes() {
+        let dir = tempfile::tempdir().unwrap();
+        let ours = manifest(Look::varied(&[]));
+        make(&ours, &[], dir.path(), (1, 4), &|| {}).unwrap();
+        assert_eq!(Manifest::read(dir.path()).unwrap(), ours);
+        let pair = read_pair(&ours, dir.path(), 1).unwrap();
+        let scene = scene::varied_scene(ours.scene_seed(1), 24, 24, &[]);
+        assert!(pair.ldi == scene::render_ldi_reference(&scene, 24, 24, 2).unwrap().quantized());
+        let refused = make(&manifest(Look::photographs(&[])), &[], dir.path(), (1, 4), &|| {}).unwrap_err();
+        assert!(refused.to_string().contains("other parameters"), "{refused}");
+    }
+
+    #[test]
     fn a_pair_that_is_not_whole_is_made_anew() {
         let dir = tempfile::tempdir().unwrap();
         let ours = manifest(Look::Objects);
@@ -468,7 +508,8 @@ mod tests {
             (Look::photographs(&one), other),
             (Look::photographs(&one), Vec::new()),
             (Look::photographs(&[]), one.clone()),
-            (Look::Objects, one),
+            (Look::Objects, one.clone()),
+            (Look::varied(&[]), one),
         ];
         for (look, textures) in looks {
             let refused = make(&manifest(look), &textures, dir.path(), (0, 1), &|| {});

@@ -1,7 +1,7 @@
 //! Scenes of textured triangle meshes, and their rendering to layered depth images.
 //!
 //! * [`Scene`], [`Mesh`] and [`Texture`] describe what is there.
-//! * [`random_scene`] and, like photographs, [`natural_scene`] make the scenes that data sets consist of.
+//! * [`random_scene`], [`natural_scene`] (like photographs) and [`varied_scene`] make the scenes of data sets.
 //! * [`read_model`] reads glTF, GLB and OBJ files.
 //! * [`render_ldi_reference`] renders on the CPU, exactly; [`DepthPeeler`] the same on a GPU.
 //!
@@ -14,6 +14,7 @@
 mod beside;
 pub mod dice;
 mod gltf_file;
+mod ground;
 mod model;
 mod natural;
 mod obj_file;
@@ -24,7 +25,10 @@ mod photographs;
 mod random;
 mod raster;
 pub mod shapes;
+mod surface;
 mod texture;
+mod thin;
+mod varied;
 
 use std::sync::Arc;
 
@@ -35,6 +39,7 @@ pub use photographs::{fingerprint, read_photographs};
 pub use random::random_scene;
 pub use raster::render_ldi_reference;
 pub use texture::Texture;
+pub use varied::varied_scene;
 
 use crate::error::{Error, Result};
 

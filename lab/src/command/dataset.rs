@@ -32,7 +32,7 @@ pub(crate) struct Dataset {
     /// What the scenes look like
     #[arg(long, value_enum, default_value_t = Like::Objects)]
     scenes_like: Like,
-    /// Pictures (.jpg, .png) for the surfaces of scenes like photographs; the manifest knows them again
+    /// Pictures (.jpg, .png) for surfaces, of scenes like photographs and of varied ones; the manifest knows them again
     #[arg(long, value_name = "DIR")]
     textures: Option<PathBuf>,
     /// Make every nth pair only, from the ith of 0..n
@@ -51,6 +51,8 @@ enum Like {
     Objects,
     /// Bright and dark scenes that fill the frame, with textures, steps of depth and thin things as photographs have
     Photographs,
+    /// Scenes of every kind: any brightness, textures from white noise to flat, few objects to hundreds of thin ones
+    Varied,
 }
 
 fn parse_shard(text: &str) -> std::result::Result<(usize, usize), String> {
@@ -75,7 +77,9 @@ impl Dataset {
         }
         let textures = match &self.textures {
             Some(_) if self.scenes_like == Like::Objects => {
-                return Err(Error::Input("--textures is for --scenes-like photographs".into()));
+                return Err(Error::Input(
+                    "--textures is for --scenes-like photographs and varied".into(),
+                ));
             }
             Some(folder) => scene::read_photographs(folder)?,
             None => Vec::new(),
@@ -83,6 +87,7 @@ impl Dataset {
         let look = match self.scenes_like {
             Like::Objects => Look::Objects,
             Like::Photographs => Look::photographs(&textures),
+            Like::Varied => Look::varied(&textures),
         };
         let manifest = Manifest::new(self.scenes, self.size, self.planes, self.ldi_layers, self.seed, display)?
             .looking(look)

@@ -7,15 +7,15 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::dice::Dice;
-use super::parts::{DEPTH_PER_PX, MARGIN, holes, pattern, settle, shape, stretch, turned};
+use super::ground::Ground;
+use super::parts::{DEPTH_PER_PX, holes, pattern, settle, shape, stretch, turned};
 use super::pattern::Pattern;
+use super::photographs::piece;
 use super::shapes::{Light, Place, Shape, turn};
-use super::{Mesh, Scene, Texture};
+use super::{Mesh, Scene, Texture, thin};
 
 /// Most texels of a texture along a side. Larger surfaces show larger texels.
 const MAX_TEXELS: f64 = 432.0;
-/// Pieces of the background along a side.
-const PIECES: usize = 32;
 /// What red, green and blue gain where a colour is warmer, and where it is more purple.
 const WARMER: [f64; 3] = [0.5, 0.0, -0.5];
 const PURPLER: [f64; 3] = [0.25, -0.5, 0.25];
@@ -24,7 +24,7 @@ const PURPLER: [f64; 3] = [0.25, -0.5, 0.25];
 /// where there are any. The same arguments give the same scene on every machine.
 pub fn natural_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
     let mut dice = Dice::new(seed);
-    let ground = Ground::new(&mut dice);
+    let ground = Ground::natural(&mut dice);
     let mut maker = Maker::new(dice, height as f64, width as f64, ground, photographs);
     let mut meshes: Vec<Mesh> = (0..maker.dice.log_range(40.0, 300.0) as usize)
         .map(|_| maker.object())
@@ -34,77 +34,6 @@ pub fn natural_scene(seed: u64, height: usize, width: usize, photographs: &[Text
     meshes.extend((0..maker.dice.pick(&[0, 0, 0, 1, 2])).map(|_| maker.branches()));
     meshes.push(maker.background());
     Scene { meshes }
-}
-
-/// How deep the background lies, on a grid over the frame.
-struct Ground(Vec<f64>);
-
-impl Ground {
-    fn new(dice: &mut Dice) -> Self {
-        let depth_at = Self::depths(dice);
-        let along = |i: usize| i as f64 / PIECES as f64;
-        let depths = (0..=PIECES).flat_map(|j| (0..=PIECES).map(move |i| (i, j)));
-        Self(
-            depths
-                .map(|(i, j)| depth_at(along(i), along(j)).clamp(0.02, 1.0 - MARGIN))
-                .collect(),
-        )
-    }
-
-    /// The depth at (u, v), u from the left and v from below, both in [0, 1].
-    fn depths(dice: &mut Dice) -> Box<dyn Fn(f64, f64) -> f64> {
-        // A plane by its depth at the frame's middle and what it gains toward the edge in a direction.
-        let plane = |dice: &mut Dice, middle: [f64; 2], slope: [f64; 2], angle: f64| {
-            let (middle, slope) = (dice.range(middle[0], middle[1]), dice.range(slope[0], slope[1]));
-            let (sin, cos) = libm::sincos(angle);
-            move |u: f64, v: f64| middle + slope * (cos * (2.0 * u - 1.0) + sin * (2.0 * v - 1.0))
-        };
-        let any = TAU * dice.unit();
-        match dice.weighted(&[0.3, 0.3, 0.2, 0.2]) {
-            0 => Box::new(plane(dice, [0.5, 1.0], [0.0, 0.5], any)),
-            1 => {
-                // A floor that rises to a wall, the camera a little aslant.
-                let (sin, cos) = libm::sincos(dice.range(-0.35, 0.35));
-                let (near, far) = (dice.range(0.0, 0.4), dice.range(0.6, 1.05));
-                let (horizon, bend) = (dice.range(0.25, 0.8), dice.log_range(0.6, 1.8));
-                let wall = plane(dice, [0.0, 0.0], [0.0, 0.1], any);
-                Box::new(move |u, v| {
-                    let up = 0.5 + cos * (v - 0.5) + sin * (u - 0.5);
-                    let t = (up / horizon).clamp(0.0, 1.0);
-                    near + (far + wall(u, v) - near) * libm::pow(t, bend)
-                })
-            }
-            2 => {
-                // Walls that meet in a corner, or the corner of a block.
-                let third = TAU / 3.0;
-                let walls = [0.0, 1.0, 2.0].map(|k| {
-                    let turned = any + third * (k + dice.range(-0.25, 0.25));
-                    plane(dice, [0.55, 1.0], [0.1, 0.7], turned)
-                });
-                let block = dice.chance(0.3);
-                Box::new(move |u, v| {
-                    let [a, b, c] = [&walls[0], &walls[1], &walls[2]].map(|wall| wall(u, v));
-                    if block { a.max(b).max(c) - 0.25 } else { a.min(b).min(c) }
-                })
-            }
-            _ => {
-                let cells = dice.integer(1, 5);
-                let rough = dice.range(0.3, 0.7) as f32;
-                let side = PIECES + 1;
-                let relief = Pattern::noise((side, side), (cells, cells), 4, rough, dice);
-                let (far, height) = (dice.range(0.7, 1.0), dice.range(0.1, 0.8));
-                Box::new(move |u, v| {
-                    let [i, j] = [u, v].map(|t| (t * PIECES as f64 + 0.5) as usize);
-                    far - height * f64::from(relief.at(i, j))
-                })
-            }
-        }
-    }
-
-    fn at(&self, u: f64, v: f64) -> f64 {
-        let [i, j] = [u, v].map(|t| (t.clamp(0.0, 1.0) * PIECES as f64 + 0.5) as usize);
-        self.0[j * (PIECES + 1) + i]
-    }
 }
 
 /// One scene in the making: its frame, and what its surfaces have in common.
@@ -152,11 +81,7 @@ impl<'a> Maker<'a> {
     fn background(&mut self) -> Mesh {
         let size = [self.width, self.height].map(|v| v.clamp(1.0, MAX_TEXELS) as usize);
         let texture = self.texture((size[0], size[1]));
-        let (ground, w, h) = (&self.ground, 1.02 * self.width, 1.02 * self.height);
-        let sheet = Shape::grid(PIECES, PIECES, |u, v| {
-            let z = (0.5 - ground.at(u, v)) / DEPTH_PER_PX;
-            [w * (u - 0.5), h * (v - 0.5), z]
-        });
+        let sheet = self.ground.sheet(self.width, self.height);
         let place = self.place([1.0; 3], turn([0.0, 0.0, 1.0], 0.0), DEPTH_PER_PX, [0.5; 2]);
         sheet.place(&place, Arc::new(texture))
     }
@@ -223,11 +148,12 @@ impl<'a> Maker<'a> {
         let at = self.somewhere();
         let from = self.before_the_ground(at);
         let drop = self.dice.range(-0.5, 0.5) * self.dice.unit();
-        let thread = Shape::grid(24, 1, |u, v| {
-            let hang = sag * (4.0 * u * (u - 1.0) + 0.5);
-            [length * (u - 0.5), hang + half * (2.0 * v - 1.0), drop * (u - 0.5)]
-        });
-        self.thin(thread, turn([0.0, 0.0, 1.0], angle), at, from)
+        self.thin(
+            thin::wire(length, half, sag, drop),
+            turn([0.0, 0.0, 1.0], angle),
+            at,
+            from,
+        )
     }
 
     /// Twigs, grass, cracks: straight pieces that fork and grow thinner.
@@ -235,26 +161,7 @@ impl<'a> Maker<'a> {
         let side = self.width.min(self.height);
         let length = side * self.dice.log_range(0.08, 0.3);
         let half = self.dice.log_range(0.8, 4.0);
-        let mut tips = vec![([0.0, 0.0, 0.0], TAU * self.dice.unit(), length, half)];
-        let mut shape = Shape::default();
-        let mut pieces = self.dice.integer(6, 60);
-        while let Some((from, angle, length, half)) = tips.pop() {
-            let (sin, cos) = libm::sincos(angle);
-            let lean = self.dice.range(-0.03, 0.03);
-            let to = [from[0] - sin * length, from[1] + cos * length, from[2] + lean];
-            let middle = std::array::from_fn(|i| 0.5 * (from[i] + to[i]));
-            let along = turn([0.0, 0.0, 1.0], angle);
-            shape.append(&Shape::sheet().moved([half, 0.5 * length, 1.0], along, middle));
-            for _ in 0..self.dice.integer(1, 3) {
-                if pieces > 0 {
-                    pieces -= 1;
-                    let bent = angle + self.dice.range(-0.8, 0.8);
-                    let shorter = length * self.dice.range(0.6, 0.95);
-                    // Breadth first, so that no single twig takes all pieces.
-                    tips.insert(0, (to, bent, shorter, (half * 0.8).max(0.5)));
-                }
-            }
-        }
+        let shape = thin::branches(&mut self.dice, length, half);
         let at = self.somewhere();
         let depth = self.before_the_ground(at);
         self.thin(shape, turn([0.0, 0.0, 1.0], 0.0), at, depth)
@@ -360,29 +267,6 @@ impl<'a> Maker<'a> {
 fn texels(radius: f64) -> (usize, usize) {
     let size = 2 * radius.round().clamp(4.0, MAX_TEXELS / 4.0) as usize;
     (size, size)
-}
-
-/// A piece of `photograph` as a texture of `size`, each texel the mean of a square of it: somewhere in it, as coarse as
-/// may be.
-fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture {
-    let (width, height) = (photograph.width(), photograph.height());
-    let largest = (width / size.0).min(height / size.1).max(1);
-    let square = dice.integer(1, largest);
-    let corner = |dice: &mut Dice, whole: usize, part: usize| dice.integer(0, whole.saturating_sub(part * square));
-    let (left, top) = (corner(dice, width, size.0), corner(dice, height, size.1));
-    let mean = |x: usize, y: usize| {
-        let mut sum = [0u32; 3];
-        for (j, i) in (0..square).flat_map(|j| (0..square).map(move |i| (j, i))) {
-            let row = (top + y * square + j) % height;
-            let texel = photograph.texels()[row * width + (left + x * square + i) % width];
-            (0..3).for_each(|c| sum[c] += u32::from(texel[c]));
-        }
-        let count = (square * square) as u32;
-        let [r, g, b] = sum.map(|sum| ((sum + count / 2) / count) as u8);
-        [r, g, b, 255]
-    };
-    let texels = (0..size.0 * size.1).map(|index| mean(index % size.0, index / size.0));
-    Texture::sized(size.0, size.1, texels.collect())
 }
 
 #[cfg(test)]

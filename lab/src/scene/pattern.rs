@@ -1,5 +1,5 @@
 //! Procedural pictures for surfaces: a [`Pattern`] is one value a texel, which a ramp of colours makes a [`Texture`].
-//! All of them join their own repeats without a seam, but [`Pattern::strokes`].
+//! Most of them join their own repeats without a seam; those that do not say so.
 
 use super::Texture;
 use super::dice::Dice;
@@ -81,6 +81,36 @@ impl Pattern {
         })
     }
 
+    /// Stripes of any `period`, in texels, whose waves run at `angle` (radians) to the rows; `softness` as of
+    /// [`stripes`](Self::stripes). They join their repeats with a seam.
+    pub fn slanted_stripes(size: (usize, usize), period: f64, angle: f64, softness: f32) -> Self {
+        let (sin, cos) = libm::sincos(angle);
+        Self::from_fn(size, |x, y| {
+            wave(((cos * x as f64 + sin * y as f64) / period) as f32, softness)
+        })
+    }
+
+    /// A checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. It joins its repeats with a
+    /// seam.
+    pub fn slanted_checks(size: (usize, usize), side: f64, angle: f64) -> Self {
+        let (sin, cos) = libm::sincos(angle);
+        Self::from_fn(size, |x, y| {
+            let (x, y) = (x as f64 + 0.5, y as f64 + 0.5);
+            let field = ((cos * x + sin * y) / side).floor() + ((cos * y - sin * x) / side).floor();
+            (field.rem_euclid(2.0)) as f32
+        })
+    }
+
+    /// Single points of value 1 on 0, `count` of them anywhere, each `radius` texels in radius.
+    pub fn points(size: (usize, usize), count: usize, radius: f32, dice: &mut Dice) -> Self {
+        let mut pattern = Self::from_fn(size, |_, _| 0.0);
+        for _ in 0..count {
+            let at = [size.0, size.1].map(|n| dice.range(0.0, n as f64) as f32);
+            pattern.stroke(at, at, radius);
+        }
+        pattern
+    }
+
     /// A wall: `courses` rows of `bricks`, every second row set off by half a brick, each brick of its own tone in
     /// [0.35, 1], joints of `joint` of a course at value 0.
     pub fn bricks(size: (usize, usize), bricks: usize, courses: usize, joint: f32, dice: &mut Dice) -> Self {
@@ -154,7 +184,7 @@ impl Pattern {
     }
 
     /// Lines of writing in no language: glyphs of a few straight strokes, value 1 on 0. `lines` rows of them, strokes
-    /// `thickness` of a line wide.
+    /// `thickness` of a line wide. They join their repeats with a seam.
     pub fn strokes(size: (usize, usize), lines: usize, thickness: f32, dice: &mut Dice) -> Self {
         let mut pattern = Self::from_fn(size, |_, _| 0.0);
         let line = size.1 as f32 / lines as f32;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::Texture;
+use super::dice::Dice;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::fingerprint::Fingerprint;
@@ -31,6 +32,29 @@ pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
         Texture::new(width, height, texels.collect())
     };
     paths.iter().map(read).collect()
+}
+
+/// A piece of `photograph` as a texture of `size`, each texel the mean of a square of it: somewhere in it, as coarse as
+/// may be.
+pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture {
+    let (width, height) = (photograph.width(), photograph.height());
+    let largest = (width / size.0).min(height / size.1).max(1);
+    let square = dice.integer(1, largest);
+    let corner = |dice: &mut Dice, whole: usize, part: usize| dice.integer(0, whole.saturating_sub(part * square));
+    let (left, top) = (corner(dice, width, size.0), corner(dice, height, size.1));
+    let mean = |x: usize, y: usize| {
+        let mut sum = [0u32; 3];
+        for (j, i) in (0..square).flat_map(|j| (0..square).map(move |i| (j, i))) {
+            let row = (top + y * square + j) % height;
+            let texel = photograph.texels()[row * width + (left + x * square + i) % width];
+            (0..3).for_each(|c| sum[c] += u32::from(texel[c]));
+        }
+        let count = (square * square) as u32;
+        let [r, g, b] = sum.map(|sum| ((sum + count / 2) / count) as u8);
+        [r, g, b, 255]
+    };
+    let texels = (0..size.0 * size.1).map(|index| mean(index % size.0, index / size.0));
+    Texture::sized(size.0, size.1, texels.collect())
 }
 
 /// FNV-1a over sizes and texels, by which a data set knows its photographs again.
