@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from phasefront_training.networks import Architecture, Chain
-from phasefront_training.optimiser import MUON_RATE, MuonAndAdam
+from phasefront_training.optimiser import MOMENTUM, MUON_RATE, Muon, MuonAndAdam
 
 
 @pytest.mark.parametrize("memory", [torch.contiguous_format, torch.channels_last])
@@ -42,3 +42,21 @@ def test_the_state_of_another_optimiser_is_refused():
     other = torch.optim.Adam(network.parameters()).state_dict()
     with pytest.raises(ValueError, match="--init"):
         MuonAndAdam(network, 1e-2).load_state_dict(other)
+
+
+def test_the_matrices_of_a_chain_taken_together_step_as_torch_takes_each():
+    torch.manual_seed(0)
+    ours = [torch.nn.Parameter(torch.randn(8, 8, 3, 3)) for _ in range(3)]
+    theirs = [torch.nn.Parameter(p.detach().reshape(8, 72).clone()) for p in ours]
+    muon = Muon(ours)
+    torchs = torch.optim.Muon(theirs, lr=1e-2, weight_decay=0.0, momentum=MOMENTUM, adjust_lr_fn="match_rms_adamw")
+    before = ours[0].detach().clone()
+    for _ in range(3):
+        for mine, its in zip(ours, theirs):
+            mine.grad = torch.randn(8, 8, 3, 3)
+            its.grad = mine.grad.reshape(8, 72)
+        muon.step(1e-2)
+        torchs.step()
+    for mine, its in zip(ours, theirs):
+        assert torch.allclose(mine.reshape(8, 72), its, atol=5e-4)
+    assert (ours[0] - before).abs().mean() > 2e-3
