@@ -12,7 +12,7 @@ from statistics import fmean
 
 import torch
 
-from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, prepare, quantize, recipe, rounding, seeds, shards, statistics
+from . import card, checkpoint, data, evaluate, evaluate_encoding, export, export_int8, grow, loop, networks, plot, pool, prepare, quantize, recipe, rounding, seeds, shards, statistics
 from .checkpoint import Checkpoint
 from .encode import DeepDoublePhase
 from .stage1 import Stage1
@@ -45,6 +45,16 @@ def parser():
     p.add_argument("--shards", type=int, help="tasks (default: four for each that runs at a time)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --scenes 4000 --size 384 --planes 1000")
 
+    p = add("pool", run_pool, "Make a pool of scenes for --pool, shard by shard, also while networks train on it; called again it goes on. What follows -- goes to `phasefront dataset`.")
+    p.add_argument("-o", "--output", required=True, help="folder of the pool")
+    p.add_argument("--scenes", type=int, required=True, help="in all")
+    p.add_argument("--shares", nargs="+", default=[f"{kind}={share:g}" for kind, share in pool.SHARES.items()], metavar="KIND=NUMBER", help="how many scenes are of each kind (default %(default)s)")
+    p.add_argument("--shard-scenes", type=int, default=pool.SHARD_SCENES, help="scenes a shard, of one kind (default %(default)s)")
+    p.add_argument("--gib", type=float, help="make no further shard once the pool takes so much of the disk")
+    p.add_argument("--textures", metavar="DIR", help="pictures for surfaces of photographs and varied scenes")
+    p.add_argument("--phasefront", default="phasefront", metavar="FILE", help="the lab's command (default: phasefront on the PATH)")
+    p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --size 256 --planes 200 --threads 1")
+
     p = add("seeds", run_seeds, "Make the seeds of a data set by the lab's command; what follows -- goes to `phasefront seeds`.")
     p.add_argument("--data", required=True, help="folder of the data set")
     p.add_argument("-o", "--output", required=True, help="folder of the seeds")
@@ -67,6 +77,7 @@ def parser():
     p.add_argument("--input", default="rgbd", help="rgbd, rgbdxy (with the place in the frame), seeded, or ldiN, N layers of a layered depth image (default rgbd)")
     p.add_argument("--head", choices=networks.HEADS, default=networks.HEADS[0], help="what the last layer means (default %(default)s)")
     p.add_argument("--init", metavar="FILE", help="begin with the weights of an .onnx or a checkpoint; fewer layers are grown to --layers")
+    p.add_argument("--average", type=int, default=0, metavar="STEPS", help="keep and judge the running mean of the weights over about so many steps (default 0: the weights as they are)")
     p.add_argument("--dimmed", type=float, default=0.0, help="share of samples whose colours are made brighter or darker, each by a factor, and their holograms with them (default 0)")
 
     p = add("stage2", run_stage2, "Train a hologram network and a pre-filter through the encoding (deep double phase method).")
@@ -141,7 +152,9 @@ def evaluation_flags(p):
 
 
 def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e-3, crop=192):
-    p.add_argument("--data", required=True, nargs="+", help="folder of the data set, or of several that are trained on together")
+    scenes = p.add_mutually_exclusive_group(required=True)
+    scenes.add_argument("--data", nargs="+", help="folder of the data set, or of several that are trained on together")
+    scenes.add_argument("--pool", metavar="DIR", help="a pool of scenes instead, which may grow meanwhile")
     p.add_argument("--seeds", nargs="+", help="folder of the seeds of each: for seeded networks, and for refined depth among the degraded")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
@@ -152,7 +165,7 @@ def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e
     p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
     p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
     p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
-    p.add_argument("--scenes", type=int, help="only the first so many training scenes of each data set")
+    p.add_argument("--scenes", type=int, help="only the first so many training scenes of each data set or shard")
     p.add_argument("--seed", type=int, default=0)
     p.add_argument("--f32", action="store_true", help="float32 throughout; bf16 is 3 to 4 times faster where the CPU has it")
     p.add_argument("--loaders", type=int, help="threads that draw samples ahead (default 0 on a CPU, 8 on a GPU)")
@@ -169,6 +182,13 @@ def run_data(args):
 
 def run_shards(args):
     made = shards.make(args.output, passed_on(args), args.phasefront, args.address, args.shards, args.cpus)
+    print(f"{args.output}: {made} shards", file=sys.stderr)
+
+
+def run_pool(args):
+    limit = None if args.gib is None else int(args.gib * 2**30)
+    shares = pool.parse_shares(args.shares)
+    made = pool.make(args.output, args.scenes, shares, args.shard_scenes, limit, args.textures, passed_on(args), args.phasefront)
     print(f"{args.output}: {made} shards", file=sys.stderr)
 
 
@@ -277,6 +297,11 @@ def sampling(args):
 
 def load(args, architecture):
     """The training scenes, and a few for the curve's validation."""
+    if args.pool:
+        if args.seeds or architecture.input == "seeded":
+            raise ValueError("a pool has no seeds; seeded networks train on --data with --seeds")
+        train = pool.Pool(args.pool, architecture.ldi_layers, args.scenes)
+        return train, pool.validation(args.pool, architecture.ldi_layers, VALIDATION_SCENES)
     folders, inputs = args.data, {architecture.input}
     of_seeds = args.seeds or [None] * len(folders)
     if len(of_seeds) != len(folders):
@@ -315,7 +340,7 @@ def go(task, args, workers, resume, folder=None):
     options = {k: v for k, v in vars(args).items() if k not in ("run", "command", "resume", "output")}
     loaders = args.loaders if args.loaders is not None else (8 if workers.device.type == "cuda" else 0)
     budget = loop.Budget(args.steps, args.minutes)
-    last = loop.fit(task, budget, args.rate, folder, workers, resume, options, loaders=loaders)
+    last = loop.fit(task, budget, args.rate, folder, workers, resume, options, loaders=loaders, average=getattr(args, "average", 0))
     if workers.rank == 0:
         print(f"{last.step} steps in {last.elapsed_s / 60:.1f} minutes: {Path(folder) / 'checkpoint.pt'}", file=sys.stderr)
 

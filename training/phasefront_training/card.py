@@ -12,7 +12,7 @@ from .networks import multiplies_per_pixel
 from .optics import Display
 
 USUAL = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront dataset`
-SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "rate", "seed", "scenes", "f32")
+SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "average", "rate", "seed", "scenes", "f32")
 
 
 def sets(last):
@@ -21,7 +21,9 @@ def sets(last):
 
 
 def names(name, last):
-    """The folder name of each data set: DATA, or DATA1 and DATA2."""
+    """The folder name of each data set: DATA, or DATA1 and DATA2; of a pool POOL."""
+    if last.extra["data"].get("pool"):
+        return ["POOL"]
     count = len(sets(last))
     return [name] if count == 1 else [f"{name}{k + 1}" for k in range(count)]
 
@@ -29,7 +31,7 @@ def names(name, last):
 def command(last, init):
     """The command that reproduces the checkpoint `last`."""
     architecture, _ = last.networks["hologram"]
-    parts = ["python", "-m", "phasefront_training", last.kind, "--data", *names("DATA", last), "-o", "OUT"]
+    parts = ["python", "-m", "phasefront_training", last.kind, "--pool" if last.extra["data"].get("pool") else "--data", *names("DATA", last), "-o", "OUT"]
     if last.kind == "stage1":
         parts += ["--layers", architecture.layers, "--filters", architecture.filters, "--input", architecture.input, "--head", architecture.head]
         parts += ["--halved"] if architecture.halved else []
@@ -51,8 +53,8 @@ def command(last, init):
 
 
 def like(known):
-    """Says that scenes are like photographs, if they are."""
-    return " like photographs" if known.get("like") == "photographs" else ""
+    """Says of which kind scenes are, unless they are of objects."""
+    return {"photographs": " like photographs", "varied": " of every kind"}.get(known.get("like"), "")
 
 
 def counted(count, noun):
@@ -105,18 +107,28 @@ def describe(name, last, figures):
         else:
             lines.append(evaluate.table(methods))
         lines.append("")
-    lines += ["## Reproduce", ""]
-    seeded = any(a.input == "seeded" for a, _ in last.networks.values())
+    lines += ["## Reproduce", "", *scenes_again(last), f"    {command(last, last.options.get('init'))}", ""]
+    return "\n".join(lines)
+
+
+def scenes_again(last):
+    """Lines with the commands that make the scenes that `last` was trained on."""
+    data = last.extra["data"]
+    if data.get("pool"):
+        first = sets(last)[0]
+        shares = " ".join(f"{each['like']}={each['shards']}" for each in sets(last))
+        flags = f"--scenes {data['scenes']} --shares {shares} -- --size {first['size']} --planes {first['planes']}"
+        return [f"    python -m phasefront_training pool -o POOL {flags}"]
+    lines, seeded = [], any(a.input == "seeded" for a, _ in last.networks.values())
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
-        flags += " --scenes-like photographs" if like(each) else ""
+        flags += f" --scenes-like {each['like']}" if like(each) else ""
         flags += "" if replace(display_of(each, last), corrected=False) == USUAL else " --display …"
         lines.append(f"    python -m phasefront_training data -o {folder} -- {flags}")
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"
             lines.append(f"    python -m phasefront_training seeds --data {folder} -o {seeds} -- {refined}")
-    lines += [f"    {command(last, last.options.get('init'))}", ""]
-    return "\n".join(lines)
+    return lines
 
 
 def write(path, last, figure_files):

@@ -21,7 +21,10 @@ class CheckpointError(Exception):
 
 @dataclass
 class Checkpoint:
-    """kind: what was trained (stage1, stage2, qat). networks: {name: (architecture, weights)}."""
+    """kind: what was trained (stage1, stage2, qat). networks: {name: (architecture, weights)}.
+
+    Where weights are averaged, those are the means, and `average` is what the training itself goes on from.
+    """
 
     kind: str
     networks: dict
@@ -29,6 +32,7 @@ class Checkpoint:
     step: int = 0
     elapsed_s: float = 0.0
     optimiser: dict | None = None
+    average: dict | None = None
     options: dict = field(default_factory=dict)
     extra: dict = field(default_factory=dict)
 
@@ -41,6 +45,7 @@ class Checkpoint:
             "step": self.step,
             "elapsed_s": self.elapsed_s,
             "optimiser": self.optimiser,
+            "average": self.average,
             "options": self.options,
             "extra": self.extra,
         }

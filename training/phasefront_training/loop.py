@@ -13,12 +13,14 @@ import sys
 import time
 from collections import deque
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
 import torch
 from torch import distributed
 
+from .average import Average
 from .checkpoint import Checkpoint
 from .files import replacing
 from .optimiser import MuonAndAdam
@@ -47,6 +49,9 @@ class Task:
     def sample(self, step):
         """The batch of a step, on the CPU or the device; called from a thread where a GPU trains."""
         raise NotImplementedError
+
+    def before(self, step):
+        """What is to be done before a step's batch is drawn."""
 
     def revive(self, step, progress):
         """Gives units of the module that never fire fresh weights, if it is time to; returns how many there were."""
@@ -154,19 +159,23 @@ def to_device(batch, device):
     return type(batch)(**{k: v.to(device, non_blocking=True) for k, v in batch.__dict__.items()})
 
 
-def fit(task, budget, learning_rate, output, workers, resume=None, options=None, stop_at=None, loaders=0):
+def fit(task, budget, learning_rate, output, workers, resume=None, options=None, stop_at=None, loaders=0, average=0):
     """Trains until the budget is spent or a signal asks to stop; returns the last checkpoint.
 
     output: folder for `checkpoint.pt` and `curve.jsonl`. resume: a Checkpoint to go on from. stop_at: stop (and save)
-    after this step though the budget is not spent. loaders: threads that draw batches ahead.
+    after this step though the budget is not spent. loaders: threads that draw batches ahead. average: keep and judge the
+    mean of the weights over about so many steps; 0: the weights as they are.
     """
     output = Path(output)
     module = task.module()
     optimiser = MuonAndAdam(module, learning_rate)
     step, before = 0, 0.0
+    mean = Average(task.networks, average) if average else None
     if resume is not None:
         optimiser.load_state_dict(resume.optimiser)
         step, before = resume.step, resume.elapsed_s
+        if resume.average:
+            (mean or Average(task.networks, 1)).load_state_dict(resume.average)
     trained = module
     if workers.count > 1:
         ids = [workers.device.index] if workers.device.type == "cuda" else None
@@ -177,14 +186,21 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
     def elapsed():
         return before + time.monotonic() - begin
 
+    def in_place():
+        return mean.in_place() if mean else nullcontext()
+
     def save():
+        trained = _on_cpu(mean.state_dict()) if mean else None
+        with in_place():
+            networks = {n: (net.architecture, _on_cpu(net.state_dict())) for n, net in task.networks.items()}
         checkpoint = Checkpoint(
             kind=task.kind,
-            networks={n: (net.architecture, _on_cpu(net.state_dict())) for n, net in task.networks.items()},
+            networks=networks,
             display=task.display,
             step=step,
             elapsed_s=elapsed(),
             optimiser=_on_cpu(optimiser.state_dict()),
+            average=trained,
             options=options or {},
             extra=task.extra(),
         )
@@ -206,6 +222,7 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                     break
                 now = rate(learning_rate, step, progress)
                 optimiser.set_rate(now)
+                task.before(step)
                 batch = to_device(batches.take(), workers.device)
                 if begun_again := task.revive(step, progress):
                     workers.share(module)
@@ -221,6 +238,8 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                     )
                 optimiser.step()
                 step += 1
+                if mean:
+                    mean.add()
                 for name, value in (("loss", loss), *terms.items()):
                     sums[name] = sums.get(name, 0) + value.detach()
                 summed += 1
@@ -234,7 +253,8 @@ def fit(task, budget, learning_rate, output, workers, resume=None, options=None,
                         sums, summed, revived = {}, 0, 0
                         if int(VALIDATIONS * progress) > last_validation:
                             last_validation = int(VALIDATIONS * progress)
-                            line |= task.validate()
+                            with in_place():
+                                line |= task.validate()
                         curve.add(line)
                     if time.monotonic() - saved > CHECKPOINT_S and _finite(module):
                         checkpoint, saved = save(), time.monotonic()

@@ -5,6 +5,8 @@ machine allows, or a few of them at random in each step, which has the same mean
 (revive.py) every hundred steps of the first part.
 """
 
+import sys
+
 import numpy as np
 import torch
 
@@ -13,6 +15,7 @@ from .evaluate import evaluate, torch_predictor
 from .loop import Task
 from .losses import field_terms, fill_invalid, focal_stack_terms
 from .networks import head_field
+from .pool import Pool
 from .revive import revive
 
 FOCAL_WEIGHT = 2.0
@@ -45,13 +48,20 @@ class Stage1(Task):
         self.degraded = degraded
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
-        self.facts = scenes.facts
+        self.scenes, self.looked = scenes, 0
         cut, kind = margin(network.architecture), network.architecture.input
         self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind, dimmed)
         self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind, dimmed)
 
     def module(self):
         return self.network
+
+    def before(self, step):
+        """Looks for new scenes of a pool when as many samples have been drawn as there are scenes."""
+        if isinstance(self.scenes, Pool) and (step - self.looked) * self.sampler.batch >= len(self.scenes):
+            self.looked = step
+            if more := self.scenes.look():
+                print(f"{more} scenes more, {len(self.scenes)} in all", file=sys.stderr, flush=True)
 
     def sample(self, step):
         return self.sampler.draw(step)
@@ -79,7 +89,7 @@ class Stage1(Task):
         return sum(weights.get(name, 1.0) * value for name, value in terms.items()), terms
 
     def extra(self):
-        return {"data": self.facts}
+        return {"data": self.scenes.facts}
 
     def validate(self):
         predict = torch_predictor(self.network, self.bf16)

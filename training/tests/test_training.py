@@ -153,3 +153,19 @@ def test_layered_input_trains(data_folder, tmp_path):
     call = ["stage1", "--data", str(data_folder), "-o", str(out), "--input", "ldi3", "--layers", "4", "--filters", "8", "--crop", "48", "--steps", "2"]
     assert main(call) == 0
     assert Checkpoint.load(out / "checkpoint.pt").network().architecture.input_channels == 12
+
+
+def test_averaged_weights_are_kept_and_the_training_itself_is_not_changed(data_folder, tmp_path):
+    budget = Budget(steps=8)
+    plain = fit(task(data_folder), budget, 2e-3, tmp_path / "plain", HERE)
+    whole = fit(task(data_folder), budget, 2e-3, tmp_path / "whole", HERE, average=4)
+    fit(task(data_folder), budget, 2e-3, tmp_path / "parts", HERE, stop_at=5, average=4)
+    half = Checkpoint.load(tmp_path / "parts" / "checkpoint.pt")
+    second = task(data_folder)
+    second.network.load_state_dict(half.network().state_dict())
+    resumed = fit(second, budget, 2e-3, tmp_path / "parts", HERE, resume=half, average=4)
+    own = whole.average["trained"]["hologram"]
+    for name, value in plain.network().state_dict().items():
+        assert torch.equal(own[name], value) and torch.equal(resumed.average["trained"]["hologram"][name], value)
+        assert torch.equal(whole.network().state_dict()[name], resumed.network().state_dict()[name])
+    assert any(not torch.equal(a, b) for a, b in zip(whole.network().parameters(), plain.network().parameters()))

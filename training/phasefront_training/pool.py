@@ -1,0 +1,168 @@
+"""A pool of scenes that grows while networks are trained on it.
+
+A pool is a folder of shards, `shard_0000`, `shard_0001`, …: data sets of one kind of scenes each, with their own splits.
+A shard is made under another name and renamed when it is whole, so whoever reads the pool sees whole shards only.
+Shard k has the seed FIRST_SEED + k and the kind that the shares are most short of, so that a pool of any length holds the
+kinds in their shares, and one that is made again has the same bytes.
+
+Networks train on the shards' training scenes; those that come later are taken in as they come. The first shards' validation
+scenes judge the training. What is drawn at a step depends on how many scenes there are at that step: a training on a pool
+that grows does not repeat itself bit by bit; on one that is complete it does.
+"""
+
+import sys
+from pathlib import Path
+
+from . import data
+
+FIRST_SEED = 1000  # seeds below are for other data sets, of which some are for tests
+KINDS = ("objects", "photographs", "varied")
+SHARES = {"objects": 1.0, "photographs": 1.0, "varied": 2.0}
+SHARD_SCENES = 40  # with one of them for validation and one for tests
+PART = ".part"  # what a shard is called as well until it is whole
+
+
+def kind_of(shard, shares):
+    """The kind of a shard's scenes."""
+    whole = sum(shares.values())
+    made = dict.fromkeys(shares, 0)
+    for k in range(shard + 1):
+        kind = max(shares, key=lambda each: (k + 1) * shares[each] / whole - made[each])
+        made[kind] += 1
+    return kind
+
+
+def check(shares, scenes, shard_scenes, arguments):
+    """Raises ValueError where no pool can be made so."""
+    if unknown := [kind for kind in shares if kind not in KINDS]:
+        raise ValueError(f"no kind of scenes is called {', '.join(unknown)}; there are {', '.join(KINDS)}")
+    if not shares or min(shares.values()) < 0 or sum(shares.values()) <= 0:
+        raise ValueError("shares are numbers of 0 and more, one at least above 0")
+    if shard_scenes < SHARD_SCENES or scenes < shard_scenes:
+        raise ValueError(f"a shard has {SHARD_SCENES} scenes at least, so that one is for validation, and a pool one shard at least")
+    if taken := [flag for flag in ("--seed", "--scenes", "--scenes-like", "--textures", "-o") if flag in arguments]:
+        raise ValueError(f"{', '.join(taken)} behind -- is the pool's own to say")
+
+
+def make(folder, scenes, shares=None, shard_scenes=SHARD_SCENES, limit_bytes=None, textures=None, arguments=(), command="phasefront"):
+    """Makes the shards that are not there yet, until there are `scenes` scenes or the disk's share is spent.
+
+    textures: a folder of pictures for surfaces. arguments: more for `phasefront dataset`, such as --size 256. Stopped, the
+    same call goes on. Returns how many shards there are.
+    """
+    shares = shares or SHARES
+    check(shares, scenes, shard_scenes, arguments)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted = scenes // shard_scenes
+    for k in range(wanted):
+        place = folder / f"shard_{k:04d}"
+        if place.exists():
+            continue
+        if limit_bytes is not None and (used := size_of(folder)) >= limit_bytes:
+            print(f"{folder}: {used / 2**30:.2f} GiB are there, the limit; {k} of {wanted} shards", file=sys.stderr)
+            return k
+        kind = kind_of(k, shares)
+        begun = place.with_name(place.name + PART)
+        named = ["--textures", str(textures)] if textures and kind != "objects" else []
+        flags = ["--scenes", str(shard_scenes), "--seed", str(FIRST_SEED + k), "--scenes-like", kind, *named, *arguments]
+        data.make(begun, flags, command)
+        begun.rename(place)
+    return wanted
+
+
+def size_of(folder):
+    """Bytes of all files in it."""
+    return sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file())
+
+
+def shards(folder):
+    """The manifests of the shards that are whole, in their order."""
+    found = sorted(path for path in Path(folder).glob("shard_*") if not path.name.endswith(PART))
+    return [data.Manifest.read(path) for path in found]
+
+
+def validation(folder, ldi_layers, scenes):
+    """The validation scenes of the first `scenes` shards, one of each."""
+    first = shards(folder)[:scenes]
+    return data.Scenes.joined([data.Scenes(manifest, "validation", ldi_layers, 1) for manifest in first])
+
+
+class Pool(data.Scenes):
+    """The training scenes of a pool in memory, each scene a tensor of its own, so that more can come."""
+
+    def __init__(self, folder, ldi_layers=1, limit=None):
+        self.folder, self.limit = Path(folder), limit
+        found = shards(folder)
+        if not found:
+            raise data.DataError(f"{folder}: no whole shard there yet; make the pool first (python -m phasefront_training pool)")
+        self.known = set()
+        first = self._read(found[0], ldi_layers)
+        for name in ("display", "ldi_layers", "corrected", "seeded", "refined"):
+            setattr(self, name, getattr(first, name))
+        self.origin, self.sets, self.damaged, self.numbers = {}, [], [], []
+        self.colour, self.depth, self.target = [], [], []
+        self._take(first)
+        self.look()
+
+    @property
+    def shape(self):
+        return tuple(self.depth[0].shape[-2:])
+
+    @property
+    def facts(self):
+        """What a checkpoint keeps about the pool: how many scenes of which kind."""
+        kinds = {}
+        for each in self.sets:
+            known = kinds.setdefault(each["like"], dict(each) | {"scenes": 0, "shards": 0})
+            known["scenes"] += each["scenes"]
+            known["shards"] += 1
+        return {"pool": True, "scenes": len(self), "size": self.shape[-1], "ldi_layers": self.ldi_layers, "sets": list(kinds.values())}
+
+    def stretch(self, i):
+        return 1.0
+
+    def look(self):
+        """Takes in the shards that have come since the last look; returns how many scenes there are more.
+
+        A shard for another display or of another size than the first is named and left out.
+        """
+        before = len(self)
+        for manifest in shards(self.folder):
+            if manifest.folder.name in self.known:
+                continue
+            try:
+                scenes = self._read(manifest, self.ldi_layers)
+                self._fits(scenes, manifest)
+            except data.DataError as error:
+                print(f"{error}; left out", file=sys.stderr)
+                continue
+            self._take(scenes)
+        return len(self) - before
+
+    def _read(self, manifest, ldi_layers):
+        self.known.add(manifest.folder.name)
+        return data.Scenes(manifest, "train", ldi_layers, self.limit)
+
+    def _fits(self, scenes, manifest):
+        for what in ("display", "shape", "corrected"):
+            mine, its = getattr(self, what), getattr(scenes, what)
+            if mine != its:
+                raise data.DataError(f"{manifest.folder}: its {what} is {its}, that of the other shards {mine}")
+
+    def _take(self, scenes):
+        self.sets.append(scenes.facts)
+        self.damaged += scenes.damaged
+        for mine, its in ((self.colour, scenes.colour), (self.depth, scenes.depth), (self.target, scenes.target)):
+            mine += list(its)
+        # Their count comes last: samples may be drawn meanwhile.
+        self.numbers += scenes.numbers
+
+
+def parse_shares(texts):
+    """{kind: share} of words such as varied=2."""
+    try:
+        pairs = (text.split("=") for text in texts)
+        return {kind: float(share) for kind, share in pairs}
+    except ValueError:
+        raise ValueError("shares are written KIND=NUMBER, such as varied=2") from None
