@@ -121,7 +121,8 @@ impl Correction {
     /// most.
     ///
     /// # Errors
-    /// No planes or too many, a volume whose reach, or light that the correction moves so far that it, cannot be padded.
+    /// No planes or too many, a volume whose reach, or light that the correction moves so far that it, cannot be
+    /// padded.
     pub fn of_aberrations(
         aberrations: &Aberrations,
         (height, width): (usize, usize),

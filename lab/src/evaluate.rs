@@ -529,8 +529,8 @@ pub struct Sample {
     pub margin: usize,
 }
 
-/// Judges each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`: rows in that order, the
-/// ways of a method together. `done` hears of each scene.
+/// Judges each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`: rows in that order,
+/// the ways of a method together. `done` hears of each scene.
 ///
 /// # Errors
 /// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.
@@ -647,8 +647,8 @@ pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Res
     })
 }
 
-/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`], side by side: the visible image, the midpoint's amplitude,
-/// the true one, and [`DIFFERENCE_GAIN`] times their difference.
+/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`], side by side: the visible image, the
+/// midpoint's amplitude, the true one, and [`DIFFERENCE_GAIN`] times their difference.
 ///
 /// # Errors
 /// A pair that cannot be read, what the method refuses, or a file that cannot be written.

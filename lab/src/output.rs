@@ -36,8 +36,8 @@ impl Holding<'_> {
 /// name ends in one of `extensions`, or in anything where there are none.
 ///
 /// # Errors
-/// Another name; a folder, a device, a pipe, a link to nothing; an input; another output; no such folder, or no right to
-/// write there.
+/// Another name; a folder, a device, a pipe, a link to nothing; an input; another output; no such folder, or no right
+/// to write there.
 pub fn file(path: &Path, extensions: &[&str]) -> Result<()> {
     extension(path, extensions)?;
     let place = Place::of_file(path)?;
@@ -80,7 +80,8 @@ pub fn new_file(path: &Path, extensions: &[&str], overwrite: bool) -> Result<()>
 /// Declares `path` a folder that this command fills. It is made by [`make_folder`], when there is something to write.
 ///
 /// # Errors
-/// A file; a folder that holds more than `holding` allows; an input; a parent that is a file, or no right to write there.
+/// A file; a folder that holds more than `holding` allows; an input; a parent that is a file, or no right to write
+/// there.
 pub fn folder(path: &Path, holding: Holding) -> Result<()> {
     if path.exists() && !path.is_dir() {
         return Err(Error::file(path, "is a file; the name of a folder is needed"));

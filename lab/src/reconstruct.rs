@@ -74,7 +74,8 @@ impl Hologram {
     /// aberration, which must be one for all depths.
     ///
     /// # Errors
-    /// As [`Self::views`]; a hologram that was made for another display; a table made for fewer pixels; an aberration that changes over depth or over the frame.
+    /// As [`Self::views`]; a hologram that was made for another display; a table made for fewer pixels; an aberration
+    /// that changes over depth or over the frame.
     pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
         let shape = self.shape();
         let (height, width) = shape;

@@ -286,8 +286,8 @@ fn timed(dir: &Path, list: &str) -> Result<Vec<(f64, PathBuf)>> {
         .collect()
 }
 
-/// A scan of Redwood or one like it: files whose names begin with the frame's number, as 0000012-000000366371.png. Those that have no
-/// partner are left out, as the scans' own depth may begin later.
+/// A scan of Redwood or one like it: files whose names begin with the frame's number, as 0000012-000000366371.png.
+/// Those that have no partner are left out, as the scans' own depth may begin later.
 fn redwood(colour: &Path, depth: &Path) -> Result<Sequence> {
     let numbered = |dir: &Path| -> Result<BTreeMap<u64, PathBuf>> {
         let mut found = BTreeMap::new();

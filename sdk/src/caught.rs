@@ -3,7 +3,8 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What `work` gives, or what a panic in it said, in one line. The panic's payload ends here, whatever its own end does.
+/// What `work` gives, or what a panic in it said, in one line. The panic's payload ends here, whatever its own end
+/// does.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         let message = (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))

@@ -69,8 +69,8 @@ const MOST_CLIPPED: f64 = 0.99;
 /// what lies beyond them is clamped.
 ///
 /// # Errors
-/// An empty image, no reading at all, a normalized value outside \[0, 1], near or far for normalized depth, a range that
-/// is no range, or one that hardly any reading lies in.
+/// An empty image, no reading at all, a normalized value outside \[0, 1], near or far for normalized depth, a range
+/// that is no range, or one that hardly any reading lies in.
 pub fn normalize(
     depth: ArrayView2<'_, f32>,
     unit: DepthUnit,

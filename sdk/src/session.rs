@@ -339,8 +339,8 @@ impl Session {
     ///
     /// # Errors
     /// A frame that is not usable, a late one in a video session, a session that is live, paused or closed, or reset or
-    /// closed while the frame is computed, a call by a handler of logs or traces while a session computes on its thread,
-    /// or a panic inside. None of them harms the frames that follow.
+    /// closed while the frame is computed, a call by a handler of logs or traces while a session computes on its
+    /// thread, or a panic inside. None of them harms the frames that follow.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         let (gate, video) = match &self.mode {
             Mode::Image(gate) => (gate, false),
@@ -528,8 +528,8 @@ impl Session {
         Ok(())
     }
 
-    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to a
-    /// handler of logs while a session computes. Its [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the
+    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to
+    /// a handler of logs while a session computes. Its [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the
     /// next start, save compiling.
     #[cfg(feature = "gpu")]
     pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {

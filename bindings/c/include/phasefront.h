@@ -305,8 +305,8 @@ typedef struct PfImageInfo {
 } PfImageInfo;
 
 // Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
-// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview are
-// refused there.
+// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview
+// are refused there.
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
 // One quality: a method, a resolution, and how what is shown is corrected.

@@ -23,8 +23,8 @@ pub enum PfLogLevel {
 const LEVELS: [LogLevel; 4] = [LogLevel::Error, LogLevel::Warning, LogLevel::Info, LogLevel::Debug];
 
 /// Hears log messages, on any thread. The message ends with the call. It may call the library, but where a session
-/// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview are
-/// refused there.
+/// computes on its thread it cannot wait for a frame: pf_session_process, pf_session_warm_up and pf_hologram_preview
+/// are refused there.
 pub type PfOnLog = Option<unsafe extern "C" fn(context: *mut c_void, level: PfLogLevel, message: *const c_char)>;
 
 struct Listener {

@@ -402,7 +402,8 @@ impl BackendFlags {
     }
 }
 
-/// Refuses a flag that changes nothing: of each its name, whether it is given, whether it is used, and what it goes with.
+/// Refuses a flag that changes nothing: of each its name, whether it is given, whether it is used, and what it goes
+/// with.
 pub(crate) fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
     match flags.iter().find(|(_, given, used, _)| *given && !*used) {
         None => Ok(()),

@@ -31,9 +31,9 @@ pub(crate) struct FrameFlags {
     photo: Option<PathBuf>,
     #[command(flatten)]
     seen: SeenDepthFlags,
-    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with --photo].
-    /// An image of another size than the modulator's is told of: with --display any, without it one that is larger than
-    /// the default display
+    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with
+    /// --photo]. An image of another size than the modulator's is told of: with --display any, without it one that is
+    /// larger than the default display
     #[arg(long, value_enum)]
     fit: Option<FitName>,
     #[command(flatten)]

@@ -66,7 +66,8 @@ pub(crate) struct Making {
     /// and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method seeded]
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method
+    /// seeded]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a bundled network computes in [default: int8]

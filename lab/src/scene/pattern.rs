@@ -90,8 +90,8 @@ impl Pattern {
         })
     }
 
-    /// A checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. It joins its repeats with a
-    /// seam.
+    /// A checkerboard whose fields are `side` texels wide and turned by `angle`, in radians. It joins its repeats with
+    /// a seam.
     pub fn slanted_checks(size: (usize, usize), side: f64, angle: f64) -> Self {
         let (sin, cos) = libm::sincos(angle);
         Self::from_fn(size, |x, y| {

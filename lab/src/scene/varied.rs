@@ -16,8 +16,8 @@ use super::{Mesh, Scene, Texture, thin};
 /// Most texels of a texture along a side. Larger surfaces show larger texels.
 const MAX_TEXELS: f64 = 432.0;
 
-/// A random scene of any kind for a frame of `height` x `width` pixels. Some surfaces show pieces of `photographs` where
-/// there are any. The same arguments give the same scene on every machine.
+/// A random scene of any kind for a frame of `height` x `width` pixels. Some surfaces show pieces of `photographs`
+/// where there are any. The same arguments give the same scene on every machine.
 pub fn varied_scene(seed: u64, height: usize, width: usize, photographs: &[Texture]) -> Scene {
     let mut maker = Maker::new(Dice::new(seed), height as f64, width as f64, photographs);
     let crowd = &CROWDS[maker.dice.weighted(&CROWDS.each_ref().map(|crowd| crowd.share))];
