@@ -1,8 +1,8 @@
 //! Where a command writes: its outputs are checked before work begins, and files are written whole or not at all.
 //!
-//! A command calls [`file`] or [`folder`] for each of its outputs before it computes anything. Readers call [`reading`]
-//! for each file that they open. Whichever comes first, a file that is both an input and an output is refused, also by
-//! another name, a link or a hard link. [`write_atomically`] writes beside the place and renames.
+//! A command calls [`file()`] or [`folder`] for each of its outputs before it computes anything. Readers call
+//! [`reading`] for each file that they open. Whichever comes first, a file that is both an input and an output is
+//! refused, also by another name, a link or a hard link. [`write_atomically`] writes beside the place and renames.
 
 use crate::error::{Error, Result};
 use crate::files::has_extension;
@@ -68,7 +68,7 @@ pub fn check_file(path: &Path) -> Result<()> {
 /// Declares `path` an output file of this command that must not exist yet, unless `overwrite` is set.
 ///
 /// # Errors
-/// Those of [`file`]; a file that is there.
+/// Those of [`file()`]; a file that is there.
 pub fn new_file(path: &Path, extensions: &[&str], overwrite: bool) -> Result<()> {
     file(path, extensions)?;
     if path.exists() && !overwrite {
