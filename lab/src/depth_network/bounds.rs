@@ -8,8 +8,9 @@ use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::Cost;
 use tract_onnx::tract_hir::infer::{Factoid, InferenceOp};
 
-/// Most nodes of a network; the largest that are public have some thousands.
-const MOST_NODES: usize = 1 << 13;
+/// Most nodes of a network; large public ones have one to three thousand. The time that tract takes to prepare them
+/// grows with the square: minutes for as many.
+const MOST_NODES: usize = 1 << 12;
 /// Most bytes of one tensor.
 const MOST_TENSOR: u64 = 1 << 30;
 /// Most bytes of all tensors that are needed at one time.
