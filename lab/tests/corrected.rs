@@ -227,7 +227,7 @@ fn what_cannot_be_computed_is_refused() {
         assert!(message.contains(word) && !message.contains('\n'), "{message}");
     };
     refused(8, &small, "at least");
-    refused(0, &small, "at least 1");
+    refused(0, &small, "1 to 1000000");
 }
 
 #[test]
