@@ -17,9 +17,10 @@ sample:
 bench *FLAGS:
     cargo run --release -- bench {{ FLAGS }}
 
-# Regenerate the conformance suite's levels and the Swift and Python bindings
+# Regenerate the levels of the conformance suite, the C header, and the Swift and Python bindings
 bless:
     PHASEFRONT_BLESS=1 cargo test --release --workspace --test conformance
+    bindings/c/header
     cargo build --release --workspace
     bindings/generate "$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
 
