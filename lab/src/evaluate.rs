@@ -299,7 +299,7 @@ fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
     format!("{encoder}, dark {dark}, steps {local_steps}{more}")
 }
 
-/// The ways of `shown` in which fields of `method` are judged. A pre-filter takes the place of every encoder, so that
+/// The ways of `shown` that apply to fields of `method`. A pre-filter takes the place of every encoder, so that
 /// ways which differ in their encoder alone are one.
 pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
     let mut ways: Vec<Shown> = Vec::new();

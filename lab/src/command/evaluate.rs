@@ -193,7 +193,7 @@ impl Evaluate {
         Ok(())
     }
 
-    /// Refuses flags that no method of those which are judged takes.
+    /// Refuses flags that none of the methods takes.
     fn check_flags(&self) -> Result<()> {
         let has = |wanted: &[MethodName]| self.method.iter().any(|method| wanted.contains(method));
         let sweep = has(&[MethodName::Sweep]);
