@@ -363,6 +363,35 @@ fn film(rate: &[&str], from: &Path, path: &Path, codec: &[&str]) {
 }
 
 #[test]
+fn the_shorter_of_two_films_ends_the_video_and_is_named() {
+    let (dir, input) = folder(3);
+    let at = |name: &str| dir.path().join(name);
+    let rate = ["-framerate", "10"];
+    for (length, frames) in [("long", "3"), ("short", "2")] {
+        for (kind, format) in [("color", "gbrp"), ("depth", "gray16le")] {
+            let codec = ["-c:v", "ffv1", "-pix_fmt", format, "-frames:v", frames];
+            let pictures = input.join(format!("{kind}_%d.png"));
+            film(&rate, &pictures, &at(&format!("{kind}-{length}.mkv")), &codec);
+        }
+    }
+    for (colour, depth, ends) in [("long", "short", "of depth ends"), ("short", "long", "of colour ends")] {
+        let out = at(colour);
+        let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+            .arg("video")
+            .arg(at(&format!("color-{colour}.mkv")))
+            .arg("--depth-video")
+            .arg(at(&format!("depth-{depth}.mkv")))
+            .args(["--depth-unit", "mm", "-o"])
+            .arg(&out)
+            .output()
+            .unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.contains(ends), "{errors}");
+        assert_eq!(holograms(&out).len(), 2);
+    }
+}
+
+#[test]
 fn films_go_in_and_come_out() {
     let (dir, input) = folder(5);
     let at = |name: &str| dir.path().join(name);

@@ -313,12 +313,19 @@ impl FilmSource {
 
     fn read(&mut self) -> Result<Option<VideoFrame>> {
         let Some(colour) = self.colour.read()? else {
+            if let FilmDepth::Film(film) = &mut self.depth
+                && film.read()?.is_some()
+            {
+                log::warn!("the film of colour ends before that of depth; the video ends with it");
+            }
             return Ok(None);
         };
         let mut frame = match &mut self.depth {
-            // The shorter of two films is the end of both.
             FilmDepth::Film(film) => match film.read()? {
-                None => return Ok(None),
+                None => {
+                    log::warn!("the film of depth ends before that of colour; the video ends with it");
+                    return Ok(None);
+                }
                 Some(depth) => {
                     VideoFrame::of_big_endian(colour.shape, colour.bytes, depth.shape, &depth.bytes, self.unit)
                 }
