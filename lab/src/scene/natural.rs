@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::dice::Dice;
 use super::ground::Ground;
-use super::parts::{DEPTH_PER_PX, holes, pattern, settle, shape, stretch, turned};
+use super::parts::{DEPTH_PER_PX, holes, light, pattern, settle, shape, stretch, turned};
 use super::pattern::Pattern;
 use super::photographs::piece;
 use super::shapes::{Light, Place, Shape, turn};
@@ -56,13 +56,7 @@ struct Maker<'a> {
 
 impl<'a> Maker<'a> {
     fn new(mut dice: Dice, height: f64, width: f64, ground: Ground, photographs: &'a [Texture]) -> Self {
-        let [x, y, z] = dice.direction();
-        let toward = z.abs() + 0.5;
-        let length = (x * x + y * y + toward * toward).sqrt();
-        let light = Light {
-            direction: [x / length, y / length, toward / length],
-            ambient: dice.range(0.4, 0.95),
-        };
+        let light = light(&mut dice, 0.5, [0.4, 0.95]);
         let largest = height.min(width) * dice.log_range(0.12, 0.4);
         Self {
             height,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::Mesh;
 use super::dice::Dice;
 use super::pattern::Pattern;
-use super::shapes::{Shape, quaternion, star, turn};
+use super::shapes::{Light, Shape, quaternion, star, turn};
 
 /// Parts of the volume's depth that a length of one pixel takes where nothing is stretched: 8 µm of 6 mm.
 pub(super) const DEPTH_PER_PX: f64 = 8e-6 / 6e-3;
@@ -13,6 +13,18 @@ pub(super) const DEPTH_PER_PX: f64 = 8e-6 / 6e-3;
 pub(super) const MAX_TEXELS: f64 = 144.0;
 /// How much of the volume stays empty at either end.
 pub(super) const MARGIN: f64 = 0.004;
+
+/// Light from the viewer's side: `front` is added to the part of its direction that points there. Its ambient part lies
+/// from `least` to `most`.
+pub(super) fn light(dice: &mut Dice, front: f64, [least, most]: [f64; 2]) -> Light {
+    let [x, y, z] = dice.direction();
+    let toward = z.abs() + front;
+    let length = (x * x + y * y + toward * toward).sqrt();
+    Light {
+        direction: [x / length, y / length, toward / length],
+        ambient: dice.range(least, most),
+    }
+}
 
 /// A shape, and whether it is a sheet. `radius` in pixels decides how finely it is made.
 pub(super) fn shape(dice: &mut Dice, radius: f64) -> (Shape, bool) {

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::dice::Dice;
-use super::parts::{DEPTH_PER_PX, MARGIN, MAX_TEXELS, holes, pattern, settle, shape, stretch, turned};
+use super::parts::{DEPTH_PER_PX, MARGIN, MAX_TEXELS, holes, light, pattern, settle, shape, stretch, turned};
 use super::pattern::Pattern;
 use super::shapes::{Light, Place, Shape, turn};
 use super::{Mesh, Scene, Texture};
@@ -56,14 +56,7 @@ struct Palette {
 impl Maker {
     fn new(mut dice: Dice, height: f64, width: f64) -> Self {
         let side = height.min(width);
-        let light = dice.chance(0.85).then(|| {
-            let [x, y, z] = dice.direction();
-            let length = (x * x + y * y + (z.abs() + 0.4) * (z.abs() + 0.4)).sqrt();
-            Light {
-                direction: [x / length, y / length, (z.abs() + 0.4) / length],
-                ambient: dice.range(0.15, 0.7),
-            }
-        });
+        let light = dice.chance(0.85).then(|| light(&mut dice, 0.4, [0.15, 0.7]));
         let palette = Palette {
             hue: dice.unit(),
             hue_spread: dice.pick(&[0.08, 0.25, 0.5, 0.5]),

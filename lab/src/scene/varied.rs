@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::dice::Dice;
 use super::ground::Ground;
-use super::parts::{DEPTH_PER_PX, holes, settle, shape, stretch, turned};
+use super::parts::{DEPTH_PER_PX, holes, light, settle, shape, stretch, turned};
 use super::shapes::{Light, Place, Shape, star, turn};
 use super::surface::Surfaces;
 use super::{Mesh, Scene, Texture, thin};
@@ -107,13 +107,7 @@ struct Maker<'a> {
 
 impl<'a> Maker<'a> {
     fn new(mut dice: Dice, height: f64, width: f64, photographs: &'a [Texture]) -> Self {
-        let [x, y, z] = dice.direction();
-        let toward = z.abs() + 0.5;
-        let length = (x * x + y * y + toward * toward).sqrt();
-        let light = Light {
-            direction: [x / length, y / length, toward / length],
-            ambient: dice.range(0.2, 0.95),
-        };
+        let light = light(&mut dice, 0.5, [0.2, 0.95]);
         let narrow = dice.log_range(0.03, 0.6);
         let nearest = dice.range(0.0, 1.0 - narrow);
         let span = if dice.chance(0.12) {
