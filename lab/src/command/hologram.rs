@@ -299,19 +299,8 @@ pub(crate) enum Image {
 }
 
 impl Making {
-    /// The names of the flags but for those of the display, for what takes their place.
-    pub(crate) const NAMES: [&str; 26] = [
-        "rgb",
-        "depth",
-        "photo",
-        "depth_network",
-        "depth_network_colours",
-        "invert",
-        "fit",
-        "depth_unit",
-        "depth_scale",
-        "near",
-        "far",
+    /// The names of the flags besides those of [`FrameFlags`] and the display, for what takes their place.
+    pub(crate) const NAMES: [&str; 15] = [
         "ldi",
         "method",
         "network",

@@ -1,6 +1,7 @@
 //! `phasefront view`: one HTML file to look at holograms in.
 
 use super::flags::{check_used, progress_bar};
+use super::frame::FrameFlags;
 use super::hologram::{Image, Judged, Making, infos, judge};
 use clap::Args;
 use image::RgbImage;
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 pub(crate) struct View {
     /// Holograms (.png, or .npy with its .json), folders of `video`, pages of this command: all become one page
-    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = Making::NAMES)]
+    #[arg(value_name = "HOLOGRAM|DIR|PAGE", conflicts_with_all = FrameFlags::NAMES, conflicts_with_all = Making::NAMES)]
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     making: Making,
