@@ -5,9 +5,17 @@ export CARGO_TARGET_DIR := env("CARGO_TARGET_DIR", cache_directory() / "phasefro
 _default:
     @just --list
 
-# Run all tests, or the Rust tests whose names contain FILTER
+# Check formatting, names, documents and lints, and run the unit tests
+check:
+    tests/run skips formatting documents spelling lints 'unit tests'
+
+# Run the quick tests, or the Rust tests whose names contain FILTER
 test FILTER="":
     {{ if FILTER == "" { "tests/run" } else { "cargo test --release --workspace " + quote(FILTER) } }}
+
+# Run all tests: other languages, browsers, phones, fuzzing, training
+test-all:
+    tests/run --all
 
 # Make the sample's hologram and views in out/
 sample:
@@ -15,7 +23,8 @@ sample:
 
 # Time each stage of a frame on this machine
 bench *FLAGS:
-    cargo run --release -- bench {{ FLAGS }}
+    cargo build --release --workspace --bin phasefront
+    "$CARGO_TARGET_DIR/release/phasefront" bench {{ FLAGS }}
 
 # Regenerate the levels of the conformance suite, the C header, and the Swift and Python bindings
 bless:
@@ -23,6 +32,7 @@ bless:
     bindings/c/header
     cargo build --release --workspace
     bindings/generate "$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
+    PHASEFRONT_BLESS=1 tests/surface/run
 
 # Build and open the documentation of all crates
 docs:

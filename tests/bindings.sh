@@ -16,24 +16,28 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-# Installs Debian packages, or fails.
+# Installs Debian packages, or fails. Steps run side by side, and apt-get does not.
 install() {
     need apt-get || return 1
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1 && return
-    as_root apt-get update -qq >/dev/null 2>&1
-    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null 2>&1
+    (
+        flock 9
+        get() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq "$@" >/dev/null 2>&1; }
+        get install -y --no-install-recommends "$@" || { get update && get install -y --no-install-recommends "$@"; }
+    ) 9>"$cache/install.lock"
 }
 
-# Builds the whole workspace, for a part of it alone has other features and builds tract anew (never use -p).
-# Runs the conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`.
+# Builds the whole workspace: a part of it alone has other features, with which tract is built again (never use -p). Runs the
+# conformance suite from Rust, whose levels the other languages compare with. Sets `library` and `generator`. Within tests/run
+# all this is there already.
 build_library() {
+    library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
+    generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"
+    export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"
+    [ -z "${PHASEFRONT_BUILT:-}" ] || return 0
     [ -e tests/conformance/cases.json ] && [ -e ios/Generated/PhasefrontFFI.h ] ||
         cannot 'the conformance suite and the generated Swift are not written yet: CONTRIBUTING.md has the two commands'
     need cargo || PATH="$HOME/.cargo/bin:$PATH"
     need cargo || cannot 'cargo is missing; see https://rustup.rs'
-    export PHASEFRONT_CONFORMANCE="$CARGO_TARGET_DIR/conformance"
     cargo build --release --quiet --workspace || exit 1
     cargo test --release --quiet --workspace --test conformance >/dev/null || exit 1
-    library="$CARGO_TARGET_DIR/release/libphasefront_ffi.so"
-    generator="$CARGO_TARGET_DIR/release/uniffi-bindgen"
 }

@@ -28,7 +28,7 @@ rust_target() {
         skip_or_fail rustup "this Rust has no target $1"
         exit 0
     }
-    rustup target add "$1" >/dev/null 2>&1
+    flock "$expected_skips" rustup target add "$1" >/dev/null 2>&1
     [ -d "$library" ] || cannot "rustup could not add the target $1"
 }
 
@@ -38,6 +38,6 @@ rust_nightly() {
         skip_or_fail rustup 'this Rust has no nightly toolchain'
         exit 0
     }
-    cargo +nightly --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal >/dev/null 2>&1 ||
+    cargo +nightly --version >/dev/null 2>&1 || flock "$expected_skips" rustup toolchain install nightly --profile minimal >/dev/null 2>&1 ||
         cannot 'rustup could not install the nightly toolchain'
 }
