@@ -5,7 +5,9 @@ use crate::frame::{FrameInfo, FrameMemory};
 use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
 use crate::statistics::Statistics;
-use phasefront::session::{self, Event, Session, Submission};
+use phasefront::session::{self, Event, SessionHandle, Submission};
+use phasefront::{ImageSession, LiveSession, VideoSession};
+use std::ops::Deref;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
@@ -94,7 +96,7 @@ pub trait SessionListener: Send + Sync {
 /// A session. Every call may come from any thread, at any moment.
 #[derive(uniffi::Object)]
 pub struct RawSession {
-    core: Session,
+    core: Core,
     closed: AtomicBool,
     listener_failures: Arc<AtomicU64>,
 }
@@ -115,17 +117,18 @@ impl RawSession {
         guard(|| {
             let listener_failures = Arc::new(AtomicU64::new(0));
             let options = session::SessionOptions::try_from(&options)?;
-            let running = match (mode, listener) {
-                (RunningMode::Image, None) => session::RunningMode::Image,
-                (RunningMode::Video, None) => session::RunningMode::Video,
+            let core = match (mode, listener) {
+                (RunningMode::Image, None) => Core::Image(ImageSession::new(options)?),
+                (RunningMode::Video, None) => Core::Video(VideoSession::new(options)?),
                 (RunningMode::LiveStream, Some(listener)) => {
                     let failures = listener_failures.clone();
-                    session::RunningMode::Live(Box::new(move |event| {
+                    let session = LiveSession::new(options, move |event| {
                         if let Err(error) = tell(&*listener, event) {
                             failures.fetch_add(1, Ordering::Relaxed);
                             log::warn!("{error}");
                         }
-                    }))
+                    })?;
+                    Core::Live(session)
                 }
                 (RunningMode::LiveStream, None) => {
                     return Err(PhasefrontError::Session(
@@ -138,11 +141,10 @@ impl RawSession {
                     ));
                 }
             };
-            let session = Session::new(options, running)?;
-            let backend = session.statistics().backend;
+            let backend = core.statistics().backend;
             log::info!("a session in mode {mode:?} on {}: {}", backend.name, backend.why);
             Ok(Arc::new(RawSession {
-                core: session,
+                core,
                 closed: AtomicBool::new(false),
                 listener_failures,
             }))
@@ -170,8 +172,16 @@ impl RawSession {
                 depth,
                 confidence,
             })?;
-            let hologram = self.session()?.process(&frame)?;
-            Ok(RawHologram::new(hologram))
+            let hologram = match self.session()? {
+                Core::Image(session) => session.process(&frame),
+                Core::Video(session) => session.process(&frame),
+                Core::Live(_) => {
+                    return Err(PhasefrontError::Session(
+                        "session: it is live, so frames are submitted; process is for image and video sessions".into(),
+                    ));
+                }
+            };
+            Ok(RawHologram::new(hologram?))
         })
     }
 
@@ -196,7 +206,12 @@ impl RawSession {
                 depth,
                 confidence,
             })?;
-            Ok(match self.session()?.submit(&frame)? {
+            let Core::Live(session) = self.session()? else {
+                return Err(PhasefrontError::Session(
+                    "session: it is not live; process frames, or make a live session".into(),
+                ));
+            };
+            Ok(match session.submit(&frame)? {
                 Submission::Queued => None,
                 Submission::Dropped(reason) => Some(reason.into()),
             })
@@ -269,10 +284,29 @@ impl RawSession {
 }
 
 impl RawSession {
-    fn session(&self) -> Result<&Session, PhasefrontError> {
-        match self.closed.load(Ordering::Relaxed) {
-            false => Ok(&self.core),
-            true => Err(PhasefrontError::Session("session: it is closed; make a new one".into())),
+    fn session(&self) -> Result<&Core, PhasefrontError> {
+        if self.closed.load(Ordering::Relaxed) {
+            return Err(PhasefrontError::Session("session: it is closed; make a new one".into()));
+        }
+        Ok(&self.core)
+    }
+}
+
+/// A session of any running mode: the languages have one type for all three.
+enum Core {
+    Image(ImageSession),
+    Video(VideoSession),
+    Live(LiveSession),
+}
+
+impl Deref for Core {
+    type Target = SessionHandle;
+
+    fn deref(&self) -> &SessionHandle {
+        match self {
+            Core::Image(session) => session,
+            Core::Video(session) => session,
+            Core::Live(session) => session,
         }
     }
 }

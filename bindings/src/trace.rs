@@ -129,8 +129,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-    use phasefront::session::RunningMode;
-    use phasefront::{Display, Method, Session, SessionOptions, Sweep};
+    use phasefront::{Display, ImageSession, Method, SessionOptions, Sweep};
     use std::sync::Mutex;
 
     /// Keeps what it hears, and panics each time.
@@ -148,7 +147,7 @@ mod tests {
         }
     }
 
-    fn frame(session: &Session) {
+    fn frame(session: &ImageSession) {
         let (rgb, depth) = (vec![180; 24 * 16 * 3], vec![90; 24 * 16]);
         let colour = ColourImage::new(ColourFormat::Rgb, 24, 16, &[Plane::new(&rgb, 24 * 3, 3)]).unwrap();
         let depth = DepthImage::new(DepthFormat::NormalizedU8, 24, 16, Plane::new(&depth, 24, 1)).unwrap();
@@ -160,7 +159,7 @@ mod tests {
     fn a_listener_hears_each_stage_begin_and_end_until_it_is_gone() {
         let display = Display::default().with_size(16, 24).unwrap();
         let method = Method::Sweep(Sweep::for_display(&display));
-        let session = Session::new(SessionOptions::new(display, method), RunningMode::Image).unwrap();
+        let session = ImageSession::new(SessionOptions::new(display, method)).unwrap();
         frame(&session);
         let heard = Arc::new(Unruly(Mutex::default()));
         set_stage_listener(Some(heard.clone())).unwrap();

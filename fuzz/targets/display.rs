@@ -2,8 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use phasefront::session::RunningMode;
-use phasefront::{Display, Method, Session, SessionOptions, Sweep};
+use phasefront::{Display, Method, ImageSession, SessionOptions, Sweep};
 
 fuzz_target!(|text: &str| {
     match Display::from_toml(text) {
@@ -20,7 +19,7 @@ fuzz_target!(|text: &str| {
             let method = Method::Sweep(Sweep::for_display(&display));
             let mut options = SessionOptions::new(display, method);
             options.threads = std::num::NonZeroUsize::new(1);
-            let _ = Session::new(options, RunningMode::Image);
+            let _ = ImageSession::new(options);
         }
     }
 });

@@ -7,10 +7,9 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
     Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
 };
-use phasefront::session::RunningMode;
 use phasefront::unstable::depth::stream::{DepthOptions, DepthStream};
 use phasefront::unstable::frame::ColourPlan;
-use phasefront::{Display, EncoderOptions, Encoding, Method, Result, Session, SessionOptions, Sweep};
+use phasefront::{Display, EncoderOptions, Encoding, Method, Result, VideoSession, SessionOptions, Sweep};
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -51,8 +50,8 @@ impl Numbers<'_> {
     }
 }
 
-fn session() -> &'static Session {
-    static SESSION: OnceLock<Session> = OnceLock::new();
+fn session() -> &'static VideoSession {
+    static SESSION: OnceLock<VideoSession> = OnceLock::new();
     SESSION.get_or_init(|| {
         let display = Display::default().with_size(8, 12).expect("a display");
         // What frames become is not looked at, so little time is spent on it.
@@ -65,7 +64,7 @@ fn session() -> &'static Session {
         let mut options = SessionOptions::new(display, method);
         options.encoder = EncoderOptions::plain(Encoding::DoublePhase);
         options.threads = NonZeroUsize::new(1);
-        Session::new(options, RunningMode::Video).expect("a session")
+        VideoSession::new(options).expect("a session")
     })
 }
 

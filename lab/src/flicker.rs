@@ -6,8 +6,7 @@ use crate::error::{Error, Result};
 use crate::ldi::Ldi;
 use crate::scene;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-use phasefront::session::RunningMode;
-use phasefront::{Brightness, Display, EncoderOptions, Method, Session, SessionOptions};
+use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
 use serde::Serialize;
 
 /// Noise and missing readings, new in each frame.
@@ -132,11 +131,13 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 },
                 ..options.encoder
             };
-            let mode = match setting.video {
-                true => RunningMode::Video,
-                false => RunningMode::Image,
+            let process: Box<dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>> = if setting.video {
+                let session = VideoSession::new(options)?;
+                Box::new(move |frame| session.process(frame))
+            } else {
+                let session = ImageSession::new(options)?;
+                Box::new(move |frame| session.process(frame))
             };
-            let session = Session::new(options, mode)?;
             let mut seen: Vec<Vec<f32>> = Vec::with_capacity(frames);
             for (frame, readings) in readings.iter().enumerate() {
                 let colour = Plane::new(&rgb, 3 * shape.1, 3);
@@ -144,7 +145,7 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 let plane = Plane::new(readings, 4 * SENSOR.1, 4);
                 let depth = DepthImage::new(DepthFormat::MetresF32, SENSOR.1, SENSOR.0, plane)?;
                 let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
-                let hologram = session.process(&CameraFrame::new(timestamp, colour, depth))?;
+                let hologram = process(&CameraFrame::new(timestamp, colour, depth))?;
                 let (height, width) = (shape.0 / 2, shape.1 / 2);
                 let mut rgba = vec![0; 4 * height * width];
                 hologram.preview(0.0, height, width, &mut rgba)?;

@@ -7,8 +7,7 @@ mod network_models;
 use camera::{Scene, frame};
 use network_models::Model;
 use phasefront::input::DepthFormat;
-use phasefront::session::RunningMode;
-use phasefront::{Display, EncoderOptions, Encoding, Method, Network, Session, SessionOptions, Sweep};
+use phasefront::{Display, EncoderOptions, Encoding, Method, Network, SessionOptions, Sweep, VideoSession};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -26,7 +25,7 @@ fn display() -> Display {
 
 /// The levels of three frames of a video in which something moves.
 fn video(options: SessionOptions) -> Vec<u8> {
-    let session = Session::new(options, RunningMode::Video).unwrap();
+    let session = VideoSession::new(options).unwrap();
     let mut levels = Vec::new();
     for time in 0..3 {
         let scene = Scene::new(H, W, 40 + 9 * time);

@@ -9,10 +9,12 @@ mod on_gpu;
 use camera::{Scene, colour_formats, depth, frame, options};
 use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
-use phasefront::session::{Backend, DropReason, Event, Quality, RunningMode};
+use phasefront::session::{Backend, DropReason, Event, Quality};
 use phasefront::target::Response;
 use phasefront::unstable::gpu::{ChainOptions, Float};
-use phasefront::{Brightness, Display, Error, Method, Network, Session, SessionOptions, Sweep};
+use phasefront::{
+    Brightness, Display, Error, ImageSession, LiveSession, Method, Network, SessionOptions, Sweep, VideoSession,
+};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;
@@ -49,8 +51,8 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
             let lut = Response::lut(std::array::from_fn(|i| 255 - i as u8));
             (plain.target.response, gpu.target.response) = (lut.clone(), lut);
         }
-        let cpu = Session::new(plain, RunningMode::Image).unwrap();
-        let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+        let cpu = ImageSession::new(plain).unwrap();
+        let gpu = ImageSession::new(gpu).unwrap();
         gpu.warm_up().unwrap();
         let frame = frame(7, &scene, &metres);
         let expected = cpu.process(&frame).unwrap();
@@ -88,7 +90,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = frame(7, &scene, &metres);
-    let cpu = Session::new(plain, RunningMode::Image).unwrap();
+    let cpu = ImageSession::new(plain).unwrap();
     let expected = cpu.process(&frame).unwrap();
     for (float, far, most) in [(Float::F32, 0.001, 0.02), (Float::Fastest, 0.2, 0.6)] {
         let mut options = gpu.clone();
@@ -96,7 +98,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
             float,
             ..Default::default()
         };
-        let session = Session::new(options, RunningMode::Image).unwrap();
+        let session = ImageSession::new(options).unwrap();
         let made = session.process(&frame).unwrap();
         let share = differing(made.levels(), expected.levels(), far);
         println!("{float:?}: {share} differ");
@@ -114,8 +116,8 @@ fn sweeps_are_those_of_the_cpu() {
         plain.ladder[0].method = method;
         let mut gpu = on_gpu(plain.clone());
         gpu.gpu.chain.float = Float::F32;
-        let cpu = Session::new(plain.clone(), RunningMode::Image).unwrap();
-        let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+        let cpu = ImageSession::new(plain.clone()).unwrap();
+        let gpu = ImageSession::new(gpu).unwrap();
         let expected = cpu.process(&frame_at(1)).unwrap();
         let made = gpu.process(&frame_at(1)).unwrap();
         assert!((made.scale() - expected.scale()).abs() < 1e-3 * expected.scale());
@@ -132,8 +134,8 @@ fn sweeps_are_those_of_the_cpu() {
 fn cameras_may_change_their_format() {
     let plain = options(W, H);
     let gpu = on_gpu(plain.clone());
-    let cpu = Session::new(plain, RunningMode::Image).unwrap();
-    let gpu = Session::new(gpu, RunningMode::Image).unwrap();
+    let cpu = ImageSession::new(plain).unwrap();
+    let gpu = ImageSession::new(gpu).unwrap();
     let turned = Orientation {
         rotation: Rotation::Half,
         mirrored: true,
@@ -158,8 +160,8 @@ fn cameras_may_change_their_format() {
 fn video_is_as_steady_as_on_the_cpu() {
     let plain = options(W, H);
     let gpu = on_gpu(plain.clone());
-    let cpu = Session::new(plain, RunningMode::Video).unwrap();
-    let gpu = Session::new(gpu, RunningMode::Video).unwrap();
+    let cpu = VideoSession::new(plain).unwrap();
+    let gpu = VideoSession::new(gpu).unwrap();
     let mut scales = Vec::new();
     for i in 0..8u64 {
         let mut scene = Scene::new(H, W, 4 + 3 * i as usize);
@@ -207,7 +209,7 @@ fn a_live_session_outlives_its_device() {
     let options = on_gpu(options(W, H));
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
-    let session = Session::new(options, RunningMode::Live(Box::new(listener))).unwrap();
+    let session = LiveSession::new(options, listener).unwrap();
     let (mut made, mut lost, mut timestamp) = (0, 0, 0);
     let mut levels = None;
     for round in 0..3 {
@@ -253,7 +255,7 @@ fn a_live_session_outlives_its_device() {
 fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let cpu = |mut options: SessionOptions| {
         options.backend = Backend::Cpu;
-        let session = Session::new(options, RunningMode::Image).unwrap();
+        let session = ImageSession::new(options).unwrap();
         session.process(&frame_at(1)).unwrap().levels().to_vec()
     };
     let mut missing = options(W, H);
@@ -296,7 +298,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     }
     for (options, word) in cases {
         let expected = cpu(options.clone());
-        let session = Session::new(options, RunningMode::Image).unwrap();
+        let session = ImageSession::new(options).unwrap();
         let backend = session.statistics().backend;
         assert!(backend.why.contains(word), "{word}: {backend:?}");
         assert!(!backend.name.is_empty() && !backend.why.contains('\n'));
@@ -308,7 +310,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     wrong.backend = Backend::Gpu;
     wrong.gpu.device.name = Some("no such card".into());
     wrong.target.display = Display::from_toml("width = 64\nheight = 48\npitch_um = 4").unwrap();
-    assert!(Session::new(wrong, RunningMode::Image).is_err());
+    assert!(ImageSession::new(wrong).is_err());
 }
 
 /// A ladder whose rungs lie on the GPU and on the CPU.
@@ -322,7 +324,7 @@ fn rungs_say_where_they_are_computed() {
     middle.backend = None;
     options.ladder.extend([middle, low]);
     options.quality = Quality::Fixed(0);
-    let session = Session::new(options, RunningMode::Video).unwrap();
+    let session = VideoSession::new(options).unwrap();
     let device = session.gpu().unwrap();
     let mut names = Vec::new();
     for (i, rung) in [0, 1, 2, 2, 0].into_iter().enumerate() {
@@ -350,7 +352,7 @@ fn sessions_close_at_any_moment() {
             assert!(!late.load(Ordering::SeqCst), "told after it was closed");
             sender.send(event).unwrap();
         };
-        let session = Session::new(options.clone(), RunningMode::Live(Box::new(listener)));
+        let session = LiveSession::new(options.clone(), listener);
         let session = session.unwrap();
         for timestamp in 1..=round {
             session.submit(&frame_at(timestamp)).unwrap();

@@ -9,8 +9,8 @@ mod on_gpu;
 use camera::{Scene, frame, options};
 use on_gpu::on_gpu;
 use phasefront::input::DepthFormat;
-use phasefront::session::{Event, RunningMode};
-use phasefront::{Error, Session};
+use phasefront::session::Event;
+use phasefront::{Error, LiveSession};
 use std::sync::mpsc;
 
 /// Each frame is answered, and memory does not grow with the losses.
@@ -36,7 +36,7 @@ fn nothing_grows_where_devices_go() {
     };
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
-    let session = Session::new(options, RunningMode::Live(Box::new(listener))).unwrap();
+    let session = LiveSession::new(options, listener).unwrap();
     let (mut made, mut lost) = (0, 0);
     let mut run = |frames: std::ops::Range<u64>| {
         for i in frames {

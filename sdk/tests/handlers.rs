@@ -8,8 +8,8 @@ mod counting;
 use camera::{Scene, frame, options};
 use counting::HELD;
 use phasefront::input::DepthFormat;
-use phasefront::session::{Event, Quality, RunningMode};
-use phasefront::{Hologram, Session};
+use phasefront::session::{Event, Quality, SessionHandle};
+use phasefront::{Hologram, LiveSession, SessionOptions, VideoSession};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, OnceLock, mpsc};
 use std::time::Duration;
@@ -63,21 +63,25 @@ fn handle(stage: &'static str, handler: impl Fn() + Send + Sync + 'static) {
     *HANDLER.lock().unwrap() = Some((stage, Arc::new(handler)));
 }
 
-/// A session of two quality levels, so that the second is planned in the midst of a frame.
-fn session(mode: RunningMode) -> Arc<Session> {
+/// Options of two quality levels, so that the second is planned in the midst of a frame.
+fn two_levels() -> SessionOptions {
     let mut options = options(W, H);
     options.ladder.push(options.ladder[0].clone());
     options.quality = Quality::Fixed(0);
-    Arc::new(Session::new(options, mode).unwrap())
+    options
 }
 
-fn process(session: &Session, time: u64) -> phasefront::Result<Hologram> {
+fn video() -> Arc<VideoSession> {
+    Arc::new(VideoSession::new(two_levels()).unwrap())
+}
+
+fn process(session: &VideoSession, time: u64) -> phasefront::Result<Hologram> {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     session.process(&frame(time, &scene, &metres))
 }
 
-fn submit(session: &Session, time: u64) {
+fn submit(session: &LiveSession, time: u64) {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     session.submit(&frame(time, &scene, &metres)).unwrap();
@@ -88,7 +92,7 @@ fn closing_a_video() {
     for stage in ["method", "plan"] {
         let before = HELD.load(Ordering::Relaxed);
         let result = in_time("closing within process", move || {
-            let session = session(RunningMode::Video);
+            let session = video();
             process(&session, 1).unwrap();
             session.set_quality(Quality::Fixed(1)).unwrap();
             let closing = session.clone();
@@ -121,7 +125,7 @@ fn closing_a_video() {
 fn calling_back() {
     for stage in ["method", "plan"] {
         let told = in_time("calling back within process", move || {
-            let (this, other) = (session(RunningMode::Video), session(RunningMode::Image));
+            let (this, other) = (video(), video());
             let view = Arc::new(process(&other, 1).unwrap());
             process(&this, 1).unwrap();
             this.set_quality(Quality::Fixed(1)).unwrap();
@@ -153,14 +157,14 @@ fn calling_back() {
     }
 }
 
-/// A live session is closed and dropped by the handler; its listener hears the end.
+/// A live session is closed by the handler; its listener hears the end.
 fn closing_a_live_stream() {
     let told = in_time("closing a live stream", || {
         let (sender, events) = mpsc::channel();
-        let slot = Arc::new(OnceLock::<Mutex<Option<Arc<Session>>>>::new());
+        let slot = Arc::new(OnceLock::<Mutex<Option<SessionHandle>>>::new());
         let closing = slot.clone();
-        let session = session(RunningMode::Live(Box::new(move |event| drop(sender.send(event)))));
-        slot.get_or_init(|| Mutex::new(Some(session.clone())));
+        let session = LiveSession::new(two_levels(), move |event| drop(sender.send(event))).unwrap();
+        slot.get_or_init(|| Mutex::new(Some(SessionHandle::clone(&session))));
         handle("method", move || {
             let session = closing.get().unwrap().lock().unwrap().take();
             if let Some(session) = session {
@@ -184,7 +188,7 @@ fn closing_a_live_stream() {
 fn a_handler_of_logs_may_close_and_call_any_session() {
     tracing::subscriber::set_global_default(Collector).unwrap();
     // What is made once is there.
-    process(&session(RunningMode::Image), 1).unwrap();
+    process(&video(), 1).unwrap();
     closing_a_video();
     calling_back();
     closing_a_live_stream();

@@ -11,15 +11,14 @@ use network_models::Model;
 use num_complex::Complex32;
 use phasefront::input::DepthFormat;
 use phasefront::output::{Layout, Levels, Output, Placement};
-use phasefront::session::RunningMode;
 use phasefront::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
 use phasefront::unstable::encode::Encoder;
 use phasefront::unstable::preview::Preview;
 use phasefront::unstable::refocus::{Refocus, phase_only_field};
 use phasefront::unstable::slm::per_pixel;
 use phasefront::{
-    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, Session, SessionOptions,
-    Sweep, Target,
+    Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, SessionOptions, Sweep, Target,
+    VideoSession,
 };
 use std::sync::Arc;
 
@@ -314,7 +313,7 @@ fn a_session_shows_a_pictures_luminance() {
         let method = Method::Sweep(Sweep::for_display(&display));
         let mut options = SessionOptions::new(display, method);
         options.encoder.brightness = Brightness::Fixed(1.1);
-        Session::new(options, RunningMode::Video).unwrap()
+        VideoSession::new(options).unwrap()
     };
     let (one, three) = (session(ONE), session(THREE));
     one.warm_up().unwrap();

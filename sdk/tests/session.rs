@@ -9,18 +9,21 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, Rung, RunningMode, Submission, Thermal};
+use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, Rung, Submission, Thermal};
 use phasefront::target::{Aberration, Response};
 use phasefront::unstable::refocus::Refocus;
 use phasefront::unstable::wave::aperture::Opening;
-use phasefront::{Brightness, Display, EncoderOptions, Error, Method, Session, SessionOptions, Sweep, Target};
+use phasefront::{
+    Brightness, Display, EncoderOptions, Error, ImageSession, LiveSession, Method, SessionOptions, Sweep, Target,
+    VideoSession,
+};
 use std::sync::mpsc;
 
 const W: usize = 64;
 const H: usize = 48;
 
-fn image_session() -> Session {
-    Session::new(options(W, H), RunningMode::Image).unwrap()
+fn image_session() -> ImageSession {
+    ImageSession::new(options(W, H)).unwrap()
 }
 
 #[test]
@@ -131,7 +134,7 @@ fn a_display_of_ten_bits_gets_words() {
     let target = Target::from(display);
     let method = options(W, H).ladder[0].method.clone();
     let mut options = SessionOptions::new(target.clone(), method);
-    let session = Session::new(options.clone(), RunningMode::Image).unwrap();
+    let session = ImageSession::new(options.clone()).unwrap();
     let ten = session.process(&frame(1, &scene, &metres)).unwrap();
     assert!(eight.words().is_none());
     let words = ten.words().unwrap();
@@ -146,12 +149,12 @@ fn a_display_of_ten_bits_gets_words() {
     output.unwrap().write(ten.output_levels(), 1, &mut bytes).unwrap();
     assert_eq!(u16::from_le_bytes([bytes[0], bytes[1]]), words[W * H] << 6);
     options.target.response = Response::lut([0; 256]);
-    assert!(Session::new(options, RunningMode::Image).is_err());
+    assert!(ImageSession::new(options).is_err());
 }
 
 /// Hands a session one bad frame after another, and a good one after each.
 struct Trial<'a> {
-    session: Session,
+    session: VideoSession,
     scene: &'a Scene,
     metres: &'a [u8],
     timestamp: u64,
@@ -160,7 +163,7 @@ struct Trial<'a> {
 impl<'a> Trial<'a> {
     fn new(scene: &'a Scene, metres: &'a [u8]) -> Self {
         let mut trial = Trial {
-            session: Session::new(options(W, H), RunningMode::Video).unwrap(),
+            session: VideoSession::new(options(W, H)).unwrap(),
             scene,
             metres,
             timestamp: 0,
@@ -289,7 +292,7 @@ fn late_frames_are_named_and_counted() {
 }
 
 /// The last timestamp taken, from the refusal of an old one.
-fn timestamp_of(session: &Session) -> u64 {
+fn timestamp_of(session: &VideoSession) -> u64 {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     match session.process(&frame(0, &scene, &metres)) {
@@ -304,7 +307,7 @@ fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
     let (height, width) = (480, 640);
     let scene = Scene::new(height, width, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    let session = Session::new(options(width, height), RunningMode::Video).unwrap();
+    let session = VideoSession::new(options(width, height)).unwrap();
     let first = session.process(&frame(1, &scene, &metres)).unwrap();
     // Again and again, until a frame is met while it is computed.
     let met = |end: &(dyn Fn() + Sync)| {
@@ -336,7 +339,7 @@ fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
 }
 
 #[test]
-fn modes_pause_and_close_are_kept_to() {
+fn pause_and_close_are_kept_to() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = |t| frame(t, &scene, &metres);
@@ -344,7 +347,6 @@ fn modes_pause_and_close_are_kept_to() {
     // Without a past, timestamps do not matter and equal frames are equal.
     let (a, b) = (image.process(&frame(9)).unwrap(), image.process(&frame(3)).unwrap());
     assert_eq!(a.levels(), b.levels());
-    assert!(image.submit(&frame(1)).unwrap_err().to_string().contains("not live"));
     image.pause();
     assert!(image.process(&frame(1)).unwrap_err().to_string().contains("paused"));
     image.resume();
@@ -352,8 +354,7 @@ fn modes_pause_and_close_are_kept_to() {
     image.close();
     assert!(image.process(&frame(1)).unwrap_err().to_string().contains("closed"));
     assert_eq!(a.levels().len(), 3 * W * H);
-    let live = Session::new(options(W, H), RunningMode::Live(Box::new(|_| {}))).unwrap();
-    assert!(live.process(&frame(1)).unwrap_err().to_string().contains("live"));
+    let live = LiveSession::new(options(W, H), |_| {}).unwrap();
     live.close();
     assert!(live.submit(&frame(1)).unwrap_err().to_string().contains("closed"));
     live.close();
@@ -371,7 +372,7 @@ fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
     let far_metres = far.depth_bytes(DepthFormat::MetresF32);
     // Colour and depth that do not belong together.
     let odd = |t| CameraFrame::new(t, scene.colour(), depth(&metres, DepthFormat::MetresF32, H, W));
-    let new = || Session::new(options(W, H), RunningMode::Video).unwrap();
+    let new = || VideoSession::new(options(W, H)).unwrap();
     let alone = new().process(&frame(30, &far, &far_metres)).unwrap();
     let session = new();
     session.process(&frame(10, &scene, &metres)).unwrap();
@@ -387,7 +388,7 @@ fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
 fn a_replay_is_refused_where_a_frame_is() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    let session = Session::new(options(W, H), RunningMode::Video).unwrap();
+    let session = VideoSession::new(options(W, H)).unwrap();
     for scale in [f32::NAN, f32::INFINITY, 0.0, -1.0] {
         let refused = session.replay(&frame(1, &scene, &metres), scale);
         let message = refused.unwrap_err().to_string();
@@ -401,7 +402,7 @@ fn a_replay_is_refused_where_a_frame_is() {
     let s = session.statistics();
     assert_eq!((s.submitted, s.processed, s.dropped.paused), (2, 1, 1));
     // It is given up by a reset, as a frame is.
-    let session = Session::new(options(640, 480), RunningMode::Video).unwrap();
+    let session = VideoSession::new(options(640, 480)).unwrap();
     let large = Scene::new(480, 640, 10);
     let metres = large.depth_bytes(DepthFormat::MetresF32);
     let replaying = std::sync::atomic::AtomicBool::new(true);
@@ -453,7 +454,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     let nan: Vec<u8> = f32::NAN.to_le_bytes().repeat(W * H);
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
-    let session = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let session = LiveSession::new(options(W, H), listener).unwrap();
     // One at a time, every frame is answered.
     for timestamp in 1..=5 {
         assert_eq!(
@@ -523,7 +524,7 @@ fn a_listener_may_panic_and_may_close() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let (sender, events) = mpsc::channel();
-    let session = std::sync::Arc::new(std::sync::OnceLock::<Session>::new());
+    let session = std::sync::Arc::new(std::sync::OnceLock::<LiveSession>::new());
     let listener = {
         let session = session.clone();
         move |event: Event| {
@@ -538,7 +539,7 @@ fn a_listener_may_panic_and_may_close() {
             }
         }
     };
-    let live = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let live = LiveSession::new(options(W, H), listener).unwrap();
     let live = session.get_or_init(|| live);
     live.submit(&frame(1, &scene, &metres)).unwrap();
     assert_eq!(events.recv().unwrap(), 1);
@@ -568,7 +569,7 @@ fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
         // Without the hook's message on stderr.
         std::panic::resume_unwind(Box::new(Bomb));
     };
-    let session = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let session = LiveSession::new(options(W, H), listener).unwrap();
     for timestamp in 1..=3 {
         session.submit(&frame(timestamp, &scene, &metres)).unwrap();
         let told = events.recv_timeout(std::time::Duration::from_secs(60)).unwrap();
@@ -585,7 +586,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let (sender, events) = mpsc::channel();
-    let session = std::sync::Arc::new(std::sync::OnceLock::<Session>::new());
+    let session = std::sync::Arc::new(std::sync::OnceLock::<LiveSession>::new());
     let submitted = std::sync::Arc::new(std::sync::Barrier::new(2));
     let listener = {
         let (session, submitted) = (session.clone(), submitted.clone());
@@ -597,7 +598,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
             sender.send(event).unwrap();
         }
     };
-    let live = Session::new(options(W, H), RunningMode::Live(Box::new(listener))).unwrap();
+    let live = LiveSession::new(options(W, H), listener).unwrap();
     let live = session.get_or_init(|| live);
     live.submit(&frame(1, &scene, &metres)).unwrap();
     // Wait until the first is a hologram; the others can only be dropped then.
@@ -660,11 +661,8 @@ fn a_whole_view_is_what_the_levels_become_behind_the_aperture() {
     for (offset_mm, bits) in [(0, 8), (3, 5), (1, 10)] {
         let text = format!("width = {W}\nheight = {H}\noffset_mm = {offset_mm}\nbits = {bits}");
         let display = Display::from_toml(&text).unwrap();
-        let session = Session::new(
-            SessionOptions::new(display.clone(), Method::Sweep(Sweep::for_display(&display))),
-            RunningMode::Image,
-        )
-        .unwrap();
+        let method = Method::Sweep(Sweep::for_display(&display));
+        let session = ImageSession::new(SessionOptions::new(display.clone(), method)).unwrap();
         let hologram = session.process(&frame(1, &scene, &metres)).unwrap();
         let turn = std::f32::consts::TAU / (1 << bits) as f32;
         let light = |level: f32| Complex32::from_polar(hologram.scale(), turn * level);
@@ -700,7 +698,7 @@ fn a_whole_view_passes_the_optics_that_are_corrected() {
             ..Display::default().with_size(H, W).unwrap().into()
         };
         let method = Method::Sweep(Sweep::for_display(&target.display));
-        let session = Session::new(SessionOptions::new(target, method), RunningMode::Image).unwrap();
+        let session = ImageSession::new(SessionOptions::new(target, method)).unwrap();
         session.process(&frame(1, &scene, &metres)).unwrap()
     });
     let [a, b] = [&plain, &corrected].map(|hologram| hologram.refocus(0.0).unwrap());
@@ -715,7 +713,7 @@ fn options_that_cannot_be_meant_are_named() {
     let refuse = |change: &dyn Fn(&mut SessionOptions), word: &str| {
         let mut options = options(W, H);
         change(&mut options);
-        let refused = Session::new(options, RunningMode::Image).map(|_| ());
+        let refused = ImageSession::new(options).map(|_| ());
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(word), "{word}: {message}");
     };

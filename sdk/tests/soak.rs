@@ -9,8 +9,8 @@ mod counting;
 use camera::{Scene, depth, frame, options};
 use counting::HELD;
 use phasefront::input::{CameraFrame, DepthFormat};
-use phasefront::session::{Event, Quality, Rung, RunningMode, Thermal};
-use phasefront::{Error, Session, SessionOptions, Sweep};
+use phasefront::session::{Event, Quality, Rung, Thermal};
+use phasefront::{Error, LiveSession, SessionOptions, Sweep};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::num::NonZeroUsize;
@@ -92,7 +92,7 @@ fn ladder() -> SessionOptions {
 }
 
 /// One frame, or a fault; the clock after it.
-fn submit(session: &Session, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<u8>)], now: u64) -> u64 {
+fn submit(session: &LiveSession, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<u8>)], now: u64) -> u64 {
     let (scene, metres) = &scenes[random.random_range(0..scenes.len())];
     let later = now + random.random_range(1..3_000_000);
     let submitted = match random.random_range(0..100) {
@@ -177,7 +177,7 @@ fn run(frames: u64, seed: u64) -> Heard {
             }
         }
     };
-    let session = Session::new(ladder(), RunningMode::Live(Box::new(listener))).unwrap();
+    let session = LiveSession::new(ladder(), listener).unwrap();
     let mut now = 1;
     for sent in 0..frames {
         now = submit(&session, random, &scenes, now);

@@ -5,13 +5,32 @@ use crate::frame::RawFrame;
 use crate::hologram::{RawHologram, times};
 use crate::options::{RawOptions, quality};
 use js_sys::Object;
-use phasefront::session::{RunningMode, Session};
+use phasefront::session::SessionHandle;
+use phasefront::{ImageSession, VideoSession};
+use std::ops::Deref;
 use wasm_bindgen::prelude::*;
 
 /// A session.
 #[wasm_bindgen]
 pub struct RawSession {
-    core: Session,
+    core: Core,
+}
+
+/// A session of either running mode: JavaScript has one type for both.
+enum Core {
+    Image(ImageSession),
+    Video(VideoSession),
+}
+
+impl Deref for Core {
+    type Target = SessionHandle;
+
+    fn deref(&self) -> &SessionHandle {
+        match self {
+            Core::Image(session) => session,
+            Core::Video(session) => session,
+        }
+    }
 }
 
 #[wasm_bindgen]
@@ -19,37 +38,41 @@ impl RawSession {
     /// A session that runs in `mode`: `image` or `video`.
     ///
     /// # Errors
-    /// `setting` and others: options that cannot be meant or planned for. `session`: a live stream, which needs a
-    /// thread.
+    /// `setting` and others: a mode that there is not, or options that cannot be meant or planned for.
     #[wasm_bindgen(constructor)]
     pub fn new(options: &RawOptions, mode: &str) -> Answer<RawSession> {
-        let mode = match mode {
-            "image" => RunningMode::Image,
-            "video" => RunningMode::Video,
-            "live-stream" => RunningMode::Live(Box::new(|_| {})),
+        let options = options.core.clone();
+        let core = match mode {
+            "image" => ImageSession::new(options).map(Core::Image),
+            "video" => VideoSession::new(options).map(Core::Video),
             other => {
                 return Err(setting(&format!(
                     "there is no mode '{other}'; there are image and video"
                 )));
             }
         };
-        let core = Session::new(options.core.clone(), mode).map_err(of_core)?;
+        let core = core.map_err(of_core)?;
         Ok(RawSession { core })
     }
 
     /// The hologram of a frame.
     ///
     /// # Errors
-    /// As [`Session::process`].
+    /// As [`ImageSession::process`]; a late frame in a video session.
     pub fn process(&self, frame: &RawFrame) -> Answer<RawHologram> {
-        let core = self.core.process(&frame.frame()?).map_err(of_core)?;
+        let frame = frame.frame()?;
+        let made = match &self.core {
+            Core::Image(session) => session.process(&frame),
+            Core::Video(session) => session.process(&frame),
+        };
+        let core = made.map_err(of_core)?;
         Ok(RawHologram { core })
     }
 
     /// Runs an empty frame through the stages.
     ///
     /// # Errors
-    /// As [`Session::warm_up`].
+    /// As [`SessionHandle::warm_up`].
     #[wasm_bindgen(js_name = warmUp)]
     pub fn warm_up(&self) -> Answer<()> {
         self.core.warm_up().map_err(of_core)

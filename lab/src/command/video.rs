@@ -10,9 +10,9 @@ use super::method::{CoreMethod, Parts};
 use super::request::{Before, Request};
 use clap::{Args, ValueEnum};
 use phasefront::input::DepthRange;
-use phasefront::session::{Backend, Event, Quality, RunningMode, Statistics};
+use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
 use phasefront::target::Panel;
-use phasefront::{Brightness, Hologram, Session, SessionOptions, Sweep, Target};
+use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
 use phasefront_lab::files::HologramInfo;
 use phasefront_lab::{Error, Result, film, gpu};
 use serde_json::json;
@@ -106,11 +106,9 @@ enum BrightnessName {
     Max,
 }
 
-/// A session that is warm. Where the GPU was asked for and does not serve, that is said; where it does, what was
-/// compiled for it is kept.
-fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
-    let asked = options.backend;
-    let session = Session::new(options, mode)?;
+/// Warms a session up whose options asked for the backend `asked`. Warns where the GPU was asked for and does not serve;
+/// where it does, keeps what was compiled for it.
+fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
     session.warm_up()?;
     match session.gpu() {
         Some(device) => gpu::keep_programs(&device),
@@ -119,7 +117,7 @@ fn start(options: SessionOptions, mode: RunningMode) -> Result<Session> {
         }
         None => {}
     }
-    Ok(session)
+    Ok(())
 }
 
 impl Video {
@@ -309,7 +307,9 @@ impl Video {
         rate: f64,
     ) -> Result<Statistics> {
         let midpoint_steps = options.encoder.midpoint_steps;
-        let session = start(options, RunningMode::Video)?;
+        let backend = options.backend;
+        let session = VideoSession::new(options)?;
+        warm_up(&session, backend)?;
         let mut resuming = sink.resumes();
         let mut frame = 0;
         while let Some(read) = source.next()? {
@@ -367,7 +367,9 @@ impl Video {
                 _ => {}
             }
         };
-        let session = start(options, RunningMode::Live(Box::new(listener)))?;
+        let backend = options.backend;
+        let session = LiveSession::new(options, listener)?;
+        warm_up(&session, backend)?;
         let (submitted, written) = std::thread::scope(|scope| {
             let writer = scope.spawn(move || {
                 let mut result = Ok(());
@@ -448,7 +450,7 @@ fn timestamp_ns(frame: usize, rate_hz: f64) -> u64 {
     (frame as f64 * 1e9 / rate_hz) as u64
 }
 
-fn submit_all(session: &Session, source: &mut Source, rate_hz: f64) -> Result<()> {
+fn submit_all(session: &LiveSession, source: &mut Source, rate_hz: f64) -> Result<()> {
     let paced = source.is_stored();
     let start = Instant::now();
     let mut frame = 0;

@@ -49,6 +49,6 @@ pub enum Event {
         change: QualityChange,
     },
     /// The session is closed and its memory is given back. This is the last event, told exactly once, also where
-    /// [`super::Session::close`] does not wait for it.
+    /// [`super::SessionHandle::close`] does not wait for it.
     Closed,
 }

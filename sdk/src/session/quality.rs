@@ -8,7 +8,7 @@ use std::time::Duration;
 
 /// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its
 /// middle.
-#[derive(Clone)]
+#[derive(Debug, Clone)]
 pub struct Rung {
     /// What makes the midpoint hologram.
     pub method: Method,

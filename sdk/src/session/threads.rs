@@ -1,7 +1,7 @@
 //! The threads that a session computes with.
 
-use super::MOST_THREADS;
 use super::computing::Computing;
+use super::options::MOST_THREADS;
 use crate::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;

@@ -147,7 +147,7 @@ export class Session {
   #raw: RawSession | undefined;
 
   /**
-   * @throws PhasefrontError for options that cannot be meant or planned for; `session`: a live stream.
+   * @throws PhasefrontError for options that cannot be meant or planned for.
    */
   constructor(options: SessionOptions = {}, mode: RunningMode = "image") {
     const raw = rawOptions(options);

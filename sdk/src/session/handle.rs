@@ -1,0 +1,236 @@
+//! Controls of a session that all three kinds share.
+
+use super::computing::{self, Computing};
+use super::home::Home;
+use super::live::{Live, guarded, lock};
+use super::live_work::LiveWork;
+#[cfg(doc)]
+use super::on_gpu::GpuOptions;
+use super::options::SessionOptions;
+use super::quality::{Quality, Thermal};
+use super::queue::{self, Gate, Queue};
+use super::stages::{Made, Stages};
+use super::statistics::{Recent, Statistics};
+use crate::cancel::Cancel;
+use crate::clock::Instant;
+use crate::depth::camera::CameraFrame;
+use crate::error::Result;
+use std::fmt::{Debug, Formatter};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+
+/// Controls a session: every kind of session dereferences to it. A clone controls the same session from any thread, a
+/// listener's too. It does not keep the session open: a session closes when it is dropped, whatever handles there are.
+#[derive(Clone)]
+pub struct SessionHandle {
+    pub(super) shared: Arc<Shared>,
+    pub(super) frames: Frames,
+}
+
+/// What lets frames into a session.
+#[derive(Clone)]
+pub(super) enum Frames {
+    /// Each is answered while its caller waits.
+    Answered(Arc<Mutex<Gate>>),
+    /// A thread takes them from a queue.
+    Live(Arc<Live<LiveWork>>),
+}
+
+/// What callers and the session's thread share.
+pub(super) struct Shared {
+    pub(super) home: Home,
+    /// None when the session has ended: its memory went back.
+    pub(super) stages: Mutex<Option<Stages>>,
+    control: Mutex<Control>,
+    pub(super) recent: Mutex<Recent>,
+    pub(super) cancel: Cancel,
+}
+
+/// What the caller may change while a session runs.
+#[derive(Debug, Clone, Copy)]
+struct Control {
+    /// Rungs of the ladder.
+    rungs: usize,
+    quality: Quality,
+    thermal: Thermal,
+}
+
+impl Shared {
+    /// # Errors
+    /// Options that cannot be meant or planned for, or threads that cannot be started.
+    pub(super) fn new(options: SessionOptions) -> Result<Arc<Self>> {
+        options.check()?;
+        let control = Control {
+            rungs: options.ladder.len(),
+            quality: options.quality,
+            thermal: Thermal::Nominal,
+        };
+        let cancel = Cancel::default();
+        let mut stages = Stages::new(options, cancel.clone())?;
+        let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.rung());
+        Ok(Arc::new(Shared {
+            home: Home::here(),
+            stages: Mutex::new(Some(stages)),
+            control: Mutex::new(control),
+            recent: Mutex::new(recent),
+            cancel,
+        }))
+    }
+
+    pub(super) fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<Made> {
+        let Control { quality, thermal, .. } = *lock(&self.control);
+        let made = stages.process(frame, past, thermal, quality)?;
+        let mut recent = lock(&self.recent);
+        recent.push(Instant::now(), made.hologram.times());
+        recent.rung = stages.rung();
+        if let Some(backend) = stages.new_report() {
+            recent.backend = backend;
+        }
+        Ok(made)
+    }
+
+    pub(super) fn recover(&self) {
+        let _computing = Computing::begin();
+        if let Some(stages) = &mut *lock(&self.stages) {
+            stages.recover();
+        }
+    }
+
+    /// Gives back all memory but the statistics'; waits for a frame that is being processed, but not on a thread that
+    /// computes: whoever processes it does this when the frame is done.
+    pub(super) fn end(&self) {
+        let stages = if computing::here() {
+            match self.stages.try_lock() {
+                Ok(mut stages) => stages.take(),
+                Err(TryLockError::Poisoned(stages)) => PoisonError::into_inner(stages).take(),
+                Err(TryLockError::WouldBlock) => None,
+            }
+        } else {
+            lock(&self.stages).take()
+        };
+        // Not under the lock: what is logged meanwhile may come back here.
+        drop(stages);
+    }
+}
+
+impl SessionHandle {
+    /// Lets `work` have the stages, once nobody else has them.
+    pub(super) fn with_stages<T>(&self, work: impl FnOnce(&mut Option<Stages>) -> Result<T>) -> Result<T> {
+        self.shared.home.check()?;
+        computing::check()?;
+        let result = {
+            let _computing = Computing::begin();
+            work(&mut lock(&self.shared.stages))
+        };
+        // A handler of logs that closed the session meanwhile did not wait.
+        if let Frames::Answered(gate) = &self.frames
+            && lock(gate).closed
+        {
+            self.shared.end();
+        }
+        result
+    }
+
+    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    ///
+    /// # Errors
+    /// A session that is closed, a call by a handler of logs while a session computes, or a panic inside.
+    pub fn warm_up(&self) -> Result<()> {
+        self.with_stages(|stages| {
+            let stages = stages.as_mut().ok_or_else(queue::closed)?;
+            let (result, panicked) = guarded(|| stages.warm_up());
+            if panicked {
+                stages.recover();
+            }
+            result
+        })
+    }
+
+    /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
+    /// first again. A frame that is being computed is given up, on the CPU within a row, tile or plane of its work; a
+    /// GPU and a network on tract end it first. The `process` that waits for it then gives an error.
+    pub fn reset(&self) {
+        match &self.frames {
+            Frames::Answered(gate) => lock(gate).reset(),
+            Frames::Live(live) => live.change(Queue::reset),
+        }
+    }
+
+    /// Takes no frames until [`Self::resume`]. A live session drops what waits, ends what is in flight, and drops what
+    /// is submitted; the others refuse to process.
+    pub fn pause(&self) {
+        match &self.frames {
+            Frames::Answered(gate) => lock(gate).paused = true,
+            Frames::Live(live) => live.change(Queue::pause),
+        }
+    }
+
+    /// Takes frames again.
+    pub fn resume(&self) {
+        match &self.frames {
+            Frames::Answered(gate) => lock(gate).paused = false,
+            Frames::Live(live) => live.change(|queue| {
+                queue.resume();
+                None
+            }),
+        }
+    }
+
+    /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up,
+    /// as by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has
+    /// heard everything, [`Event::Closed`](super::Event::Closed) last, and will not be called again. Called by a
+    /// listener, of this session or another, or by a handler of logs while a session computes, it does not wait for
+    /// that. Results that were handed out stay valid. Dropping a session closes it.
+    pub fn close(&self) {
+        match &self.frames {
+            Frames::Answered(gate) => {
+                lock(gate).close();
+                if self.shared.home.is_here() {
+                    self.shared.end();
+                }
+            }
+            Frames::Live(live) => live.close(),
+        }
+    }
+
+    /// Says how hot the device is; an adaptive session follows it from the next frame on.
+    pub fn set_thermal(&self, thermal: Thermal) {
+        lock(&self.shared.control).thermal = thermal;
+    }
+
+    /// Allows or forbids steps on the ladder, from the next frame on.
+    ///
+    /// # Errors
+    /// A rung that is not on the ladder.
+    pub fn set_quality(&self, quality: Quality) -> Result<()> {
+        let mut control = lock(&self.shared.control);
+        quality.check(control.rungs)?;
+        control.quality = quality;
+        Ok(())
+    }
+
+    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to
+    /// a handler of logs while a session computes. Its [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the
+    /// next start, save compiling.
+    #[cfg(feature = "gpu")]
+    pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
+        let gpu = self.with_stages(|stages| Ok(stages.as_ref().and_then(Stages::gpu)));
+        gpu.ok().flatten()
+    }
+
+    /// What the session has done so far. Never waits for a frame.
+    pub fn statistics(&self) -> Statistics {
+        let counts = match &self.frames {
+            Frames::Answered(gate) => lock(gate).counts,
+            Frames::Live(live) => live.look(|queue| queue.gate.counts),
+        };
+        lock(&self.shared.recent).statistics(counts)
+    }
+}
+
+impl Debug for SessionHandle {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SessionHandle")
+            .field("statistics", &self.statistics())
+            .finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,60 @@
+//! What the thread of a live session does with frames, and what its listener hears.
+
+use super::computing::Computing;
+use super::event::Event;
+use super::handle::Shared;
+use super::live::{Report, Work, lock};
+use super::owned_frame::OwnedFrame;
+use super::queue;
+use super::stages::Made;
+use crate::cancel::Cancel;
+use crate::error::Result;
+use std::sync::Arc;
+
+/// The work of a live session's thread.
+pub(super) struct LiveWork(pub(super) Arc<Shared>);
+
+impl Work for LiveWork {
+    type Frame = OwnedFrame;
+    type Output = Made;
+
+    fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
+        let _computing = Computing::begin();
+        let mut stages = lock(&self.0.stages);
+        let stages = stages.as_mut().ok_or_else(queue::closed)?;
+        if fresh {
+            stages.forget();
+        }
+        self.0.process(stages, &frame.frame()?, !fresh)
+    }
+
+    fn recover(&mut self) {
+        self.0.recover();
+    }
+
+    fn cancel(&self) -> Cancel {
+        self.0.cancel.clone()
+    }
+}
+
+impl Drop for LiveWork {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}
+
+/// Tells `listener` the events of a report.
+pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) {
+    match report {
+        Report::Done { timestamp_ns, output } => {
+            listener(Event::Hologram(output.hologram));
+            if let Some(change) = output.change {
+                listener(Event::QualityChanged { timestamp_ns, change });
+            }
+        }
+        Report::Dropped { timestamp_ns, reason } => listener(Event::Dropped { timestamp_ns, reason }),
+        Report::Failed { timestamp_ns, error } => listener(Event::Failed { timestamp_ns, error }),
+        Report::ListenerPanicked => lock(&shared.recent).listener_panics += 1,
+        Report::Closed => listener(Event::Closed),
+    }
+}
