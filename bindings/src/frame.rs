@@ -255,7 +255,7 @@ impl FrameInfo {
         let mut frame = CameraFrame::new(self.timestamp_ns, colour, depth);
         frame.orientation = input::Orientation {
             rotation: match self.orientation.rotation {
-                Rotation::Upright => input::Rotation::None,
+                Rotation::Upright => input::Rotation::Upright,
                 Rotation::Clockwise90 => input::Rotation::Clockwise90,
                 Rotation::Half => input::Rotation::Half,
                 Rotation::Clockwise270 => input::Rotation::Clockwise270,

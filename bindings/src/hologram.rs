@@ -34,8 +34,8 @@ pub struct HologramInfo {
     pub far_m: Option<f32>,
     /// The share of the depth sensor's pixels that had a usable reading.
     pub valid_depth: f32,
-    /// The rung of the ladder that it was made on, 0 the best.
-    pub rung: u32,
+    /// The quality level that it was made at, 0 the best.
+    pub quality_level: u32,
     /// How long each stage took.
     pub times: FrameTimes,
 }
@@ -62,7 +62,7 @@ impl RawHologram {
                 near_m,
                 far_m,
                 valid_depth: self.core.valid_depth(),
-                rung: self.core.rung() as u32,
+                quality_level: self.core.quality_level() as u32,
                 times: self.core.times().into(),
             })
         })

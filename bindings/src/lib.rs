@@ -33,8 +33,8 @@ pub use hologram::{HologramInfo, RawHologram, RawImage, RawPlanes};
 pub use log::{LogLevel, LogListener, set_log_listener};
 pub use network::{DeepPair, Network, NetworkInfo, built_in_pair};
 pub use options::{
-    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, Rung, RunningMode, SessionOptions,
-    Thermal, session_options,
+    Backend, Brightness, DepthRange, Encoding, Layout, Method, Placement, Quality, QualityLevel, RunningMode,
+    SessionOptions, Thermal, session_options,
 };
 pub use session::{DropReason, QualityChange, QualityReason, RawSession, SessionListener};
 pub use statistics::{Drops, FrameTimes, Statistics};

@@ -12,10 +12,10 @@ use std::sync::Arc;
 pub enum RunningMode {
     /// Each frame is answered by itself.
     Image,
-    /// Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
+    /// Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
     Video,
     /// Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
-    LiveStream,
+    Live,
 }
 
 /// How the field becomes phases.
@@ -46,7 +46,7 @@ pub enum Encoding {
 #[derive(Debug, Clone, Copy, PartialEq, uniffi::Enum)]
 pub enum Brightness {
     /// Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
-    Steady,
+    Smoothed,
     /// This one; what is brighter is clipped.
     Fixed {
         /// The amplitude.
@@ -80,9 +80,9 @@ pub enum Method {
     },
     /// The plane sweep, for any display: slower, and nothing needs to be trained.
     Sweep,
-    /// For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained
-    /// network where it is ragged, as sensors' depth is.
-    BySharpness {
+    /// For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
+    /// network where it is noisy or incomplete, as sensors' depth is.
+    Auto {
         /// The network, for the session's display.
         network: Arc<Network>,
     },
@@ -91,17 +91,17 @@ pub enum Method {
 /// One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
 /// shown in its middle.
 #[derive(Debug, Clone, uniffi::Record)]
-pub struct Rung {
+pub struct QualityLevel {
     /// What makes the hologram.
     pub method: Method,
     /// Width of the hologram, pixels.
     pub width: u32,
     /// Height of the hologram, pixels.
     pub height: u32,
-    /// Local steps of this rung; none for the session's.
+    /// Local steps of this quality level; none for the session's.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
-    /// Steps at the midpoint of this rung; none for the session's.
+    /// Steps at the midpoint of this quality level; none for the session's.
     #[uniffi(default = None)]
     pub midpoint_steps: Option<u32>,
 }
@@ -109,26 +109,26 @@ pub struct Rung {
 /// Whether a session may change its quality.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum Quality {
-    /// It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up
+    /// It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
     /// where there is room.
     Adaptive,
-    /// It stays on this rung.
+    /// It stays at this quality level.
     Fixed {
         /// 0 the best.
-        rung: u32,
+        quality_level: u32,
     },
 }
 
 /// How hot the device is, as its system says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Enum)]
 pub enum Thermal {
-    /// Nothing to heed.
+    /// Not warm: nothing is limited.
     Nominal,
     /// Warm: frames may take a little less time.
     Fair,
     /// Hot: half the time.
     Serious,
-    /// Too hot: the lowest rung.
+    /// Too hot: the lowest quality level.
     Critical,
 }
 
@@ -142,14 +142,14 @@ pub enum Backend {
     Gpu,
 }
 
-/// What a session makes, and how. [`session_options`] has what is usual; change what is not.
+/// What a session makes, and how. [`session_options`] gives the defaults; change what differs.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct SessionOptions {
     /// What holograms are for.
     pub target: Arc<Target>,
     /// Quality levels, the best first: 1 to 16.
-    pub ladder: Vec<Rung>,
-    /// Whether the session may step on the ladder by itself.
+    pub quality_levels: Vec<QualityLevel>,
+    /// Whether the session may change its quality level by itself.
     pub quality: Quality,
     /// Frames a second that are aimed at; none takes frames as they come and never steps.
     pub target_rate_hz: Option<f64>,
@@ -175,8 +175,8 @@ pub struct SessionOptions {
     pub least_confidence: f32,
     /// Threads to compute with, at most 256; none for as many as the device has.
     pub threads: Option<u32>,
-    /// Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
-    /// of them.
+    /// Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
+    /// multiple of them.
     #[uniffi(default = 33554432)]
     pub most_pixels: u64,
     /// Where frames are computed.
@@ -237,16 +237,14 @@ impl Method {
         match self {
             Method::Trained { network } => phasefront::Method::trained(network.core.clone()),
             Method::Sweep => phasefront::Method::Sweep(Sweep::for_display(display)),
-            Method::BySharpness { network } => {
-                phasefront::Method::BySharpness(Sweep::for_display(display), network.core.clone())
-            }
+            Method::Auto { network } => phasefront::Method::Auto(Sweep::for_display(display), network.core.clone()),
         }
     }
 }
 
-/// What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
+/// The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
 /// correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
-/// the display; steady brightness, near and far by percentiles.
+/// the display; smoothed brightness, near and far by percentiles.
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
@@ -280,23 +278,25 @@ impl SessionOptions {
             phasefront::Method::Network(core) | phasefront::Method::Seeded(core) => {
                 Method::Trained { network: network(core) }
             }
-            phasefront::Method::BySharpness(_, core) => Method::BySharpness { network: network(core) },
+            phasefront::Method::Auto(_, core) => Method::Auto { network: network(core) },
             _ => Method::Sweep,
         };
         SessionOptions {
             target,
-            ladder: (core.ladder.iter())
-                .map(|rung| Rung {
-                    method: method(&rung.method),
-                    width: rung.width as u32,
-                    height: rung.height as u32,
+            quality_levels: (core.quality_levels.iter())
+                .map(|quality_level| QualityLevel {
+                    method: method(&quality_level.method),
+                    width: quality_level.width as u32,
+                    height: quality_level.height as u32,
                     local_steps: None,
                     midpoint_steps: None,
                 })
                 .collect(),
             quality: match core.quality {
                 session::Quality::Adaptive => Quality::Adaptive,
-                session::Quality::Fixed(rung) => Quality::Fixed { rung: rung as u32 },
+                session::Quality::Fixed(quality_level) => Quality::Fixed {
+                    quality_level: quality_level as u32,
+                },
             },
             target_rate_hz: core.target_rate_hz,
             encoding: match &core.encoder.encoding {
@@ -311,7 +311,7 @@ impl SessionOptions {
                 _ => Encoding::DoublePhase,
             },
             brightness: match core.encoder.brightness {
-                phasefront::Brightness::Steady => Brightness::Steady,
+                phasefront::Brightness::Smoothed => Brightness::Smoothed,
                 phasefront::Brightness::Fixed(scale) => Brightness::Fixed { scale },
                 phasefront::Brightness::FrameMax => Brightness::FrameMax,
             },
@@ -337,13 +337,13 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
     type Error = PhasefrontError;
 
     fn try_from(options: &SessionOptions) -> Result<Self, PhasefrontError> {
-        let [best, ..] = options.ladder.as_slice() else {
+        let [best, ..] = options.quality_levels.as_slice() else {
             return Err(PhasefrontError::Setting(
-                "the ladder is empty; give at least one rung: a method and a resolution".into(),
+                "there are no quality levels; give at least one: a method and a resolution".into(),
             ));
         };
         let target = options.target.core.clone();
-        let method = |rung: &Rung| rung.method.core(&target.display);
+        let method = |quality_level: &QualityLevel| quality_level.method.core(&target.display);
         let mut to = session::SessionOptions::new(target.clone(), method(best));
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
@@ -364,19 +364,19 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             ..usual
         };
         to.encoder.brightness = match options.brightness {
-            Brightness::Steady => phasefront::Brightness::Steady,
+            Brightness::Smoothed => phasefront::Brightness::Smoothed,
             Brightness::Fixed { scale } => phasefront::Brightness::Fixed(scale),
             Brightness::FrameMax => phasefront::Brightness::FrameMax,
         };
-        to.ladder = (options.ladder.iter())
-            .map(|rung| session::Rung {
-                method: method(rung),
-                height: rung.height as usize,
-                width: rung.width as usize,
+        to.quality_levels = (options.quality_levels.iter())
+            .map(|quality_level| session::QualityLevel {
+                method: method(quality_level),
+                height: quality_level.height as usize,
+                width: quality_level.width as usize,
                 backend: None,
                 encoder: Some(phasefront::EncoderOptions {
-                    local_steps: steps(rung.local_steps, to.encoder.local_steps),
-                    midpoint_steps: steps(rung.midpoint_steps, to.encoder.midpoint_steps),
+                    local_steps: steps(quality_level.local_steps, to.encoder.local_steps),
+                    midpoint_steps: steps(quality_level.midpoint_steps, to.encoder.midpoint_steps),
                     ..to.encoder.clone()
                 }),
             })
@@ -405,7 +405,7 @@ impl From<Quality> for session::Quality {
     fn from(quality: Quality) -> Self {
         match quality {
             Quality::Adaptive => session::Quality::Adaptive,
-            Quality::Fixed { rung } => session::Quality::Fixed(rung as usize),
+            Quality::Fixed { quality_level } => session::Quality::Fixed(quality_level as usize),
         }
     }
 }

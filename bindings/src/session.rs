@@ -55,19 +55,20 @@ pub enum QualityReason {
     Thermal,
     /// The caller said so.
     Asked,
-    /// The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+    /// again.
     Refused,
     /// For a reason that this version of the bindings does not know.
     Other,
 }
 
-/// A step on the ladder.
+/// A change of the quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, uniffi::Record)]
 pub struct QualityChange {
-    /// The rung before.
-    pub from_rung: u32,
-    /// The rung now; the one before where the step was refused.
-    pub to_rung: u32,
+    /// The quality level before.
+    pub from_quality_level: u32,
+    /// The quality level now; the one before where the step was refused.
+    pub to_quality_level: u32,
     /// Why.
     pub reason: QualityReason,
 }
@@ -77,7 +78,7 @@ pub struct QualityChange {
 #[uniffi::export(foreign)]
 pub trait SessionListener: Send + Sync {
     /// A frame became a hologram.
-    fn on_hologram(&self, hologram: Arc<RawHologram>) -> Result<(), ListenerError>;
+    fn on_processed(&self, hologram: Arc<RawHologram>) -> Result<(), ListenerError>;
 
     /// A frame was dropped.
     fn on_dropped(&self, timestamp_ns: u64, reason: DropReason) -> Result<(), ListenerError>;
@@ -85,7 +86,7 @@ pub trait SessionListener: Send + Sync {
     /// A frame could not be processed. The session goes on.
     fn on_failed(&self, timestamp_ns: u64, message: String) -> Result<(), ListenerError>;
 
-    /// The frames after this one are made on another rung of the ladder.
+    /// The frames after this one are made at another quality level.
     fn on_quality_changed(&self, timestamp_ns: u64, change: QualityChange) -> Result<(), ListenerError>;
 
     /// The session is closed and its memory is given back. This is the last call, made exactly once, also where
@@ -120,7 +121,7 @@ impl RawSession {
             let core = match (mode, listener) {
                 (RunningMode::Image, None) => Core::Image(ImageSession::new(options)?),
                 (RunningMode::Video, None) => Core::Video(VideoSession::new(options)?),
-                (RunningMode::LiveStream, Some(listener)) => {
+                (RunningMode::Live, Some(listener)) => {
                     let failures = listener_failures.clone();
                     let session = LiveSession::new(options, move |event| {
                         if let Err(error) = tell(&*listener, event) {
@@ -130,7 +131,7 @@ impl RawSession {
                     })?;
                     Core::Live(session)
                 }
-                (RunningMode::LiveStream, None) => {
+                (RunningMode::Live, None) => {
                     return Err(PhasefrontError::Session(
                         "session: a live one needs a listener, which hears its results".into(),
                     ));
@@ -255,10 +256,10 @@ impl RawSession {
         })
     }
 
-    /// Allows or forbids steps on the ladder.
+    /// Allows or forbids changes of the quality level.
     ///
     /// # Errors
-    /// A rung that is not on the ladder.
+    /// A quality level that the session does not have.
     pub fn set_quality(&self, quality: Quality) -> Result<(), PhasefrontError> {
         guard(|| Ok(self.session()?.set_quality(quality.into())?))
     }
@@ -314,7 +315,7 @@ impl Deref for Core {
 /// Tells `listener` of `event`.
 fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerError> {
     match event {
-        Event::Hologram(hologram) => listener.on_hologram(RawHologram::new(hologram)),
+        Event::Processed(hologram) => listener.on_processed(RawHologram::new(hologram)),
         Event::Dropped { timestamp_ns, reason } => listener.on_dropped(timestamp_ns, reason.into()),
         Event::Failed { timestamp_ns, error } => {
             log::warn!("the frame of {timestamp_ns} ns failed: {error}");
@@ -329,10 +330,10 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerErro
                 session::QualityReason::Refused => QualityReason::Refused,
                 _ => QualityReason::Other,
             };
-            log::info!("from rung {} to {}: {reason:?}", change.from, change.to);
+            log::info!("from quality level {} to {}: {reason:?}", change.from, change.to);
             let change = QualityChange {
-                from_rung: change.from as u32,
-                to_rung: change.to as u32,
+                from_quality_level: change.from as u32,
+                to_quality_level: change.to as u32,
                 reason,
             };
             listener.on_quality_changed(timestamp_ns, change)

@@ -74,8 +74,8 @@ pub struct Statistics {
     pub backend: String,
     /// Why that.
     pub backend_why: String,
-    /// The rung of the ladder, 0 the best.
-    pub rung: u32,
+    /// The quality level, 0 the best.
+    pub quality_level: u32,
     /// How often the listener threw.
     pub listener_failures: u64,
 }
@@ -108,7 +108,7 @@ impl Statistics {
             times: core.times.into(),
             backend: core.backend.name,
             backend_why: core.backend.why,
-            rung: core.rung as u32,
+            quality_level: core.quality_level as u32,
             listener_failures: core.listener_panics + listener_failures,
         }
     }

@@ -17,7 +17,7 @@ pub enum Stage {
     Frame,
     /// Colour: turned, converted, resized.
     Colour,
-    /// Depth: read, aligned, steadied, refined.
+    /// Depth: read, aligned, smoothed over time, refined.
     Depth,
     /// From the frame to the midpoint hologram.
     Method,
@@ -29,7 +29,7 @@ pub enum Stage {
     Midpoint,
     /// A frame that a GPU computes, with the ways there and back.
     Gpu,
-    /// Plans and memory of a rung are made.
+    /// Plans and memory of a quality level are made.
     Plan,
     /// A small view.
     Preview,

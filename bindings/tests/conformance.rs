@@ -82,7 +82,7 @@ fn options(case: &Value) -> SessionOptions {
             network: Network::built_in("rgbd-8").unwrap(),
         },
         "sweep" => Method::Sweep,
-        "by-sharpness" => Method::BySharpness {
+        "auto" => Method::Auto {
             network: Network::built_in("rgbd-8").unwrap(),
         },
         file => Method::Trained { network: model(file) },
@@ -95,7 +95,7 @@ fn options(case: &Value) -> SessionOptions {
             file => Encoding::Deep { prefilter: model(file) },
         },
         brightness: match &case["brightness"] {
-            Value::Null => Brightness::Steady,
+            Value::Null => Brightness::Smoothed,
             scale => Brightness::Fixed {
                 scale: scale.as_f64().unwrap() as f32,
             },
@@ -574,7 +574,7 @@ mod write {
         cases.push(one);
 
         let mut one = case("what suits the depth", vec![plain.clone()]);
-        one["method"] = json!("by-sharpness");
+        one["method"] = json!("auto");
         cases.push(one);
 
         let mut one = case("the plane sweep, for a display that no network is for", vec![plain]);

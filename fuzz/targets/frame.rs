@@ -96,7 +96,7 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
     let depth_strides = (numbers.size().wrapping_mul(4), numbers.size());
     let confidence = numbers.byte();
     let orientation = Orientation {
-        rotation: numbers.of(&[Rotation::None, Rotation::Clockwise90, Rotation::Half, Rotation::Clockwise270]),
+        rotation: numbers.of(&[Rotation::Upright, Rotation::Clockwise90, Rotation::Half, Rotation::Clockwise270]),
         mirrored: numbers.of(&[false, true]),
     };
     let cameras = (numbers.byte() % 3 == 0).then(|| {

@@ -21,15 +21,15 @@ const RANGE_M: (f32, f32) = (0.5, 2.5);
 /// Frames of a second.
 const RATE_HZ: u64 = 30;
 
-/// What steadies a session's frames, and how what is shown is corrected.
+/// What smooths a session's frames, and how what is shown is corrected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Its name in tables.
     pub name: &'static str,
-    /// Whether frames have a past: depth is steadied.
+    /// Whether frames have a past: depth is smoothed over time.
     pub video: bool,
-    /// Whether brightness is [`Brightness::Steady`]; if not, it is [`Brightness::FrameMax`].
-    pub steady: bool,
+    /// Whether brightness is [`Brightness::Smoothed`]; if not, it is [`Brightness::FrameMax`].
+    pub smoothed: bool,
     /// As in [`EncoderOptions`].
     pub dark: f32,
     /// As in [`EncoderOptions`].
@@ -42,32 +42,32 @@ pub struct Setting {
 const ALONE: Setting = Setting {
     name: "each frame by itself",
     video: false,
-    steady: false,
+    smoothed: false,
     dark: EncoderOptions::DARK,
     local_steps: 1,
     midpoint_steps: 0,
 };
 
-/// Depth and brightness steadied.
+/// Depth and brightness smoothed.
 const BOTH: Setting = Setting {
     name: "both",
     video: true,
-    steady: true,
+    smoothed: true,
     ..ALONE
 };
 
-/// Nothing steadied, each, and both; then both without correction, and with one step at the midpoint that goes on from
+/// Nothing smoothed, each, and both; then both without correction, and with one step at the midpoint that goes on from
 /// the frame before.
 pub const SETTINGS: [Setting; 6] = [
     ALONE,
     Setting {
-        name: "depth steadied",
+        name: "depth smoothed",
         video: true,
         ..ALONE
     },
     Setting {
-        name: "brightness steady",
-        steady: true,
+        name: "brightness smoothed",
+        smoothed: true,
         ..ALONE
     },
     BOTH,
@@ -87,7 +87,7 @@ pub const SETTINGS: [Setting; 6] = [
 /// What changes from frame to frame: root mean squares over the frames.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What steadied the frames.
+    /// What smoothed the frames.
     pub setting: &'static str,
     /// The change of the picture's mean brightness, of that brightness.
     pub brightness: f64,
@@ -125,8 +125,8 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 dark: setting.dark,
                 local_steps: setting.local_steps,
                 midpoint_steps: setting.midpoint_steps,
-                brightness: match setting.steady {
-                    true => Brightness::Steady,
+                brightness: match setting.smoothed {
+                    true => Brightness::Smoothed,
                     false => Brightness::FrameMax,
                 },
                 ..options.encoder

@@ -5,7 +5,7 @@
 //! use phasefront::Display;
 //!
 //! let options = phasefront_models::session_options(Display::default().with_offset_m(6e-3)?);
-//! assert_eq!(options.ladder.len(), 1);
+//! assert_eq!(options.quality_levels.len(), 1);
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 
@@ -151,16 +151,16 @@ pub fn pair_for(display: &Display, precision: Precision) -> Option<DeepPair> {
     pairs.find(|pair| pair.prefilter.check_prefilter(display).is_ok())
 }
 
-/// The network that is usual for `display`: 8 layers, in int8; None where it was not trained for it.
-pub fn usual_network(display: &Display) -> Option<Arc<Network>> {
+/// The default network for `display`: 8 layers, in int8; None where it was not trained for it.
+pub fn default_network(display: &Display) -> Option<Arc<Network>> {
     network("rgbd-8", Precision::Int8).filter(|network| network.check_display(display).is_ok())
 }
 
-/// What is usual for `target`: a network where one was trained for its display, else the plane sweep; AA-DPM with one
-/// local step.
+/// The default options for `target`: a network where one was trained for its display, else the plane sweep; AA-DPM with
+/// one local step.
 pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     let target = target.into();
-    let method = match usual_network(&target.display) {
+    let method = match default_network(&target.display) {
         Some(network) => Method::Network(network),
         None => Method::Sweep(Sweep::for_display(&target.display)),
     };
@@ -208,7 +208,7 @@ mod tests {
         ] {
             let display = Display::from_toml(display).unwrap();
             assert_eq!(pair_for(&display, Precision::Int8).is_some(), paired);
-            let method = &session_options(display).ladder[0].method;
+            let method = &session_options(display).quality_levels[0].method;
             assert_eq!(matches!(method, Method::Network(_)), trained, "{method:?}");
             assert_eq!(matches!(method, Method::Sweep(_)), !trained, "{method:?}");
         }

@@ -10,7 +10,7 @@ pub enum Brightness {
     /// The amplitude that all but one of a thousand stay under, in a session smoothed over a second. What is brighter
     /// is clipped.
     #[default]
-    Steady,
+    Smoothed,
     /// This one, always. What is brighter is clipped.
     Fixed(f32),
     /// Each frame's own largest amplitude: nothing is clipped, and video flickers.
@@ -29,17 +29,17 @@ impl Brightness {
         }
     }
 
-    /// The scale of `field`, which a steady one comes to from `past`; None for the field's largest amplitude.
+    /// The scale of `field`, which a smoothed one comes to from `past`; None for the field's largest amplitude.
     pub(crate) fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
         match self {
             Brightness::FrameMax => None,
             Brightness::Fixed(scale) => Some(scale),
-            Brightness::Steady => Some(percentile.scale(field, past)),
+            Brightness::Smoothed => Some(percentile.scale(field, past)),
         }
     }
 }
 
-/// Where a steady scale comes from.
+/// Where a smoothed scale comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(not(feature = "gpu"), allow(unreachable_pub))] // `gpu` hands it on.
 pub struct Past {

@@ -1,5 +1,5 @@
 //! Depth as sensors and files give it, to normalized depth: units, range, holes; and the depth images of phones,
-//! aligned with colour, steadied over time, and refined to the display's resolution.
+//! aligned with colour, smoothed over time, and refined to the display's resolution.
 //!
 //! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
 
@@ -10,7 +10,7 @@ pub mod range;
 pub mod refine;
 pub mod refine_reference;
 pub mod sharpness;
-pub mod steady;
+pub mod smoothing;
 pub mod stream;
 
 use crate::error::{Error, Result};

@@ -77,14 +77,14 @@ impl EncoderOptions {
 }
 
 impl Default for EncoderOptions {
-    /// AA-DPM, corrected by one local step; steady brightness.
+    /// AA-DPM, corrected by one local step; smoothed brightness.
     fn default() -> Self {
         Encoding::ANTI_ALIAS.into()
     }
 }
 
 impl From<Encoding> for EncoderOptions {
-    /// This encoding, steady brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two:
+    /// This encoding, smoothed brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two:
     /// with it both are 0.
     fn from(encoding: Encoding) -> Self {
         let (dark, local_steps) = match encoding {

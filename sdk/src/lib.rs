@@ -33,7 +33,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | [`session`] | many frames: live, video, images; ladder of qualities, statistics, events |
+//! | [`session`] | many frames: live, video, images; quality levels, statistics, events |
 //! | [`input`] | what cameras give: colour and depth images, their formats, orientation, two cameras |
 //! | [`Method`] | how a hologram is made: a [`Network`], the plane [`Sweep`], or both |
 //! | [`target`] | what it is made for: display, modulator's response, lasers' light, correction of the optics |

@@ -21,9 +21,9 @@ pub enum Method {
     Sweep(Sweep),
     /// The plane sweep, corrected by a network trained on it.
     Seeded(Arc<Network>),
-    /// For each frame what suits its depth ([`sharpness::measure`]): the plane sweep where it is sharp, the trained
-    /// network where it is ragged.
-    BySharpness(Sweep, Arc<Network>),
+    /// For each frame what suits its depth ([`sharpness::measure`]): the plane sweep where it is clean, the trained
+    /// network where it is noisy or incomplete.
+    Auto(Sweep, Arc<Network>),
 }
 
 impl Method {
@@ -42,7 +42,7 @@ impl Method {
             Method::Network(network) if network.input() == InputKind::RgbdXy => (network, InputKind::RgbdXy),
             Method::Network(network) => (network, InputKind::Rgbd),
             Method::Seeded(network) => (network, InputKind::Seeded),
-            Method::BySharpness(_, network) => {
+            Method::Auto(_, network) => {
                 return Method::trained(network.clone()).check(display);
             }
         };
@@ -72,7 +72,7 @@ enum Way {
     Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
     Seeded(Box<SeededPlan>),
-    BySharpness(Box<SweepPlan>, Box<MethodPlan>),
+    Auto(Box<SweepPlan>, Box<MethodPlan>),
 }
 
 /// Working memory of a [`MethodPlan`] for one frame at a time.
@@ -82,7 +82,7 @@ enum Scratch {
     Network(NetworkScratch),
     Sweep(SweepScratch),
     Seeded(SeededScratch),
-    BySharpness {
+    Auto {
         sweep: SweepScratch,
         trained: Box<MethodScratch>,
         /// Whether the frame before was sharp.
@@ -92,14 +92,14 @@ enum Scratch {
 
 impl MethodScratch {
     /// Has frames end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         match &mut self.0 {
-            Scratch::Network(scratch) => scratch.heed(cancel),
-            Scratch::Sweep(scratch) => scratch.heed(cancel),
-            Scratch::Seeded(scratch) => scratch.heed(cancel),
-            Scratch::BySharpness { sweep, trained, .. } => {
-                sweep.heed(cancel);
-                trained.heed(cancel);
+            Scratch::Network(scratch) => scratch.set_cancel(cancel),
+            Scratch::Sweep(scratch) => scratch.set_cancel(cancel),
+            Scratch::Seeded(scratch) => scratch.set_cancel(cancel),
+            Scratch::Auto { sweep, trained, .. } => {
+                sweep.set_cancel(cancel);
+                trained.set_cancel(cancel);
             }
         }
     }
@@ -119,11 +119,11 @@ impl MethodPlan {
                 Way::Seeded(Box::new(plan))
             }
             Method::Sweep(sweep) => Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
-            Method::BySharpness(sweep, network) => {
+            Method::Auto(sweep, network) => {
                 // Both end where the network does.
                 let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
                 let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
-                Way::BySharpness(Box::new(sweep), Box::new(trained))
+                Way::Auto(Box::new(sweep), Box::new(trained))
             }
         };
         Ok(MethodPlan {
@@ -142,7 +142,7 @@ impl MethodPlan {
     /// far away, all else ends at the midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.way {
-            Way::Network(_) | Way::Seeded(_) | Way::BySharpness(..) => 0.0,
+            Way::Network(_) | Way::Seeded(_) | Way::Auto(..) => 0.0,
             Way::Sweep(plan) => plan.z_m(),
         }
     }
@@ -152,7 +152,7 @@ impl MethodPlan {
         match &self.way {
             Way::Network(plan) => Some(plan.engine()),
             Way::Seeded(plan) => Some(plan.engine()),
-            Way::BySharpness(_, trained) => trained.engine(),
+            Way::Auto(_, trained) => trained.engine(),
             Way::Sweep(_) => None,
         }
     }
@@ -163,7 +163,7 @@ impl MethodPlan {
             Way::Network(plan) => Scratch::Network(plan.scratch()),
             Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
             Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
-            Way::BySharpness(sweep, trained) => Scratch::BySharpness {
+            Way::Auto(sweep, trained) => Scratch::Auto {
                 sweep: sweep.scratch(),
                 trained: Box::new(trained.scratch()),
                 was_sharp: None,
@@ -197,8 +197,8 @@ impl MethodPlan {
             (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
             (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
             (
-                Way::BySharpness(sweep, trained),
-                Scratch::BySharpness {
+                Way::Auto(sweep, trained),
+                Scratch::Auto {
                     sweep: of_sweep,
                     trained: of_trained,
                     was_sharp,

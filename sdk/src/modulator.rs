@@ -51,10 +51,10 @@ pub struct ModulatorScratch {
 
 impl ModulatorScratch {
     /// Has fields end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
-        self.encoder.heed(cancel);
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
+        self.encoder.set_cancel(cancel);
         if let Some(midpoint) = &mut self.midpoint {
-            midpoint.heed(cancel);
+            midpoint.set_cancel(cancel);
         }
         self.cancel = cancel.clone();
     }
@@ -173,7 +173,7 @@ impl Modulator {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] of a frame that follows another: steady brightness comes from `past`, and steps at the
+    /// [`Self::modulate`] of a frame that follows another: smoothed brightness comes from `past`, and steps at the
     /// midpoint go on where the frame before ended.
     pub(crate) fn modulate_after(
         &self,

@@ -451,7 +451,7 @@ pub struct NetworkScratch {
 
 impl NetworkScratch {
     /// Has runs end where `cancel` is requested; those on tract go on to their end.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         self.fused.cancel = cancel.clone();
     }
 

@@ -56,9 +56,9 @@ pub struct FrameReport {
 
 impl PipelineScratch {
     /// Has frames end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
-        self.method.heed(cancel);
-        self.modulator.heed(cancel);
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
+        self.method.set_cancel(cancel);
+        self.modulator.set_cancel(cancel);
     }
 }
 
@@ -248,7 +248,7 @@ mod tests {
             (Method::Network(int8.clone()), deep),
             (Method::Seeded(seeded), EncoderOptions::default()),
             (Method::Sweep(sweep), steps),
-            (Method::BySharpness(sweep, int8), EncoderOptions::default()),
+            (Method::Auto(sweep, int8), EncoderOptions::default()),
         ] {
             let pipeline = Pipeline::new((height, width), method, &target, &options).unwrap();
             let values = 3 * height * width;
@@ -261,7 +261,7 @@ mod tests {
             let whole = run(&mut pipeline.scratch());
             assert!(whole.1.iter().any(|level| *level != 77));
             let (mut scratch, cancel) = (pipeline.scratch(), Cancel::default());
-            scratch.heed(&cancel);
+            scratch.set_cancel(&cancel);
             cancel.request();
             let (field, levels) = run(&mut scratch);
             // But for the mean phase, which every value is turned by.

@@ -38,9 +38,9 @@ pub struct SeededScratch {
 
 impl SeededScratch {
     /// Has frames end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
-        self.sweep.heed(cancel);
-        self.network.heed(cancel);
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
+        self.sweep.set_cancel(cancel);
+        self.network.set_cancel(cancel);
     }
 }
 

@@ -1,12 +1,12 @@
 //! Many frames: what an app feeds with camera frames and gets holograms from.
 //!
-//! An [`ImageSession`] answers each frame by itself. A [`VideoSession`] answers each frame too, and steadies depth and
-//! brightness from one to the next. A [`LiveSession`] takes frames without ever waiting, works on one while the newest
+//! An [`ImageSession`] answers each frame by itself. A [`VideoSession`] answers each frame too, and smooths depth and
+//! brightness over time. A [`LiveSession`] takes frames without ever waiting, works on one while the newest
 //! waits, and tells its listener of every result and every drop. What all three can do is their [`SessionHandle`]'s.
 //!
 //! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
-//! happens to a frame; `engine` is where CPU and GPU meet; `quality` is the ladder. One frame by itself, without a
-//! camera's formats, is [`crate::Pipeline`]'s.
+//! happens to a frame; `engine` is where CPU and GPU meet; `quality` chooses the quality level. One frame by itself,
+//! without a camera's formats, is [`crate::Pipeline`]'s.
 
 mod brightness;
 mod computing;
@@ -35,7 +35,7 @@ pub use hologram::Hologram;
 #[cfg(feature = "gpu")]
 pub use on_gpu::GpuOptions;
 pub use options::{MOST_PIXELS, MOST_QUALITY_LEVELS, MOST_THREADS, SessionOptions};
-pub use quality::{Backend, Quality, QualityChange, QualityReason, Rung, Thermal};
+pub use quality::{Backend, Quality, QualityChange, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
 use crate::depth::camera::CameraFrame;
@@ -66,7 +66,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Debug)]
 pub struct ImageSession(Answering);
 
-/// Makes a hologram of each frame of a video; depth and brightness are steadied from one to the next. Timestamps must
+/// Makes a hologram of each frame of a video; depth and brightness are smoothed over time. Timestamps must
 /// rise. Threads and processes as [`ImageSession`] says.
 #[derive(Debug)]
 pub struct VideoSession(Answering);
@@ -85,7 +85,7 @@ pub struct VideoSession(Answering);
 /// let method = Method::Network(Arc::new(network));
 /// let options = SessionOptions::new(Display::default(), method);
 /// let session = LiveSession::new(options, |event| match event {
-///     Event::Hologram(hologram) => println!("{} bytes", hologram.levels().len()),
+///     Event::Processed(hologram) => println!("{} bytes", hologram.levels().len()),
 ///     other => println!("{other:?}"),
 /// })?;
 /// loop {
@@ -151,7 +151,7 @@ impl VideoSession {
 
     /// Takes up a video where it was left: does for `frame` what the frames after it need, without making its hologram,
     /// which got `scale` ([`Hologram::scale`]). Frames that follow become what they would have become after
-    /// [`Self::process`] of it, but for what remembers more: a method chosen by sharpness, and steps at the midpoint.
+    /// [`Self::process`] of it, but for what remembers more: a method chosen automatically, and steps at the midpoint.
     ///
     /// # Errors
     /// As [`Self::process`]; a scale that no hologram has.

@@ -185,7 +185,7 @@ pub struct SweepScratch {
 
 impl SweepScratch {
     /// Has frames end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
     }
 }

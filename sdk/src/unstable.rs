@@ -1,7 +1,7 @@
 //! The rooms of the core as they are inside, for the laboratory, the tests and the benchmarks. Nothing here is
 //! promised: it changes without notice, in any release.
 
-/// Depth: units, holes, alignment, steadying, refinement.
+/// Depth: units, holes, alignment, temporal smoothing, refinement.
 pub mod depth {
     pub use crate::depth::*;
 }

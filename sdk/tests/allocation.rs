@@ -165,7 +165,7 @@ fn hot_calls_allocate_nothing() {
             for method in [
                 Method::Sweep(Sweep::for_display(&display)),
                 Method::trained(seeded.clone()),
-                Method::BySharpness(Sweep::for_display(&display), seeded.clone()),
+                Method::Auto(Sweep::for_display(&display), seeded.clone()),
             ] {
                 let plan = MethodPlan::new(h, w, method.clone(), &display).unwrap();
                 let mut scratch = plan.scratch();

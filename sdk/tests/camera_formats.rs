@@ -10,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 
 fn orientations() -> impl Iterator<Item = Orientation> {
     [
-        Rotation::None,
+        Rotation::Upright,
         Rotation::Clockwise90,
         Rotation::Half,
         Rotation::Clockwise270,

@@ -64,7 +64,7 @@ fn every_method_gives_the_same_levels_on_any_number_of_threads() {
         ("on tract", Method::Network(network(&Model::new(3, 5)))),
         ("sweep", Method::Sweep(sweep)),
         ("seeded", Method::Seeded(network(&seeded))),
-        ("by sharpness", Method::BySharpness(sweep, int8)),
+        ("auto", Method::Auto(sweep, int8)),
     ] {
         check(name, &SessionOptions::new(display(), method));
     }

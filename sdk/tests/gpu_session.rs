@@ -44,7 +44,7 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
     let gpu = on_gpu(plain.clone());
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
-    for brightness in [Brightness::Steady, Brightness::Fixed(0.9), Brightness::FrameMax] {
+    for brightness in [Brightness::Smoothed, Brightness::Fixed(0.9), Brightness::FrameMax] {
         let (mut plain, mut gpu) = (plain.clone(), gpu.clone());
         (plain.encoder.brightness, gpu.encoder.brightness) = (brightness, brightness);
         if brightness == Brightness::FrameMax {
@@ -85,7 +85,7 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
 fn images_of_an_f32_network_are_near_the_cpus() {
     let mut plain = options(W, H);
     let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
-    plain.ladder[0].method = Method::Network(Arc::new(network));
+    plain.quality_levels[0].method = Method::Network(Arc::new(network));
     let gpu = on_gpu(plain.clone());
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
@@ -106,14 +106,14 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     }
 }
 
-/// The plane sweep, by itself and under a network, on rungs of their own, from camera frames.
+/// The plane sweep, by itself and under a network, at quality levels of their own, from camera frames.
 #[test]
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(W, H);
     let seeded = Network::from_onnx(include_bytes!("../../models/seeded-6.onnx")).unwrap();
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
-        plain.ladder[0].method = method;
+        plain.quality_levels[0].method = method;
         let mut gpu = on_gpu(plain.clone());
         gpu.gpu.chain.float = Float::F32;
         let cpu = ImageSession::new(plain.clone()).unwrap();
@@ -157,7 +157,7 @@ fn cameras_may_change_their_format() {
 }
 
 #[test]
-fn video_is_as_steady_as_on_the_cpu() {
+fn video_is_as_smooth_as_on_the_cpu() {
     let plain = options(W, H);
     let gpu = on_gpu(plain.clone());
     let cpu = VideoSession::new(plain).unwrap();
@@ -223,7 +223,7 @@ fn a_live_session_outlives_its_device() {
                 device.wgpu().0.destroy();
             }
             match events.recv().unwrap() {
-                Event::Hologram(hologram) => {
+                Event::Processed(hologram) => {
                     assert_eq!(hologram.timestamp_ns(), timestamp);
                     let first = levels.get_or_insert_with(|| hologram.levels().to_vec());
                     assert!(differing(hologram.levels(), first, 0.0) < 0.01);
@@ -264,7 +264,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut cases = vec![(missing, "no GPU")];
     let gpu = on_gpu(options(W, H));
     let mut sweep = gpu.clone();
-    sweep.ladder[0].method = Method::Sweep(Sweep {
+    sweep.quality_levels[0].method = Method::Sweep(Sweep {
         taps: 31,
         ..Sweep::for_display(&sweep.target.display)
     });
@@ -272,25 +272,25 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut either = gpu.clone();
     let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
     let sweep = Sweep::for_display(&either.target.display);
-    either.ladder[0].method = Method::BySharpness(sweep, Arc::new(network));
+    either.quality_levels[0].method = Method::Auto(sweep, Arc::new(network));
     cases.push((either, "sharpness"));
     let text = "width = 64\nheight = 48\noffset_mm = 2\nbits = 10";
-    let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
+    let mut ten = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (ten.backend, ten.gpu) = (gpu.backend, gpu.gpu.clone());
     cases.push((ten, "8 bits"));
     let text = "width = 64\nheight = 48\noffset_mm = 2\nwavelengths_nm = [532]";
-    let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.ladder[0].method.clone());
+    let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
     cases.push((one, "one laser"));
     // A line that no workgroup's memory holds.
     let mut long = gpu.clone();
     let text = "width = 9000\nheight = 4\noffset_mm = 2";
     long.target.display = Display::from_toml(text).unwrap();
-    (long.ladder[0].height, long.ladder[0].width) = (4, 9000);
+    (long.quality_levels[0].height, long.quality_levels[0].width) = (4, 9000);
     cases.push((long, "workgroup"));
     let mut half = gpu.clone();
     let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
-    half.ladder[0].method = Method::Network(Arc::new(network));
+    half.quality_levels[0].method = Method::Network(Arc::new(network));
     half.gpu.chain.float = Float::F16;
     let device = phasefront::unstable::gpu::Device::open(&half.gpu.device).unwrap();
     if !device.has_half() {
@@ -313,25 +313,25 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     assert!(ImageSession::new(wrong).is_err());
 }
 
-/// A ladder whose rungs lie on the GPU and on the CPU.
+/// Quality levels that lie on the GPU and on the CPU.
 #[test]
-fn rungs_say_where_they_are_computed() {
+fn quality_levels_say_where_they_are_computed() {
     let mut options = on_gpu(options(W, H));
-    let mut low = options.ladder[0].clone();
+    let mut low = options.quality_levels[0].clone();
     low.backend = Some(Backend::Cpu);
     (low.height, low.width) = (H / 2, W / 2);
     let mut middle = low.clone();
     middle.backend = None;
-    options.ladder.extend([middle, low]);
+    options.quality_levels.extend([middle, low]);
     options.quality = Quality::Fixed(0);
     let session = VideoSession::new(options).unwrap();
     let device = session.gpu().unwrap();
     let mut names = Vec::new();
-    for (i, rung) in [0, 1, 2, 2, 0].into_iter().enumerate() {
-        session.set_quality(Quality::Fixed(rung)).unwrap();
+    for (i, quality_level) in [0, 1, 2, 2, 0].into_iter().enumerate() {
+        session.set_quality(Quality::Fixed(quality_level)).unwrap();
         session.process(&frame_at(2 * i as u64 + 1)).unwrap();
         let hologram = session.process(&frame_at(2 * i as u64 + 2)).unwrap();
-        assert_eq!(hologram.rung(), rung);
+        assert_eq!(hologram.quality_level(), quality_level);
         names.push(session.statistics().backend.name);
     }
     assert_eq!((&names[0], &names[1]), (&device.name(), &device.name()));
@@ -369,7 +369,7 @@ fn sessions_close_at_any_moment() {
         assert_eq!(told.len() as u64, round);
         assert!(told.iter().all(|event| matches!(
             event,
-            Event::Hologram(_)
+            Event::Processed(_)
                 | Event::Dropped {
                     reason: DropReason::Closed | DropReason::Superseded,
                     ..

@@ -45,7 +45,7 @@ fn nothing_grows_where_devices_go() {
                 device.wgpu().0.destroy();
             }
             match events.recv().unwrap() {
-                Event::Hologram(_) => made += 1,
+                Event::Processed(_) => made += 1,
                 Event::Failed {
                     error: Error::Lost(_), ..
                 } => lost += 1,

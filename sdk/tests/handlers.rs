@@ -66,7 +66,7 @@ fn handle(stage: &'static str, handler: impl Fn() + Send + Sync + 'static) {
 /// Options of two quality levels, so that the second is planned in the midst of a frame.
 fn two_levels() -> SessionOptions {
     let mut options = options(W, H);
-    options.ladder.push(options.ladder[0].clone());
+    options.quality_levels.push(options.quality_levels[0].clone());
     options.quality = Quality::Fixed(0);
     options
 }

@@ -9,7 +9,7 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, Rung, Submission, Thermal};
+use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, QualityLevel, Submission, Thermal};
 use phasefront::target::{Aberration, Response};
 use phasefront::unstable::refocus::Refocus;
 use phasefront::unstable::wave::aperture::Opening;
@@ -34,7 +34,7 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let hologram = session.process(&frame(5, &scene, &metres)).unwrap();
     assert_eq!(
-        (hologram.timestamp_ns(), hologram.shape(), hologram.rung()),
+        (hologram.timestamp_ns(), hologram.shape(), hologram.quality_level()),
         (5, (H, W), 0)
     );
     assert_eq!(hologram.levels().len(), 3 * H * W);
@@ -132,7 +132,7 @@ fn a_display_of_ten_bits_gets_words() {
     let eight = image_session().process(&frame(1, &scene, &metres)).unwrap();
     let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 2\nbits = 10").unwrap();
     let target = Target::from(display);
-    let method = options(W, H).ladder[0].method.clone();
+    let method = options(W, H).quality_levels[0].method.clone();
     let mut options = SessionOptions::new(target.clone(), method);
     let session = ImageSession::new(options.clone()).unwrap();
     let ten = session.process(&frame(1, &scene, &metres)).unwrap();
@@ -427,7 +427,7 @@ fn burst(events: &mpsc::Receiver<Event>, last: u64) -> (u64, u64, u64) {
     let (mut done, mut superseded, mut paused) = (0, 0, 0);
     loop {
         match events.recv().unwrap() {
-            Event::Hologram(hologram) => {
+            Event::Processed(hologram) => {
                 done += 1;
                 if hologram.timestamp_ns() == last {
                     break;
@@ -462,7 +462,7 @@ fn a_live_session_answers_or_drops_every_frame() {
             Submission::Queued
         );
         match events.recv().unwrap() {
-            Event::Hologram(hologram) => assert_eq!(hologram.timestamp_ns(), timestamp),
+            Event::Processed(hologram) => assert_eq!(hologram.timestamp_ns(), timestamp),
             other => panic!("{other:?}"),
         }
     }
@@ -507,7 +507,7 @@ fn a_live_session_answers_or_drops_every_frame() {
         matches!(
             told[..],
             [
-                Event::Hologram(_) | Event::Dropped { timestamp_ns: 1, .. },
+                Event::Processed(_) | Event::Dropped { timestamp_ns: 1, .. },
                 Event::Closed
             ]
         ),
@@ -528,7 +528,7 @@ fn a_listener_may_panic_and_may_close() {
     let listener = {
         let session = session.clone();
         move |event: Event| {
-            let Event::Hologram(hologram) = event else {
+            let Event::Processed(hologram) = event else {
                 return;
             };
             let session = session.get().unwrap();
@@ -591,7 +591,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
     let listener = {
         let (session, submitted) = (session.clone(), submitted.clone());
         move |event: Event| {
-            if let Event::Hologram(_) = event {
+            if let Event::Processed(_) = event {
                 submitted.wait();
                 session.get().unwrap().close();
             }
@@ -609,7 +609,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
     submitted.wait();
     let long = std::time::Duration::from_secs(60);
     let told: Vec<_> = (0..10).map(|_| events.recv_timeout(long).unwrap()).collect();
-    assert!(matches!(told[0], Event::Hologram(_)), "{told:?}");
+    assert!(matches!(told[0], Event::Processed(_)), "{told:?}");
     assert!(
         told[1..9].iter().all(|event| matches!(event, Event::Dropped { .. })),
         "{told:?}"
@@ -717,11 +717,11 @@ fn options_that_cannot_be_meant_are_named() {
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(word), "{word}: {message}");
     };
-    refuse(&|o| o.ladder.clear(), "ladder");
-    let many = |o: &mut SessionOptions| o.ladder = vec![o.ladder[0].clone(); MOST_QUALITY_LEVELS + 1];
+    refuse(&|o| o.quality_levels.clear(), "no quality levels");
+    let many = |o: &mut SessionOptions| o.quality_levels = vec![o.quality_levels[0].clone(); MOST_QUALITY_LEVELS + 1];
     refuse(&many, "17 quality levels are too many; 1 to 16 are right");
-    refuse(&|o| o.quality = Quality::Fixed(1), "no rung 1");
-    refuse(&|o| o.ladder[0].width = W + 1, "rung 0 is 65×48");
+    refuse(&|o| o.quality = Quality::Fixed(1), "no quality level 1");
+    refuse(&|o| o.quality_levels[0].width = W + 1, "quality level 0 is 65×48");
     refuse(&|o| o.target_rate_hz = Some(0.0), "target rate");
     refuse(
         &|o| o.threads = std::num::NonZeroUsize::new(70_000),
@@ -733,14 +733,14 @@ fn options_that_cannot_be_meant_are_named() {
             planes: 0,
             ..Sweep::for_display(&o.target.display)
         };
-        o.ladder.push(Rung {
+        o.quality_levels.push(QualityLevel {
             method: Method::Sweep(planes),
-            ..o.ladder[0].clone()
+            ..o.quality_levels[0].clone()
         });
     };
-    refuse(&worse, "rung 1: sweep: 0 planes");
+    refuse(&worse, "quality level 1: sweep: 0 planes");
     let worse = |o: &mut SessionOptions| {
-        o.ladder[0].encoder = Some(EncoderOptions {
+        o.quality_levels[0].encoder = Some(EncoderOptions {
             local_steps: 9,
             ..Default::default()
         });

@@ -9,7 +9,7 @@ mod counting;
 use camera::{Scene, depth, frame, options};
 use counting::HELD;
 use phasefront::input::{CameraFrame, DepthFormat};
-use phasefront::session::{Event, Quality, Rung, Thermal};
+use phasefront::session::{Event, Quality, QualityLevel, Thermal};
 use phasefront::{Error, LiveSession, SessionOptions, Sweep};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -75,11 +75,11 @@ impl Subscriber for Panicking {
     fn exit(&self, _: &Id) {}
 }
 
-/// A ladder of a network and a sweep, so that both are worked with.
-fn ladder() -> SessionOptions {
+/// Quality levels of a network and of a sweep, so that both are used.
+fn quality_levels() -> SessionOptions {
     let mut options = options(W, H);
     let sweep = Sweep::for_display(&options.target.display);
-    options.ladder.push(Rung {
+    options.quality_levels.push(QualityLevel {
         method: phasefront::Method::Sweep(sweep),
         height: H / 2,
         width: W / 2,
@@ -153,7 +153,7 @@ fn run(frames: u64, seed: u64) -> Heard {
         let mut kept = Vec::new();
         move |event| {
             match event {
-                Event::Hologram(hologram) => {
+                Event::Processed(hologram) => {
                     heard.made.fetch_add(1, Ordering::Relaxed);
                     // An app holds on to some, in no order.
                     kept.push(hologram);
@@ -177,7 +177,7 @@ fn run(frames: u64, seed: u64) -> Heard {
             }
         }
     };
-    let session = LiveSession::new(ladder(), listener).unwrap();
+    let session = LiveSession::new(quality_levels(), listener).unwrap();
     let mut now = 1;
     for sent in 0..frames {
         now = submit(&session, random, &scenes, now);

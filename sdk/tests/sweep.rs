@@ -266,7 +266,7 @@ fn by_sharpness_each_frame_gets_what_suits_its_depth() {
         field
     };
     let plan = |method| MethodPlan::new(height, width, method, &display).unwrap();
-    let either = plan(Method::BySharpness(usual, network.clone()));
+    let either = plan(Method::Auto(usual, network.clone()));
     assert!(either.z_m() == 0.0 && either.engine().is_some());
     let midpoint = SweepPlan::new(height, width, &display, usual, 0.0).unwrap();
     let (sharp, ragged) = (frame(1), frame(5));

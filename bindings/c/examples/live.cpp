@@ -1,5 +1,5 @@
-// A live stream from C++: frames are submitted without waiting, and a listener hears what becomes of them. Objects end by
-// themselves; statuses become exceptions.
+// A live stream from C++: frames are submitted without waiting, and a listener hears what becomes of them. Objects end
+// by themselves; statuses become exceptions.
 #include <phasefront.h>
 
 #include <chrono>
@@ -37,7 +37,7 @@ struct Listener {
     PfListener calls() {
         PfListener listener{};
         listener.context = this;
-        listener.on_hologram = [](void *self, PfHologram *given) {
+        listener.on_processed = [](void *self, PfHologram *given) {
             const Hologram hologram(given);
             PfHologramInfo info;
             if (pf_hologram_info(hologram.get(), &info) == PF_STATUS_OK)
@@ -60,14 +60,14 @@ int main() try {
     const uint32_t width = 320, height = 240;
     const auto target = made<Target>([](auto to) { return pf_target_from_toml("width = 320\nheight = 240", to); });
     const auto options =
-        made<Options>([&](auto to) { return pf_options_new(target.get(), PF_METHOD_USUAL, nullptr, to); });
+        made<Options>([&](auto to) { return pf_options_new(target.get(), PF_METHOD_DEFAULT, nullptr, to); });
     ok(pf_options_set_target_rate_hz(options.get(), 15));
 
     Listener listener;
     {
         const PfListener calls = listener.calls();
         const auto session = made<Session>(
-            [&](auto to) { return pf_session_new(options.get(), PF_RUNNING_MODE_LIVE_STREAM, &calls, to); });
+            [&](auto to) { return pf_session_new(options.get(), PF_RUNNING_MODE_LIVE, &calls, to); });
         ok(pf_session_warm_up(session.get()));
         std::vector<uint8_t> colour(width * height * 3), depth(width * height);
         for (uint64_t i = 0; i < 10; i++) {

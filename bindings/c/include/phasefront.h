@@ -74,7 +74,8 @@ typedef enum PfQualityReason {
   PF_QUALITY_REASON_THERMAL = 2,
   // The caller said so.
   PF_QUALITY_REASON_ASKED = 3,
-  // The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+  // The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+  // again.
   PF_QUALITY_REASON_REFUSED = 4,
   // For a reason that this version does not know.
   PF_QUALITY_REASON_OTHER = 5,
@@ -146,23 +147,23 @@ typedef enum PfRotation {
 // What makes holograms.
 typedef enum PfMethod {
   // The network that is built in, or the plane sweep where it was not trained for the display.
-  PF_METHOD_USUAL = 0,
+  PF_METHOD_DEFAULT = 0,
   // A trained network.
   PF_METHOD_TRAINED = 1,
   // The plane sweep, for any display: slower, and nothing needs to be trained.
   PF_METHOD_SWEEP = 2,
-  // For each frame what suits its depth: the plane sweep where it is sharp, the network where it is ragged.
-  PF_METHOD_BY_SHARPNESS = 3,
+  // For each frame what suits its depth: the plane sweep where it is clean, the network where it is noisy.
+  PF_METHOD_AUTO = 3,
 } PfMethod;
 
 // How a session runs; fixed when it is made.
 typedef enum PfRunningMode {
   // Each frame is answered by itself.
   PF_RUNNING_MODE_IMAGE = 0,
-  // Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
+  // Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
   PF_RUNNING_MODE_VIDEO = 1,
   // Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
-  PF_RUNNING_MODE_LIVE_STREAM = 2,
+  PF_RUNNING_MODE_LIVE = 2,
 } PfRunningMode;
 
 // Where frames are computed.
@@ -175,13 +176,13 @@ typedef enum PfBackend {
 
 // How hot the device is, as its system says.
 typedef enum PfThermal {
-  // Nothing to heed.
+  // Not warm: nothing is limited.
   PF_THERMAL_NOMINAL = 0,
   // Warm: frames may take a little less time.
   PF_THERMAL_FAIR = 1,
   // Hot: half the time.
   PF_THERMAL_SERIOUS = 2,
-  // Too hot: the lowest rung.
+  // Too hot: the lowest quality level.
   PF_THERMAL_CRITICAL = 3,
 } PfThermal;
 
@@ -245,8 +246,8 @@ typedef struct PfHologramInfo {
   uint32_t height;
   // How many colours its levels have: 3, or 1 for a display of one laser.
   uint32_t colours;
-  // The rung of the ladder that it was made on, 0 the best.
-  uint32_t rung;
+  // The quality level that it was made at, 0 the best.
+  uint32_t quality_level;
   // The amplitude that full light stands for.
   float scale;
   // Metres at the near end of the volume; NaN for normalized depth.
@@ -310,27 +311,27 @@ typedef struct PfImageInfo {
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
 // One quality: a method, a resolution, and how what is shown is corrected.
-typedef struct PfRung {
-  // A PfMethod but for PF_METHOD_USUAL.
+typedef struct PfQualityLevel {
+  // A PfMethod but for PF_METHOD_DEFAULT.
   uint32_t method;
-  // Of PF_METHOD_TRAINED and PF_METHOD_BY_SHARPNESS; else NULL.
+  // Of PF_METHOD_TRAINED and PF_METHOD_AUTO; else NULL.
   const struct PfNetwork *network;
   // Width of the hologram, pixels.
   uint32_t width;
   // Height of the hologram, pixels.
   uint32_t height;
-  // Local steps of this rung; below 0 the session's.
+  // Local steps of this quality level; below 0 the session's.
   int32_t local_steps;
-  // Steps at the midpoint of this rung; below 0 the session's.
+  // Steps at the midpoint of this quality level; below 0 the session's.
   int32_t midpoint_steps;
-} PfRung;
+} PfQualityLevel;
 
-// A step on the ladder.
+// A change of the quality level.
 typedef struct PfQualityChange {
-  // The rung before.
-  uint32_t from_rung;
-  // The rung now; the one before where the step was refused.
-  uint32_t to_rung;
+  // The quality level before.
+  uint32_t from_quality_level;
+  // The quality level now; the one before where the step was refused.
+  uint32_t to_quality_level;
   // Why.
   enum PfQualityReason reason;
 } PfQualityChange;
@@ -345,12 +346,12 @@ typedef struct PfListener {
   // Given to each call.
   void *context;
   // A frame became a hologram, which is the listener's until pf_hologram_free.
-  void (*on_hologram)(void *context, struct PfHologram *hologram);
+  void (*on_processed)(void *context, struct PfHologram *hologram);
   // A frame was dropped.
   void (*on_dropped)(void *context, uint64_t timestamp_ns, enum PfDropReason reason);
   // A frame could not be processed. The session goes on. The message ends with the call.
   void (*on_failed)(void *context, uint64_t timestamp_ns, const char *message);
-  // The frames after this one are made on another rung of the ladder.
+  // The frames after this one are made at another quality level.
   void (*on_quality_changed)(void *context, uint64_t timestamp_ns, struct PfQualityChange change);
   // The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
   // where that does not wait.
@@ -467,8 +468,8 @@ typedef struct PfStatistics {
   uint64_t dropped;
   // Frames that wait or are in flight.
   uint64_t pending;
-  // The rung of the ladder, 0 the best.
-  uint32_t rung;
+  // The quality level, 0 the best.
+  uint32_t quality_level;
   // Holograms a second, of late.
   double rate_hz;
   // Mean times, of late.
@@ -550,8 +551,8 @@ enum PfStatus pf_network_from_file(const char *path, struct PfNetwork **network)
 // Ends a network. Sessions and options that take it go on.
 void pf_network_free(struct PfNetwork *network);
 
-// What is usual for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for those
-// that take one, else NULL.
+// The default options for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for
+// those that take one, else NULL.
 enum PfStatus pf_options_new(const struct PfTarget *target,
                              uint32_t method,
                              const struct PfNetwork *network,
@@ -560,13 +561,13 @@ enum PfStatus pf_options_new(const struct PfTarget *target,
 // Ends options. Sessions that were made by them go on.
 void pf_options_free(struct PfOptions *options);
 
-// Takes all rungs from the ladder; at least one is to be pushed then.
-enum PfStatus pf_options_clear_ladder(struct PfOptions *options);
+// Removes all quality levels; push at least one afterwards.
+enum PfStatus pf_options_clear_quality_levels(struct PfOptions *options);
 
-// Adds a rung to the ladder, below those that are there; a session takes 16 at most.
-enum PfStatus pf_options_push_rung(struct PfOptions *options, const struct PfRung *rung);
+// Adds a quality level, below those that are there; a session takes 16 at most.
+enum PfStatus pf_options_push_quality_level(struct PfOptions *options, const struct PfQualityLevel *quality_level);
 
-// Frames a second that are aimed at; 0 takes frames as they come and never steps on the ladder.
+// Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.
 enum PfStatus pf_options_set_target_rate_hz(struct PfOptions *options, double rate_hz);
 
 // Encodes by double phase on the field as it is.
@@ -582,7 +583,7 @@ enum PfStatus pf_options_set_band_limit(struct PfOptions *options, float k);
 enum PfStatus pf_options_set_deep(struct PfOptions *options, const struct PfNetwork *prefilter);
 
 // Full light stands near the frame's largest amplitude, moving smoothly from frame to frame. The default.
-enum PfStatus pf_options_set_brightness_steady(struct PfOptions *options);
+enum PfStatus pf_options_set_brightness_smoothed(struct PfOptions *options);
 
 // Full light stands for the amplitude `scale`; what is brighter is clipped.
 enum PfStatus pf_options_set_brightness_fixed(struct PfOptions *options, float scale);
@@ -611,7 +612,8 @@ enum PfStatus pf_options_set_least_confidence(struct PfOptions *options, float c
 // Threads to compute with, 1 to 256. Not set, as many as the device has.
 enum PfStatus pf_options_set_threads(struct PfOptions *options, uint32_t threads);
 
-// Most pixels of a rung and of the modulator, 8192x4096 unless it is set: what a session allocates is a multiple.
+// Most pixels of a quality level and of the modulator, 8192x4096 unless it is set: what a session allocates is a
+// multiple.
 enum PfStatus pf_options_set_most_pixels(struct PfOptions *options, uint64_t pixels);
 
 // Where frames are computed: a PfBackend.
@@ -656,11 +658,11 @@ enum PfStatus pf_session_resume(const struct PfSession *session);
 // Says how hot the device is: a PfThermal.
 enum PfStatus pf_session_set_thermal(const struct PfSession *session, uint32_t thermal);
 
-// Stays on this rung of the ladder, 0 the best.
-enum PfStatus pf_session_fix_rung(const struct PfSession *session, uint32_t rung);
+// Stays at this quality level, 0 the best.
+enum PfStatus pf_session_fix_quality_level(const struct PfSession *session, uint32_t quality_level);
 
-// Steps on the ladder by itself: down where frames take longer than the target rate allows or the device is hot, up
-// where there is room.
+// Changes the quality level by itself: down where frames take longer than the target rate allows or the device is hot,
+// up where there is room.
 enum PfStatus pf_session_step_by_itself(const struct PfSession *session);
 
 // What the session has done so far. Never waits for a frame.

@@ -51,8 +51,8 @@ pub struct PfHologramInfo {
     pub height: u32,
     /// How many colours its levels have: 3, or 1 for a display of one laser.
     pub colours: u32,
-    /// The rung of the ladder that it was made on, 0 the best.
-    pub rung: u32,
+    /// The quality level that it was made at, 0 the best.
+    pub quality_level: u32,
     /// The amplitude that full light stands for.
     pub scale: f32,
     /// Metres at the near end of the volume; NaN for normalized depth.
@@ -150,7 +150,7 @@ pub unsafe extern "C" fn pf_hologram_info(hologram: *const PfHologram, info: *mu
                 width: known.width,
                 height: known.height,
                 colours: known.colours,
-                rung: known.rung,
+                quality_level: known.quality_level,
                 scale: known.scale,
                 near_m: known.near_m.unwrap_or(f32::NAN),
                 far_m: known.far_m.unwrap_or(f32::NAN),

@@ -29,18 +29,18 @@ pub use hologram::{
 pub use log::{PfLogLevel, PfOnLog, pf_set_log_listener};
 pub use network::{PfNetwork, pf_network_built_in, pf_network_free, pf_network_from_bytes, pf_network_from_file};
 pub use options::{
-    PfBackend, PfMethod, PfOptions, PfRung, pf_options_clear_ladder, pf_options_free, pf_options_new,
-    pf_options_push_rung, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
-    pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_steady,
+    PfBackend, PfMethod, PfOptions, PfQualityLevel, pf_options_clear_quality_levels, pf_options_free, pf_options_new,
+    pf_options_push_quality_level, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
+    pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_smoothed,
     pf_options_set_dark, pf_options_set_deep, pf_options_set_depth_range, pf_options_set_double_phase,
     pf_options_set_least_confidence, pf_options_set_local_steps, pf_options_set_midpoint_steps,
     pf_options_set_most_pixels, pf_options_set_target_rate_hz, pf_options_set_threads,
 };
 pub use session::{
     PfDropReason, PfListener, PfQualityChange, PfQualityReason, PfRunningMode, PfSession, PfStatistics, PfThermal,
-    pf_session_fix_rung, pf_session_free, pf_session_new, pf_session_pause, pf_session_process, pf_session_reset,
-    pf_session_resume, pf_session_set_thermal, pf_session_statistics, pf_session_step_by_itself, pf_session_submit,
-    pf_session_warm_up,
+    pf_session_fix_quality_level, pf_session_free, pf_session_new, pf_session_pause, pf_session_process,
+    pf_session_reset, pf_session_resume, pf_session_set_thermal, pf_session_statistics, pf_session_step_by_itself,
+    pf_session_submit, pf_session_warm_up,
 };
 pub use status::{PfStatus, pf_last_error, pf_version};
 pub use target::{

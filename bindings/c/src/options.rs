@@ -5,7 +5,7 @@ use crate::pointer::{change, free, give, object, pick, read};
 use crate::status::{PfStatus, Result, call};
 use crate::target::PfTarget;
 use phasefront_ffi::{
-    Backend, Brightness, DepthRange, Encoding, Method, PhasefrontError, Rung, SessionOptions, session_options,
+    Backend, Brightness, DepthRange, Encoding, Method, PhasefrontError, QualityLevel, SessionOptions, session_options,
 };
 
 /// What makes holograms.
@@ -13,13 +13,13 @@ use phasefront_ffi::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfMethod {
     /// The network that is built in, or the plane sweep where it was not trained for the display.
-    Usual = 0,
+    Default = 0,
     /// A trained network.
     Trained = 1,
     /// The plane sweep, for any display: slower, and nothing needs to be trained.
     Sweep = 2,
-    /// For each frame what suits its depth: the plane sweep where it is sharp, the network where it is ragged.
-    BySharpness = 3,
+    /// For each frame what suits its depth: the plane sweep where it is clean, the network where it is noisy.
+    Auto = 3,
 }
 
 /// Where frames are computed.
@@ -37,18 +37,18 @@ const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 /// One quality: a method, a resolution, and how what is shown is corrected.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
-pub struct PfRung {
-    /// A PfMethod but for PF_METHOD_USUAL.
+pub struct PfQualityLevel {
+    /// A PfMethod but for PF_METHOD_DEFAULT.
     pub method: u32,
-    /// Of PF_METHOD_TRAINED and PF_METHOD_BY_SHARPNESS; else NULL.
+    /// Of PF_METHOD_TRAINED and PF_METHOD_AUTO; else NULL.
     pub network: *const PfNetwork,
     /// Width of the hologram, pixels.
     pub width: u32,
     /// Height of the hologram, pixels.
     pub height: u32,
-    /// Local steps of this rung; below 0 the session's.
+    /// Local steps of this quality level; below 0 the session's.
     pub local_steps: i32,
-    /// Steps at the midpoint of this rung; below 0 the session's.
+    /// Steps at the midpoint of this quality level; below 0 the session's.
     pub midpoint_steps: i32,
 }
 
@@ -64,13 +64,13 @@ unsafe fn method_of(method: u32, network: *const PfNetwork) -> Result<Option<Met
         0 => None,
         1 => Some(Method::Trained { network: network()? }),
         2 => Some(Method::Sweep),
-        3 => Some(Method::BySharpness { network: network()? }),
+        3 => Some(Method::Auto { network: network()? }),
         other => return Err(PhasefrontError::Setting(format!("method is {other}; it is 0 to 3"))),
     })
 }
 
-/// What is usual for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for those
-/// that take one, else NULL.
+/// The default options for `target`: holograms of its modulator's resolution by `method`, a PfMethod; `network` is for
+/// those that take one, else NULL.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_new(
     target: *const PfTarget,
@@ -113,36 +113,41 @@ unsafe fn set(options: *mut PfOptions, how: impl FnOnce(&mut SessionOptions)) ->
     }
 }
 
-/// Takes all rungs from the ladder; at least one is to be pushed then.
+/// Removes all quality levels; push at least one afterwards.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_options_clear_ladder(options: *mut PfOptions) -> PfStatus {
+pub unsafe extern "C" fn pf_options_clear_quality_levels(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.ladder.clear()) }
+    unsafe { set(options, |options| options.quality_levels.clear()) }
 }
 
-/// Adds a rung to the ladder, below those that are there; a session takes 16 at most.
+/// Adds a quality level, below those that are there; a session takes 16 at most.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_options_push_rung(options: *mut PfOptions, rung: *const PfRung) -> PfStatus {
+pub unsafe extern "C" fn pf_options_push_quality_level(
+    options: *mut PfOptions,
+    quality_level: *const PfQualityLevel,
+) -> PfStatus {
     // SAFETY: the rules of this border.
     unsafe {
         try_set(options, |options| {
-            let rung = read(rung, "rung")?;
-            let method = method_of(rung.method, rung.network)?.ok_or_else(|| {
-                PhasefrontError::Setting("method of a rung is PF_METHOD_USUAL; name one of the others".into())
+            let quality_level = read(quality_level, "quality_level")?;
+            let method = method_of(quality_level.method, quality_level.network)?.ok_or_else(|| {
+                PhasefrontError::Setting(
+                    "method of a quality level is PF_METHOD_DEFAULT; name one of the others".into(),
+                )
             })?;
-            options.ladder.push(Rung {
+            options.quality_levels.push(QualityLevel {
                 method,
-                width: rung.width,
-                height: rung.height,
-                local_steps: u32::try_from(rung.local_steps).ok(),
-                midpoint_steps: u32::try_from(rung.midpoint_steps).ok(),
+                width: quality_level.width,
+                height: quality_level.height,
+                local_steps: u32::try_from(quality_level.local_steps).ok(),
+                midpoint_steps: u32::try_from(quality_level.midpoint_steps).ok(),
             });
             Ok(())
         })
     }
 }
 
-/// Frames a second that are aimed at; 0 takes frames as they come and never steps on the ladder.
+/// Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_target_rate_hz(options: *mut PfOptions, rate_hz: f64) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -203,9 +208,9 @@ unsafe fn brighten(options: *mut PfOptions, brightness: Brightness) -> PfStatus 
 
 /// Full light stands near the frame's largest amplitude, moving smoothly from frame to frame. The default.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_options_set_brightness_steady(options: *mut PfOptions) -> PfStatus {
+pub unsafe extern "C" fn pf_options_set_brightness_smoothed(options: *mut PfOptions) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { brighten(options, Brightness::Steady) }
+    unsafe { brighten(options, Brightness::Smoothed) }
 }
 
 /// Full light stands for the amplitude `scale`; what is brighter is clipped.
@@ -271,7 +276,8 @@ pub unsafe extern "C" fn pf_options_set_threads(options: *mut PfOptions, threads
     unsafe { set(options, |options| options.threads = Some(threads)) }
 }
 
-/// Most pixels of a rung and of the modulator, 8192x4096 unless it is set: what a session allocates is a multiple.
+/// Most pixels of a quality level and of the modulator, 8192x4096 unless it is set: what a session allocates is a
+/// multiple.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_most_pixels(options: *mut PfOptions, pixels: u64) -> PfStatus {
     // SAFETY: the rules of this border.

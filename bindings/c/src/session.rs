@@ -18,25 +18,25 @@ use std::sync::Arc;
 pub enum PfRunningMode {
     /// Each frame is answered by itself.
     Image = 0,
-    /// Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
+    /// Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
     Video = 1,
     /// Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
-    LiveStream = 2,
+    Live = 2,
 }
 
-const RUNNING_MODES: [RunningMode; 3] = [RunningMode::Image, RunningMode::Video, RunningMode::LiveStream];
+const RUNNING_MODES: [RunningMode; 3] = [RunningMode::Image, RunningMode::Video, RunningMode::Live];
 
 /// How hot the device is, as its system says.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PfThermal {
-    /// Nothing to heed.
+    /// Not warm: nothing is limited.
     Nominal = 0,
     /// Warm: frames may take a little less time.
     Fair = 1,
     /// Hot: half the time.
     Serious = 2,
-    /// Too hot: the lowest rung.
+    /// Too hot: the lowest quality level.
     Critical = 3,
 }
 
@@ -87,20 +87,21 @@ pub enum PfQualityReason {
     Thermal = 2,
     /// The caller said so.
     Asked = 3,
-    /// The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+    /// again.
     Refused = 4,
     /// For a reason that this version does not know.
     Other = 5,
 }
 
-/// A step on the ladder.
+/// A change of the quality level.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfQualityChange {
-    /// The rung before.
-    pub from_rung: u32,
-    /// The rung now; the one before where the step was refused.
-    pub to_rung: u32,
+    /// The quality level before.
+    pub from_quality_level: u32,
+    /// The quality level now; the one before where the step was refused.
+    pub to_quality_level: u32,
     /// Why.
     pub reason: PfQualityReason,
 }
@@ -108,8 +109,8 @@ pub struct PfQualityChange {
 impl From<QualityChange> for PfQualityChange {
     fn from(change: QualityChange) -> Self {
         PfQualityChange {
-            from_rung: change.from_rung,
-            to_rung: change.to_rung,
+            from_quality_level: change.from_quality_level,
+            to_quality_level: change.to_quality_level,
             reason: match change.reason {
                 QualityReason::TooSlow => PfQualityReason::TooSlow,
                 QualityReason::Room => PfQualityReason::Room,
@@ -134,12 +135,12 @@ pub struct PfListener {
     /// Given to each call.
     pub context: *mut c_void,
     /// A frame became a hologram, which is the listener's until pf_hologram_free.
-    pub on_hologram: Option<unsafe extern "C" fn(context: *mut c_void, hologram: *mut PfHologram)>,
+    pub on_processed: Option<unsafe extern "C" fn(context: *mut c_void, hologram: *mut PfHologram)>,
     /// A frame was dropped.
     pub on_dropped: Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, reason: PfDropReason)>,
     /// A frame could not be processed. The session goes on. The message ends with the call.
     pub on_failed: Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, message: *const c_char)>,
-    /// The frames after this one are made on another rung of the ladder.
+    /// The frames after this one are made at another quality level.
     pub on_quality_changed:
         Option<unsafe extern "C" fn(context: *mut c_void, timestamp_ns: u64, change: PfQualityChange)>,
     /// The session has ended. This is the last call, made exactly once: before pf_session_free returns, or after it
@@ -155,8 +156,8 @@ unsafe impl Send for Listener {}
 unsafe impl Sync for Listener {}
 
 impl SessionListener for Listener {
-    fn on_hologram(&self, hologram: Arc<RawHologram>) -> std::result::Result<(), ListenerError> {
-        if let Some(tell) = self.0.on_hologram {
+    fn on_processed(&self, hologram: Arc<RawHologram>) -> std::result::Result<(), ListenerError> {
+        if let Some(tell) = self.0.on_processed {
             // SAFETY: the listener's own call, with its context.
             unsafe { tell(self.0.context, object(PfHologram(hologram))) };
         }
@@ -213,8 +214,8 @@ pub struct PfStatistics {
     pub dropped: u64,
     /// Frames that wait or are in flight.
     pub pending: u64,
-    /// The rung of the ladder, 0 the best.
-    pub rung: u32,
+    /// The quality level, 0 the best.
+    pub quality_level: u32,
     /// Holograms a second, of late.
     pub rate_hz: f64,
     /// Mean times, of late.
@@ -234,7 +235,7 @@ impl From<Statistics> for PfStatistics {
             refused: statistics.refused,
             dropped: statistics.dropped.total,
             pending: statistics.pending,
-            rung: statistics.rung,
+            quality_level: statistics.quality_level,
             rate_hz: statistics.rate_hz,
             times: statistics.times.into(),
             backend: cut(&statistics.backend),
@@ -392,15 +393,15 @@ pub unsafe extern "C" fn pf_session_set_thermal(session: *const PfSession, therm
     }
 }
 
-/// Stays on this rung of the ladder, 0 the best.
+/// Stays at this quality level, 0 the best.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_session_fix_rung(session: *const PfSession, rung: u32) -> PfStatus {
+pub unsafe extern "C" fn pf_session_fix_quality_level(session: *const PfSession, quality_level: u32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { with(session, |session| session.set_quality(Quality::Fixed { rung })) }
+    unsafe { with(session, |session| session.set_quality(Quality::Fixed { quality_level })) }
 }
 
-/// Steps on the ladder by itself: down where frames take longer than the target rate allows or the device is hot, up
-/// where there is room.
+/// Changes the quality level by itself: down where frames take longer than the target rate allows or the device is hot,
+/// up where there is room.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_session_step_by_itself(session: *const PfSession) -> PfStatus {
     // SAFETY: the rules of this border.

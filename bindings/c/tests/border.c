@@ -44,7 +44,7 @@ typedef struct Heard {
     int holograms, dropped, failed, closed;
 } Heard;
 
-static void on_hologram(void *context, PfHologram *hologram) {
+static void on_processed(void *context, PfHologram *hologram) {
     PfHologramInfo info;
     ok(pf_hologram_info(hologram, &info));
     assert(info.width == WIDTH && info.height == HEIGHT);
@@ -88,10 +88,10 @@ static void mistakes(PfTarget *target, PfOptions *options) {
     refused(pf_options_new(target, 7, NULL, &options), PF_STATUS_SETTING, "method is 7");
     refused(pf_options_new(target, PF_METHOD_TRAINED, NULL, &options), PF_STATUS_SETTING, "network is NULL");
     refused(pf_options_set_backend(options, 2), PF_STATUS_SETTING, "backend is 2");
-    PfRung rung = {.method = PF_METHOD_USUAL, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
-    refused(pf_options_push_rung(options, &rung), PF_STATUS_SETTING, "PF_METHOD_USUAL");
+    PfQualityLevel quality_level = {.method = PF_METHOD_DEFAULT, .width = 16, .height = 16, .local_steps = -1, .midpoint_steps = -1};
+    refused(pf_options_push_quality_level(options, &quality_level), PF_STATUS_SETTING, "PF_METHOD_DEFAULT");
     refused(pf_session_new(options, 3, NULL, &no_session), PF_STATUS_SETTING, "mode is 3");
-    refused(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, NULL, &no_session), PF_STATUS_SESSION, "listener");
+    refused(pf_session_new(options, PF_RUNNING_MODE_LIVE, NULL, &no_session), PF_STATUS_SESSION, "listener");
     PfHologram *hologram = NULL;
     refused(pf_session_process(NULL, NULL, &hologram), PF_STATUS_SETTING, "NULL");
     refused(pf_hologram_z_at(NULL, 0, 0, &(double){0}), PF_STATUS_SETTING, "hologram is NULL");
@@ -155,11 +155,11 @@ static void stills(const PfOptions *options) {
 
 static void live(const PfOptions *options) {
     Heard heard = {0};
-    PfListener listener = {&heard, on_hologram, on_dropped, on_failed, NULL, on_closed};
+    PfListener listener = {&heard, on_processed, on_dropped, on_failed, NULL, on_closed};
     PfSession *session = NULL;
     refused(pf_session_new(options, PF_RUNNING_MODE_IMAGE, &listener, &session), PF_STATUS_SESSION, "listener");
     assert(heard.closed == 0);
-    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, &listener, &session));
+    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE, &listener, &session));
     ok(pf_session_warm_up(session));
     for (uint64_t i = 1; i <= 20; i++) {
         PfFrame frame = frame_at(i * 1000000);
@@ -171,7 +171,7 @@ static void live(const PfOptions *options) {
     refused(pf_session_submit(session, &late, &dropped), PF_STATUS_TIMESTAMP, "5");
     ok(pf_session_set_thermal(session, PF_THERMAL_FAIR));
     refused(pf_session_set_thermal(session, 9), PF_STATUS_SETTING, "thermal is 9");
-    refused(pf_session_fix_rung(session, 9), PF_STATUS_SETTING, "no rung 9");
+    refused(pf_session_fix_quality_level(session, 9), PF_STATUS_SETTING, "no quality level 9");
     PfStatistics statistics;
     do ok(pf_session_statistics(session, &statistics));
     while (statistics.pending > 0);
@@ -188,7 +188,7 @@ typedef struct {
     atomic_int *stage; // 1: the first hologram is there; 2: the other frames are submitted; 3: freed; 4: closed
     int told;
 } Ending;
-static void end_hologram(void *context, PfHologram *hologram) {
+static void end_processed(void *context, PfHologram *hologram) {
     Ending *ending = context;
     pf_hologram_free(hologram);
     atomic_store(ending->stage, 1);
@@ -216,9 +216,9 @@ static void ended_by_its_listener(const PfOptions *options) {
     Ending *ending = calloc(1, sizeof *ending);
     assert(ending != NULL);
     ending->stage = &stage;
-    PfListener listener = {.context = ending, .on_hologram = end_hologram, .on_dropped = end_dropped, .on_closed = end_closed};
+    PfListener listener = {.context = ending, .on_processed = end_processed, .on_dropped = end_dropped, .on_closed = end_closed};
     PfSession *session = NULL;
-    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE_STREAM, &listener, &session));
+    ok(pf_session_new(options, PF_RUNNING_MODE_LIVE, &listener, &session));
     ending->session = session;
     for (uint64_t i = 1; i <= 5; i++) {
         PfFrame frame = frame_at(i);
@@ -243,7 +243,7 @@ int main(void) {
     ok(pf_target_size(target, &width, &height));
     assert(width == WIDTH && height == HEIGHT);
     PfOptions *options = NULL;
-    ok(pf_options_new(target, PF_METHOD_USUAL, NULL, &options));
+    ok(pf_options_new(target, PF_METHOD_DEFAULT, NULL, &options));
     mistakes(target, options);
     pf_target_free(target);
     stills(options);

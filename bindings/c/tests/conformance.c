@@ -1,5 +1,5 @@
-// The conformance suite, run from C: `conformance SUITE MODELS LEVELS` compares the levels of all frames with the file that
-// Rust left, bit for bit.
+// The conformance suite, run from C: `conformance SUITE MODELS LEVELS` compares the levels of all frames with the file
+// that Rust left, bit for bit.
 #include "phasefront.h"
 
 #include <cjson/cJSON.h>
@@ -133,9 +133,9 @@ static PfOptions *options_of(const cJSON *json, const char *suite, const char *m
     uint32_t number_of_method = PF_METHOD_TRAINED;
     if (strcmp(method, "sweep") == 0) {
         number_of_method = PF_METHOD_SWEEP;
-    } else if (strcmp(method, "network") == 0 || strcmp(method, "by-sharpness") == 0) {
+    } else if (strcmp(method, "network") == 0 || strcmp(method, "auto") == 0) {
         ok(pf_network_built_in("rgbd-8", &trained), "rgbd-8");
-        if (strcmp(method, "network") != 0) number_of_method = PF_METHOD_BY_SHARPNESS;
+        if (strcmp(method, "network") != 0) number_of_method = PF_METHOD_AUTO;
     } else {
         trained = network(models, method);
     }

@@ -39,9 +39,9 @@ from ._ffi import (
     Pose,
     Quality,
     QualityChange,
+    QualityLevel,
     QualityReason,
     Rotation,
-    Rung,
     RunningMode,
     SessionOptions,
     Stage,
@@ -54,14 +54,14 @@ from ._ffi import (
 )
 from ._frame import Frame
 from ._hologram import Hologram
-from ._session import Dropped, Event, Failed, Made, QualityChanged, Session, send_log, send_stages, session_options
+from ._session import Dropped, Event, Failed, Processed, QualityChanged, Session, send_log, send_stages, session_options
 from ._target import Target
 
 __all__ = [
     "Backend", "Brightness", "Cameras", "ColourFormat", "ConfidenceFormat", "DeepPair", "DepthFormat", "DepthRange", "Display",
     "DropReason", "Dropped", "Drops", "Encoding", "Event", "Failed", "Frame", "FrameTimes", "Hologram", "HologramInfo",
-    "Intrinsics", "Layout", "LogLevel", "Made", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError",
-    "Placement", "Pose", "Quality", "QualityChange", "QualityChanged", "QualityReason", "Rotation", "Rung", "RunningMode",
+    "Intrinsics", "Layout", "LogLevel", "Method", "Network", "NetworkInfo", "Orientation", "PhasefrontError", "Placement",
+    "Pose", "Processed", "Quality", "QualityChange", "QualityChanged", "QualityLevel", "QualityReason", "Rotation", "RunningMode",
     "Session", "SessionOptions", "Stage", "Statistics", "Target", "Thermal", "YuvMatrix", "__version__", "built_in_pair",
     "display_from_toml", "send_log", "send_stages", "session_options", "version",
 ]  # fmt: skip

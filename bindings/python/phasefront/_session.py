@@ -21,7 +21,7 @@ from ._ffi import (
     Network,
     Quality,
     QualityChange,
-    Rung,
+    QualityLevel,
     RunningMode,
     SessionOptions,
     Stage,
@@ -34,7 +34,7 @@ from ._target import Target
 
 
 @dataclass(frozen=True)
-class Made:
+class Processed:
     """A frame became a hologram.
 
     Fields:
@@ -72,11 +72,11 @@ class Failed:
 
 @dataclass(frozen=True)
 class QualityChanged:
-    """The frames after this one are made on another rung of the ladder.
+    """The frames after this one are made at another quality level.
 
     Fields:
         timestamp_ns: The frame's.
-        change: From which rung to which, and why.
+        change: From which quality level to which, and why.
     """
 
     timestamp_ns: int
@@ -84,15 +84,15 @@ class QualityChanged:
 
 
 #: What a live stream tells its listener.
-Event: TypeAlias = Made | Dropped | Failed | QualityChanged
+Event: TypeAlias = Processed | Dropped | Failed | QualityChanged
 
 
 class _Listener(_ffi.SessionListener):
     def __init__(self, tell: Callable[[Event], object], purpose: Purpose):
         self._tell, self._purpose = tell, purpose
 
-    def on_hologram(self, hologram: _ffi.RawHologram) -> None:
-        self._tell(Made(Hologram(hologram, self._purpose)))
+    def on_processed(self, hologram: _ffi.RawHologram) -> None:
+        self._tell(Processed(Hologram(hologram, self._purpose)))
 
     def on_dropped(self, timestamp_ns: int, reason: DropReason) -> None:
         self._tell(Dropped(timestamp_ns, reason))
@@ -110,7 +110,7 @@ class _Listener(_ffi.SessionListener):
 class Changes(TypedDict, total=False):
     """Fields of `SessionOptions`, any of them."""
 
-    ladder: list[Rung]
+    quality_levels: list[QualityLevel]
     quality: Quality
     target_rate_hz: float | None
     encoding: Encoding
@@ -128,12 +128,12 @@ class Changes(TypedDict, total=False):
 def session_options(
     method: Network | Method | None = None, target: Display | _ffi.Target | None = None, **changes: Unpack[Changes]
 ) -> SessionOptions:
-    """What is usual for `target`, and what is changed of it.
+    """The default options for `target`, with changes.
 
     Args:
         method: A network or another method; without one the network that is built in, and the plane sweep where that was
             not trained for the display.
-        target: A display, or a calibrated one; without it the usual display of 1920×1080. Holograms have its resolution.
+        target: A display, or a calibrated one; without it the default display of 1920×1080. Holograms have its resolution.
         changes: Fields of `SessionOptions`, which says what each does.
 
     Raises `PhasefrontError.Display` for a display that cannot be.
@@ -150,10 +150,10 @@ class Session:
     """Frames in, holograms out. Every call may come from any thread, at any moment.
 
     Args:
-        options: What to make, and how: `session_options` has what is usual.
+        options: What to make, and how: `session_options` gives the defaults.
         mode: Image and video sessions answer `process`. A live stream takes `submit` and never waits.
-        listener: For a live stream alone: hears `Made`, `Dropped`, `Failed` and `QualityChanged` on the session's own
-            thread; no frame is processed while it is busy. What it raises is counted in the statistics.
+        listener: For a live stream alone: hears `Processed`, `Dropped`, `Failed` and `QualityChanged` on the session's
+            own thread; no frame is processed while it is busy. What it raises is counted in the statistics.
 
     As a context it is closed at its end. Raises `PhasefrontError` for options that cannot be meant or planned for.
     """
@@ -202,11 +202,14 @@ class Session:
         self._raw.resume()
 
     def set_thermal(self, thermal: Thermal) -> None:
-        """Says how hot the device is. A session with several rungs steps down where it is hot."""
+        """Says how hot the device is. A session with several quality levels steps down where it is hot."""
         self._raw.set_thermal(thermal)
 
     def set_quality(self, quality: Quality) -> None:
-        """Allows or forbids steps on the ladder. Raises `PhasefrontError.Setting` for a rung that is not on it."""
+        """Allows or forbids changes of the quality level.
+
+        Raises `PhasefrontError.Setting` for one that the session does not have.
+        """
         self._raw.set_quality(quality)
 
     def statistics(self) -> Statistics:

@@ -102,7 +102,7 @@ def made_of(case, memory, network):
         changes["brightness"] = Brightness.FIXED(scale=case["brightness"])
     if case["range"] is not None:
         changes["depth_range"] = DepthRange.FIXED(near_m=case["range"][0], far_m=case["range"][1])
-    methods = {"network": network, "sweep": Method.SWEEP(), "by-sharpness": Method.BY_SHARPNESS(network=network)}
+    methods = {"network": network, "sweep": Method.SWEEP(), "auto": Method.AUTO(network=network)}
     method = methods[case["method"]] if case["method"] in methods else model(case["method"])
     options = session_options(method, target_of(case), **changes)
     mode = {"image": RunningMode.IMAGE, "video": RunningMode.VIDEO}[case["mode"]]

@@ -52,4 +52,4 @@ def test_types_and_version_come_along():
 def test_what_is_shown_has_its_fields():
     assert repr(phasefront.Display(width=64)).startswith("Display(width=64, height=1080, ")
     assert repr([phasefront.Method.SWEEP()]) == "[Method.SWEEP()]"
-    assert repr(phasefront.Quality.FIXED(rung=1)) == "Quality.FIXED(rung=1)"
+    assert repr(phasefront.Quality.FIXED(quality_level=1)) == "Quality.FIXED(quality_level=1)"

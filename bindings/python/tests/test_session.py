@@ -21,10 +21,10 @@ from phasefront import (
     Failed,
     Frame,
     LogLevel,
-    Made,
     Method,
     Network,
     PhasefrontError,
+    Processed,
     Quality,
     RunningMode,
     Session,
@@ -145,11 +145,11 @@ def test_output_is_what_the_modulator_takes(options):
 
 def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
     events = Events()
-    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+    with Session(options, RunningMode.LIVE, events) as session:
         for i in range(50):
             session.submit(still(timestamp_ns=1000 + i))
         events.wait(50)  # closing would drop what still waits, on a busy machine all of it
-    made = [e.hologram.info.timestamp_ns for e in events.all if isinstance(e, Made)]
+    made = [e.hologram.info.timestamp_ns for e in events.all if isinstance(e, Processed)]
     dropped = [e.timestamp_ns for e in events.all if isinstance(e, Dropped)]
     assert sorted(made + dropped) == list(range(1000, 1050))
     assert made and made == sorted(made)
@@ -159,7 +159,7 @@ def test_a_live_stream_answers_every_frame_on_its_own_thread(options):
 
 def test_a_bad_frame_in_a_stream_harms_nothing(options):
     events = Events()
-    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+    with Session(options, RunningMode.LIVE, events) as session:
         nothing = Frame(numpy.zeros((48, 64, 3), numpy.uint8), numpy.zeros((24, 32), numpy.float32), timestamp_ns=5)
         session.submit(nothing)
         events.wait(1)
@@ -168,7 +168,7 @@ def test_a_bad_frame_in_a_stream_harms_nothing(options):
         session.submit(still(timestamp_ns=6))
         events.wait(2)
     kinds = [type(e) for e in events.all]
-    assert kinds == [Failed, Made]
+    assert kinds == [Failed, Processed]
 
 
 def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
@@ -178,18 +178,18 @@ def test_what_a_listener_raises_is_counted_and_the_stream_goes_on(options):
 
     for raised in (ValueError("no thanks"), PhasefrontError.Frame("no thanks")):
         events = Events()
-        with Session(options, RunningMode.LIVE_STREAM, listener) as session:
+        with Session(options, RunningMode.LIVE, listener) as session:
             for i in range(3):
                 session.submit(still(timestamp_ns=i + 1))
                 events.wait(i + 1)
         assert session.statistics().listener_failures == 3
-        assert [type(event) for event in events.all] == [Made] * 3
+        assert [type(event) for event in events.all] == [Processed] * 3
 
 
 LEFT_OPEN = """
 import phasefront
 options = phasefront.session_options(target=phasefront.Display(width=48, height=36))
-session = phasefront.Session(options, phasefront.RunningMode.LIVE_STREAM, print)
+session = phasefront.Session(options, phasefront.RunningMode.LIVE, print)
 """
 
 
@@ -204,12 +204,12 @@ def test_a_listener_may_call_its_session(options):
     closed = []
 
     def listener(event):
-        if isinstance(event, Made):
+        if isinstance(event, Processed):
             closed.append(session.statistics().processed)
             session.close()
             done.set()
 
-    session = Session(options, RunningMode.LIVE_STREAM, listener)
+    session = Session(options, RunningMode.LIVE, listener)
     session.submit(still(timestamp_ns=1))
     assert done.wait(60)
     with pytest.raises(PhasefrontError.Session, match="closed"):
@@ -260,11 +260,11 @@ def test_a_reset_lets_time_begin_anew(options):
 def test_modes_are_not_mixed(options):
     with Session(options) as session, pytest.raises(PhasefrontError.Session, match="not live"):
         session.submit(still())
-    with Session(options, RunningMode.LIVE_STREAM, lambda _: None) as session:
+    with Session(options, RunningMode.LIVE, lambda _: None) as session:
         with pytest.raises(PhasefrontError.Session, match="submitted"):
             session.process(still())
     with pytest.raises(PhasefrontError.Session, match="listener"):
-        Session(options, RunningMode.LIVE_STREAM)
+        Session(options, RunningMode.LIVE)
     with pytest.raises(PhasefrontError.Session, match="listener"):
         Session(options, RunningMode.IMAGE, lambda _: None)
 
@@ -325,7 +325,7 @@ def test_in_a_fork_what_is_the_parents_is_refused_and_what_is_new_works(options)
     if not hasattr(os, "fork"):
         skips.or_fail("fork", f"{sys.platform} forks no processes")
         return
-    live = Session(options, RunningMode.LIVE_STREAM, lambda _: None)
+    live = Session(options, RunningMode.LIVE, lambda _: None)
     with live, Session(options) as session:
         hologram = session.process(still())
         hologram.preview(0.0, 8, 8)
@@ -373,14 +373,14 @@ def test_listeners_may_close_each_others_session(options):
 
     def listener(i):
         def listen(event):
-            if isinstance(event, Made):
+            if isinstance(event, Processed):
                 both.wait(60)
                 sessions[1 - i].close()
                 done[i].set()
 
         return listen
 
-    sessions += [Session(options, RunningMode.LIVE_STREAM, listener(i)) for i in range(2)]
+    sessions += [Session(options, RunningMode.LIVE, listener(i)) for i in range(2)]
     [session.submit(still(timestamp_ns=1)) for session in sessions]
     assert all(event.wait(60) for event in done)
     [session.close() for session in sessions]
@@ -415,7 +415,7 @@ def test_the_network_that_is_built_in_is_usual():
     for offset_mm in (0, 3, 12):
         display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
         options = session_options(target=display)
-        assert isinstance(options.ladder[0].method, Method.TRAINED)
+        assert isinstance(options.quality_levels[0].method, Method.TRAINED)
         assert isinstance(options.encoding, Encoding.ANTI_ALIAS)
         with Session(options) as session:
             assert session.process(still()).levels.shape == (3, 48, 64)
@@ -446,7 +446,7 @@ def test_steps_and_dark_can_be_set(display):
 
 def test_without_a_network_the_sweep_is_usual():
     options = session_options(target=phasefront.Display(width=64, height=48, pitch_um=3.74))
-    assert isinstance(options.ladder[0].method, Method.SWEEP)
+    assert isinstance(options.quality_levels[0].method, Method.SWEEP)
     with Session(options) as session:
         assert session.process(still()).levels.shape == (3, 48, 64)
     with pytest.raises(PhasefrontError.Network, match="pairs for 0, 6, 12 mm"):
@@ -474,12 +474,12 @@ def test_a_target_is_taken_as_its_display_is(display):
 
 def test_settings_that_cannot_be_meant_are_named(network, display):
     for changes, words in [
-        ({"ladder": []}, "ladder is empty"),
+        ({"quality_levels": []}, "no quality levels"),
         ({"threads": 0}, "0 threads"),
         ({"threads": 70_000}, "1 to 256"),
         ({"most_pixels": 100}, "most_pixels"),
         ({"target_rate_hz": float("nan")}, "target rate"),
-        ({"quality": Quality.FIXED(rung=3)}, "no rung 3"),
+        ({"quality": Quality.FIXED(quality_level=3)}, "no quality level 3"),
     ]:
         with pytest.raises(PhasefrontError.Setting, match=words):
             Session(session_options(network, display, **changes))
@@ -573,7 +573,7 @@ def test_memory_of_ten_thousand_frames_is_flat(network, display):
 
 def test_dropped_by_reset_is_told(options):
     events = Events()
-    with Session(options, RunningMode.LIVE_STREAM, events) as session:
+    with Session(options, RunningMode.LIVE, events) as session:
         session.pause()
         assert session.submit(still(timestamp_ns=1)) == DropReason.PAUSED
         events.wait(1)

@@ -34,8 +34,8 @@ namespace Phasefront
         public uint Height;
         /// <summary>How many colours its levels have: 3, or 1 for a display of one laser.</summary>
         public uint Colours;
-        /// <summary>The rung of the ladder that it was made on, 0 the best.</summary>
-        public uint Rung;
+        /// <summary>The quality level that it was made at, 0 the best.</summary>
+        public uint QualityLevel;
         /// <summary>The amplitude that full light stands for.</summary>
         public float Scale;
         /// <summary>Metres at the near end of the volume; NaN for normalized depth.</summary>

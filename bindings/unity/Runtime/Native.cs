@@ -48,7 +48,7 @@ namespace Phasefront
     }
 
     [StructLayout(LayoutKind.Sequential)]
-    internal struct NativeRung
+    internal struct NativeQualityLevel
     {
         public uint Method;
         public IntPtr Network;
@@ -93,7 +93,7 @@ namespace Phasefront
     internal struct NativeListener
     {
         public IntPtr Context;
-        public Native.OnHologram OnHologram;
+        public Native.OnProcessed OnProcessed;
         public Native.OnDropped OnDropped;
         public Native.OnFailed OnFailed;
         public Native.OnQualityChanged OnQualityChanged;
@@ -116,7 +116,7 @@ namespace Phasefront
 #endif
         private const CallingConvention C = CallingConvention.Cdecl;
 
-        [UnmanagedFunctionPointer(C)] public delegate void OnHologram(IntPtr context, IntPtr hologram);
+        [UnmanagedFunctionPointer(C)] public delegate void OnProcessed(IntPtr context, IntPtr hologram);
         [UnmanagedFunctionPointer(C)] public delegate void OnDropped(IntPtr context, ulong timestampNs, DropReason reason);
         [UnmanagedFunctionPointer(C)] public delegate void OnFailed(IntPtr context, ulong timestampNs, IntPtr message);
         [UnmanagedFunctionPointer(C)] public delegate void OnQualityChanged(IntPtr context, ulong timestampNs, QualityChange change);
@@ -137,14 +137,14 @@ namespace Phasefront
 
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_new(Target target, uint method, IntPtr network, out IntPtr options);
         [DllImport(Library, CallingConvention = C)] public static extern void pf_options_free(IntPtr options);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_clear_ladder(SessionOptions options);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_push_rung(SessionOptions options, ref NativeRung rung);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_clear_quality_levels(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_push_quality_level(SessionOptions options, ref NativeQualityLevel qualityLevel);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_target_rate_hz(SessionOptions options, double rateHz);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_double_phase(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_anti_alias(SessionOptions options, float sigma, uint width);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_band_limit(SessionOptions options, float k);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_deep(SessionOptions options, Network prefilter);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_steady(SessionOptions options);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_smoothed(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_fixed(SessionOptions options, float scale);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_frame_max(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_dark(SessionOptions options, float dark);
@@ -166,7 +166,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_pause(Session session);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_resume(Session session);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_set_thermal(Session session, Thermal thermal);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_rung(Session session, uint rung);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_fix_quality_level(Session session, uint qualityLevel);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_step_by_itself(Session session);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_session_statistics(Session session, out Statistics statistics);
 

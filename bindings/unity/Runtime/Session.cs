@@ -9,22 +9,22 @@ namespace Phasefront
     {
         /// <summary>Each frame is answered by itself.</summary>
         Image = 0,
-        /// <summary>Each frame is answered; depth and brightness are steadied. Timestamps must rise.</summary>
+        /// <summary>Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.</summary>
         Video = 1,
         /// <summary>Frames are submitted without waiting, and the listener hears what becomes of them.</summary>
-        LiveStream = 2,
+        Live = 2,
     }
 
     /// <summary>How hot the device is, as its system says.</summary>
     public enum Thermal : uint
     {
-        /// <summary>Nothing to heed.</summary>
+        /// <summary>Not warm: nothing is limited.</summary>
         Nominal = 0,
         /// <summary>Warm: frames may take a little less time.</summary>
         Fair = 1,
         /// <summary>Hot: half the time.</summary>
         Serious = 2,
-        /// <summary>Too hot: the lowest rung.</summary>
+        /// <summary>Too hot: the lowest quality level.</summary>
         Critical = 3,
     }
 
@@ -58,20 +58,20 @@ namespace Phasefront
         Thermal = 2,
         /// <summary>The caller said so.</summary>
         Asked = 3,
-        /// <summary>The rung that was to be taken cannot be planned: the session stays where it was.</summary>
+        /// <summary>The quality level that was to be taken cannot be planned: the session stays where it was.</summary>
         Refused = 4,
         /// <summary>For a reason that this version does not know.</summary>
         Other = 5,
     }
 
-    /// <summary>A step on the ladder.</summary>
+    /// <summary>A change of the quality level.</summary>
     [StructLayout(LayoutKind.Sequential)]
     public struct QualityChange
     {
-        /// <summary>The rung before.</summary>
-        public uint FromRung;
-        /// <summary>The rung now; the one before where the step was refused.</summary>
-        public uint ToRung;
+        /// <summary>The quality level before.</summary>
+        public uint FromQualityLevel;
+        /// <summary>The quality level now; the one before where the step was refused.</summary>
+        public uint ToQualityLevel;
         /// <summary>Why.</summary>
         public QualityReason Reason;
     }
@@ -92,8 +92,8 @@ namespace Phasefront
         public ulong Dropped;
         /// <summary>Frames that wait or are in flight.</summary>
         public ulong Pending;
-        /// <summary>The rung of the ladder, 0 the best.</summary>
-        public uint Rung;
+        /// <summary>The quality level, 0 the best.</summary>
+        public uint QualityLevel;
         /// <summary>Holograms a second, of late.</summary>
         public double RateHz;
         /// <summary>Mean times, of late.</summary>
@@ -111,12 +111,12 @@ namespace Phasefront
     public interface IListener
     {
         /// <summary>A frame became a hologram, which is the listener's to dispose of.</summary>
-        void OnHologram(Hologram hologram);
+        void OnProcessed(Hologram hologram);
         /// <summary>A frame was dropped.</summary>
         void OnDropped(ulong timestampNs, DropReason reason);
         /// <summary>A frame could not be processed. The session goes on.</summary>
         void OnFailed(ulong timestampNs, string message);
-        /// <summary>The frames after this one are made on another rung of the ladder.</summary>
+        /// <summary>The frames after this one are made at another quality level.</summary>
         void OnQualityChanged(ulong timestampNs, QualityChange change);
     }
 
@@ -124,7 +124,7 @@ namespace Phasefront
     public sealed class Session : NativeObject
     {
         // What native code calls lives as long as the process.
-        private static readonly Native.OnHologram Hologram = OnHologram;
+        private static readonly Native.OnProcessed Processed = OnProcessed;
         private static readonly Native.OnDropped Dropped = OnDropped;
         private static readonly Native.OnFailed Failed = OnFailed;
         private static readonly Native.OnQualityChanged QualityChanged = OnQualityChanged;
@@ -154,7 +154,7 @@ namespace Phasefront
             var native = new NativeListener
             {
                 Context = GCHandle.ToIntPtr(context),
-                OnHologram = Hologram,
+                OnProcessed = Processed,
                 OnDropped = Dropped,
                 OnFailed = Failed,
                 OnQualityChanged = QualityChanged,
@@ -201,10 +201,10 @@ namespace Phasefront
         /// <summary>Says how hot the device is.</summary>
         public void SetThermal(Thermal thermal) => Check(Native.pf_session_set_thermal(this, thermal));
 
-        /// <summary>Stays on this rung of the ladder, 0 the best.</summary>
-        public void FixRung(int rung) => Check(Native.pf_session_fix_rung(this, checked((uint)rung)));
+        /// <summary>Stays at this quality level, 0 the best.</summary>
+        public void FixQualityLevel(int qualityLevel) => Check(Native.pf_session_fix_quality_level(this, checked((uint)qualityLevel)));
 
-        /// <summary>Steps on the ladder by itself.</summary>
+        /// <summary>Changes the quality level by itself.</summary>
         public void StepByItself() => Check(Native.pf_session_step_by_itself(this));
 
         /// <summary>What the session has done so far. Never waits for a frame.</summary>
@@ -244,11 +244,11 @@ namespace Phasefront
             }
         }
 
-        [MonoPInvokeCallback(typeof(Native.OnHologram))]
-        private static void OnHologram(IntPtr context, IntPtr hologram)
+        [MonoPInvokeCallback(typeof(Native.OnProcessed))]
+        private static void OnProcessed(IntPtr context, IntPtr hologram)
         {
             var given = new Hologram(hologram);
-            Tell(context, listener => listener.OnHologram(given));
+            Tell(context, listener => listener.OnProcessed(given));
         }
 
         [MonoPInvokeCallback(typeof(Native.OnDropped))]

@@ -7,13 +7,13 @@ namespace Phasefront
     public enum Method : uint
     {
         /// <summary>The network that is built in, or the plane sweep where it was not trained for the display.</summary>
-        Usual = 0,
+        Default = 0,
         /// <summary>A trained network.</summary>
         Trained = 1,
         /// <summary>The plane sweep, for any display: slower, and nothing needs to be trained.</summary>
         Sweep = 2,
-        /// <summary>For each frame what suits its depth: the sweep where it is sharp, the network where it is ragged.</summary>
-        BySharpness = 3,
+        /// <summary>For each frame what suits its depth: the sweep where it is clean, the network where it is noisy.</summary>
+        Auto = 3,
     }
 
     /// <summary>Where frames are computed.</summary>
@@ -26,15 +26,15 @@ namespace Phasefront
     }
 
     /// <summary>
-    /// What a session makes, and how. A new one has what is usual for its target; set what is not. Of one thread at a
+    /// What a session makes, and how. A new one has the defaults for its target; set what differs. Of one thread at a
     /// time.
     /// </summary>
     public sealed class SessionOptions : NativeObject
     {
         private SessionOptions(IntPtr handle) : base(handle) { }
 
-        /// <summary>What is usual for <paramref name="target"/>.</summary>
-        public static SessionOptions For(Target target, Method method = Method.Usual, Network network = null)
+        /// <summary>The default options for <paramref name="target"/>.</summary>
+        public static SessionOptions For(Target target, Method method = Method.Default, Network network = null)
         {
             return With(network, native =>
             {
@@ -59,18 +59,18 @@ namespace Phasefront
             }
         }
 
-        /// <summary>Takes all rungs from the ladder; at least one is to be pushed then.</summary>
-        public void ClearLadder() => Check(Native.pf_options_clear_ladder(this));
+        /// <summary>Removes all quality levels; push at least one afterwards.</summary>
+        public void ClearQualityLevels() => Check(Native.pf_options_clear_quality_levels(this));
 
         /// <summary>
-        /// Adds a rung to the ladder, below those that are there: a method, a resolution, and how often what is shown is
+        /// Adds a quality level, below those that are there: a method, a resolution, and how often what is shown is
         /// corrected; below 0 as often as in the session.
         /// </summary>
-        public void PushRung(Method method, Network network, int width, int height, int localSteps = -1, int midpointSteps = -1)
+        public void PushQualityLevel(Method method, Network network, int width, int height, int localSteps = -1, int midpointSteps = -1)
         {
             With(network, native =>
             {
-                var rung = new NativeRung
+                var qualityLevel = new NativeQualityLevel
                 {
                     Method = (uint)method,
                     Network = native,
@@ -79,12 +79,12 @@ namespace Phasefront
                     LocalSteps = localSteps,
                     MidpointSteps = midpointSteps,
                 };
-                Check(Native.pf_options_push_rung(this, ref rung));
+                Check(Native.pf_options_push_quality_level(this, ref qualityLevel));
                 return true;
             });
         }
 
-        /// <summary>Frames a second that are aimed at; 0 takes frames as they come and never steps on the ladder.</summary>
+        /// <summary>Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.</summary>
         public double TargetRateHz { set => Check(Native.pf_options_set_target_rate_hz(this, value)); }
 
         /// <summary>Encodes by double phase on the field as it is.</summary>
@@ -101,7 +101,7 @@ namespace Phasefront
         public void Deep(Network prefilter) => Check(Native.pf_options_set_deep(this, prefilter));
 
         /// <summary>Full light stands near the frame's largest amplitude, moving smoothly. The default.</summary>
-        public void SteadyBrightness() => Check(Native.pf_options_set_brightness_steady(this));
+        public void SmoothedBrightness() => Check(Native.pf_options_set_brightness_smoothed(this));
 
         /// <summary>Full light stands for this amplitude; what is brighter is clipped.</summary>
         public void FixedBrightness(float scale) => Check(Native.pf_options_set_brightness_fixed(this, scale));
@@ -127,7 +127,7 @@ namespace Phasefront
         /// <summary>Threads to compute with, 1 to 256.</summary>
         public int Threads { set => Check(Native.pf_options_set_threads(this, checked((uint)value))); }
 
-        /// <summary>Most pixels of a rung and of the modulator.</summary>
+        /// <summary>Most pixels of a quality level and of the modulator.</summary>
         public long MostPixels { set => Check(Native.pf_options_set_most_pixels(this, checked((ulong)value))); }
 
         /// <summary>Where frames are computed.</summary>

@@ -129,8 +129,8 @@ internal static class Tests
     private static SessionOptions OptionsOf(IDictionary<string, object> one, Target target, string models)
     {
         var name = (string)one["method"];
-        var method = name == "sweep" ? Method.Sweep : name == "by-sharpness" ? Method.BySharpness : Method.Trained;
-        var builtIn = name == "network" || name == "by-sharpness";
+        var method = name == "sweep" ? Method.Sweep : name == "auto" ? Method.Auto : Method.Trained;
+        var builtIn = name == "network" || name == "auto";
         using (var network = method == Method.Sweep ? null : builtIn ? Network.BuiltIn() : Model(models, name))
         {
             var options = SessionOptions.For(target, method, network);
@@ -225,7 +225,7 @@ internal static class Tests
         using (var options = SessionOptions.For(target, Method.Sweep))
         {
             Require(target.Size.Equals((48, 36)), "the display's size");
-            Refused(Status.Session, "listener", () => Session.Open(options, RunningMode.LiveStream));
+            Refused(Status.Session, "listener", () => Session.Open(options, RunningMode.Live));
             using (var session = Session.Open(options, RunningMode.Video))
             {
                 var frame = Sample(2);
@@ -256,7 +256,7 @@ internal static class Tests
     {
         public int Holograms, Dropped;
 
-        public void OnHologram(Hologram hologram)
+        public void OnProcessed(Hologram hologram)
         {
             using (hologram) Interlocked.Increment(ref Holograms);
             throw new Exception("a listener may throw");
@@ -276,10 +276,10 @@ internal static class Tests
         using (var options = SessionOptions.For(target))
         {
             options.TargetRateHz = 1000;
-            options.ClearLadder();
-            options.PushRung(Method.Sweep, null, 48, 36);
-            options.PushRung(Method.Sweep, null, 24, 18, localSteps: 0);
-            var session = Session.Open(options, RunningMode.LiveStream, heard);
+            options.ClearQualityLevels();
+            options.PushQualityLevel(Method.Sweep, null, 48, 36);
+            options.PushQualityLevel(Method.Sweep, null, 24, 18, localSteps: 0);
+            var session = Session.Open(options, RunningMode.Live, heard);
             session.WarmUp();
             for (var i = 1ul; i <= 20; i++) session.Submit(Sample(i * 1000000));
             while (session.Statistics.Pending > 0) Thread.Sleep(1);
@@ -298,7 +298,7 @@ internal static class Tests
         public readonly CountdownEvent Told = new CountdownEvent(20);
         public Session Session;
 
-        public void OnHologram(Hologram hologram)
+        public void OnProcessed(Hologram hologram)
         {
             hologram.Dispose();
             Begun.Set();
@@ -322,7 +322,7 @@ internal static class Tests
         using (var target = Target.FromToml("width = 48\nheight = 36"))
         using (var options = SessionOptions.For(target, Method.Sweep))
         {
-            listener.Session = Session.Open(options, RunningMode.LiveStream, listener);
+            listener.Session = Session.Open(options, RunningMode.Live, listener);
             listener.Session.Submit(Sample(1));
             Require(listener.Begun.Wait(60000), "the first frame is a hologram");
             for (var i = 2ul; i <= 20; i++) listener.Session.Submit(Sample(i));

@@ -169,7 +169,7 @@ impl RawFrame {
     /// `frame`: another turn than 0, 90, 180, 270.
     pub fn orientation(&mut self, degrees: u32, mirrored: bool) -> Answer<()> {
         let rotation = match degrees {
-            0 => Rotation::None,
+            0 => Rotation::Upright,
             90 => Rotation::Clockwise90,
             180 => Rotation::Half,
             270 => Rotation::Clockwise270,

@@ -43,7 +43,7 @@ impl RawHologram {
                 range.map_or(JsValue::NULL, |range| Array::from_iter(range).into()),
             ),
             ("validDepth", self.core.valid_depth().into()),
-            ("rung", self.core.rung().into()),
+            ("qualityLevel", self.core.quality_level().into()),
             ("times", times(self.core.times()).into()),
         ])
     }

@@ -4,7 +4,7 @@ use crate::error::{Answer, setting};
 use crate::network::RawNetwork;
 use crate::target::RawTarget;
 use phasefront::input::DepthRange;
-use phasefront::session::{Quality, Rung, SessionOptions};
+use phasefront::session::{Quality, QualityLevel, SessionOptions};
 use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
@@ -13,7 +13,7 @@ use wasm_bindgen::prelude::*;
 enum Maker {
     Trained(Arc<Network>),
     Sweep,
-    BySharpness(Arc<Network>),
+    Auto(Arc<Network>),
 }
 
 /// What makes holograms.
@@ -33,9 +33,8 @@ impl RawMethod {
     }
 
     /// What suits each frame's depth.
-    #[wasm_bindgen(js_name = bySharpness)]
-    pub fn by_sharpness(network: &RawNetwork) -> RawMethod {
-        RawMethod(Maker::BySharpness(network.core.clone()))
+    pub fn auto(network: &RawNetwork) -> RawMethod {
+        RawMethod(Maker::Auto(network.core.clone()))
     }
 }
 
@@ -44,12 +43,12 @@ impl RawMethod {
         match &self.0 {
             Maker::Trained(network) => Method::trained(network.clone()),
             Maker::Sweep => Method::Sweep(Sweep::for_display(&target.display)),
-            Maker::BySharpness(network) => Method::BySharpness(Sweep::for_display(&target.display), network.clone()),
+            Maker::Auto(network) => Method::Auto(Sweep::for_display(&target.display), network.clone()),
         }
     }
 }
 
-/// Options of a session. Encoding, then the corrections, then rungs: each takes up what was set before.
+/// Options of a session. Encoding, then the corrections, then quality levels: each takes up what was set before.
 #[wasm_bindgen]
 pub struct RawOptions {
     pub(crate) core: SessionOptions,
@@ -57,8 +56,9 @@ pub struct RawOptions {
 
 #[wasm_bindgen]
 impl RawOptions {
-    /// What is usual for `target`.
-    pub fn usual(target: &RawTarget) -> RawOptions {
+    /// The default options for `target`.
+    #[wasm_bindgen(js_name = withDefaults)]
+    pub fn with_defaults(target: &RawTarget) -> RawOptions {
         RawOptions {
             core: phasefront_models::session_options(target.core.clone()),
         }
@@ -101,18 +101,18 @@ impl RawOptions {
         self.core.encoder = EncoderOptions::from(Encoding::Deep(prefilter.core.clone()));
     }
 
-    /// `steady`, `frame-max`, or `fixed` at an amplitude.
+    /// `smoothed`, `frame-max`, or `fixed` at an amplitude.
     ///
     /// # Errors
     /// `setting`: an unknown name, or a fixed brightness without its amplitude.
     pub fn brightness(&mut self, name: &str, scale: Option<f32>) -> Answer<()> {
         self.core.encoder.brightness = match (name, scale) {
-            ("steady", _) => Brightness::Steady,
+            ("smoothed", _) => Brightness::Smoothed,
             ("frame-max", _) => Brightness::FrameMax,
             ("fixed", Some(scale)) => Brightness::Fixed(scale),
             (other, _) => {
                 return Err(setting(&format!(
-                    "there is no brightness '{other}'; there are steady, frame-max, and fixed with its scale"
+                    "there is no brightness '{other}'; there are smoothed, frame-max, and fixed with its scale"
                 )));
             }
         };
@@ -144,26 +144,26 @@ impl RawOptions {
         self.core.target_rate_hz = Some(rate);
     }
 
-    /// Most pixels of a rung and of the modulator.
+    /// Most pixels of a quality level and of the modulator.
     #[wasm_bindgen(js_name = mostPixels)]
     pub fn most_pixels(&mut self, pixels: u32) {
         self.core.most_pixels = pixels as usize;
     }
 
-    /// The rung that the session stays on; none lets it step.
-    pub fn quality(&mut self, rung: Option<u32>) {
-        self.core.quality = quality(rung);
+    /// The quality level that the session stays at; none lets it change.
+    pub fn quality(&mut self, quality_level: Option<u32>) {
+        self.core.quality = quality(quality_level);
     }
 
-    /// An empty ladder.
-    #[wasm_bindgen(js_name = clearLadder)]
-    pub fn clear_ladder(&mut self) {
-        self.core.ladder.clear();
+    /// Removes all quality levels.
+    #[wasm_bindgen(js_name = clearQualityLevels)]
+    pub fn clear_quality_levels(&mut self) {
+        self.core.quality_levels.clear();
     }
 
-    /// Another rung, below those that are there.
-    #[wasm_bindgen(js_name = pushRung)]
-    pub fn push_rung(
+    /// Adds a quality level, below those that are there.
+    #[wasm_bindgen(js_name = pushQualityLevel)]
+    pub fn push_quality_level(
         &mut self,
         method: &RawMethod,
         width: u32,
@@ -171,7 +171,7 @@ impl RawOptions {
         local_steps: Option<u32>,
         midpoint_steps: Option<u32>,
     ) {
-        self.core.ladder.push(Rung {
+        self.core.quality_levels.push(QualityLevel {
             method: method.core(&self.core.target),
             width: width as usize,
             height: height as usize,
@@ -191,7 +191,9 @@ fn stepped(encoder: &EncoderOptions, local_steps: Option<u32>, midpoint_steps: O
     }
 }
 
-/// The rung that a session stays on, or none.
-pub(crate) fn quality(rung: Option<u32>) -> Quality {
-    rung.map_or(Quality::Adaptive, |rung| Quality::Fixed(rung as usize))
+/// The quality level that a session stays at, or none.
+pub(crate) fn quality(quality_level: Option<u32>) -> Quality {
+    quality_level.map_or(Quality::Adaptive, |quality_level| {
+        Quality::Fixed(quality_level as usize)
+    })
 }

@@ -83,13 +83,13 @@ impl RawSession {
         self.core.reset();
     }
 
-    /// Fixes the rung, or lets the session step.
+    /// Fixes the quality level, or lets the session change it.
     ///
     /// # Errors
-    /// `setting`: a rung that is not on the ladder.
+    /// `setting`: a quality level that the session does not have.
     #[wasm_bindgen(js_name = setQuality)]
-    pub fn set_quality(&self, rung: Option<u32>) -> Answer<()> {
-        self.core.set_quality(quality(rung)).map_err(of_core)
+    pub fn set_quality(&self, quality_level: Option<u32>) -> Answer<()> {
+        self.core.set_quality(quality(quality_level)).map_err(of_core)
     }
 
     /// What the session has done so far: an object of the form `Statistics`.
@@ -105,7 +105,7 @@ impl RawSession {
             ("times", times(core.times).into()),
             ("backend", core.backend.name.into()),
             ("backendWhy", core.backend.why.into()),
-            ("rung", core.rung.into()),
+            ("qualityLevel", core.quality_level.into()),
         ])
     }
 }

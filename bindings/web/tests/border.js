@@ -35,7 +35,7 @@ export async function run() {
   refused("network", "", () => Network.fromBytes(bytes(100)));
   refused("network", "no 'rgbd-9' is built in", () => Network.builtIn("rgbd-9"));
   refused("network", "no pair", () => Network.builtInPair(3));
-  refused("setting", "no mode 'live-stream'", () => new Session({ target }, "live-stream"));
+  refused("setting", "no mode 'live'", () => new Session({ target }, "live"));
   refused("setting", "no mode 'film'", () => new Session({ target }, "film"));
   refused("setting", "no method 'magic'", () => new Session({ target, method: { kind: "magic" } }));
   refused("setting", "no encoding 'triple-phase'", () => new Session({ target, encoding: { kind: "triple-phase" } }));

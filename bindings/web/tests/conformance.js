@@ -11,7 +11,7 @@ async function targetOf(one) {
 }
 
 async function methodOf(name) {
-  const kinds = { network: "trained", "by-sharpness": "by-sharpness" };
+  const kinds = { network: "trained", auto: "auto" };
   if (name === "sweep") return { kind: "sweep" };
   return { kind: kinds[name] ?? "trained", network: name in kinds ? Network.builtIn() : await model(name) };
 }

@@ -4,9 +4,9 @@ import { Frame, Network, Session, Target, load, type Display, type SessionOption
 const display: Display = { width: 640, height: 480, wavelengthsNm: [532] };
 const options: SessionOptions = {
   target: Target.ofDisplay(display),
-  ladder: [{ method: { kind: "trained", network: Network.builtIn() }, width: 640, height: 480 }],
+  qualityLevels: [{ method: { kind: "trained", network: Network.builtIn() }, width: 640, height: 480 }],
   encoding: { kind: "anti-alias", sigma: 0.7, width: 3 },
-  quality: { kind: "fixed", rung: 0 },
+  quality: { kind: "fixed", qualityLevel: 0 },
 };
 
 export async function show(context: CanvasRenderingContext2D, metres: Float32Array): Promise<ImageData> {
@@ -24,7 +24,7 @@ export async function show(context: CanvasRenderingContext2D, metres: Float32Arr
 }
 
 // @ts-expect-error: there is no such mode
-new Session(options, "live-stream");
+new Session(options, "live");
 // @ts-expect-error: an encoding has a kind of its own
 new Session({ encoding: "anti-alias" });
 // @ts-expect-error: networks are made by name or bytes

@@ -2,8 +2,8 @@ import ARKit
 import Phasefront
 import UIKit
 
-/// Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on, the
-/// levels on an external screen where there is one, and what it costs.
+/// Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on,
+/// the levels on an external screen where there is one, and what it costs.
 @MainActor
 final class Show: ObservableObject {
     @Published var preview: CGImage?
@@ -20,7 +20,7 @@ final class Show: ObservableObject {
             try Log.sendToSystem()
             var options = try SessionOptions(display: display)
             options.targetRateHz = 30
-            let session = try Session(options, mode: .liveStream)
+            let session = try Session(options, mode: .live)
             let source: FrameSource = CameraSource.isSupported ? CameraSource() : SampleSource()
             source.start(session)
             defer { source.stop() }
@@ -28,7 +28,7 @@ final class Show: ObservableObject {
                 if Task.isCancelled { break }
                 try session.setThermal(Thermal(ProcessInfo.processInfo.thermalState))
                 switch event {
-                case .hologram(let hologram): try await show(hologram, of: session)
+                case .processed(let hologram): try await show(hologram, of: session)
                 case .failed(_, let message): say(message)
                 case .dropped, .qualityChanged: break
                 }

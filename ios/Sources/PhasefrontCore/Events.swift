@@ -3,12 +3,12 @@ import Foundation
 /// What becomes of the frames of a live stream, in the order in which it happened.
 public enum SessionEvent: Sendable {
     /// A frame became a hologram.
-    case hologram(Hologram)
+    case processed(Hologram)
     /// A frame was dropped.
     case dropped(timestampNs: UInt64, reason: DropReason)
     /// A frame could not be processed. The session goes on.
     case failed(timestampNs: UInt64, message: String)
-    /// The frames after this one are made on another rung of the ladder.
+    /// The frames after this one are made at another quality level.
     case qualityChanged(timestampNs: UInt64, change: QualityChange)
 }
 
@@ -36,8 +36,8 @@ public final class SessionEvents: AsyncSequence, Sendable {
                 return reader
             }
             state.waiting.append(event)
-            let holograms = state.waiting.indices.filter { state.waiting[$0].isHologram }
-            if holograms.count > Self.mostHolograms, case .hologram(let oldest) = state.waiting[holograms[0]] {
+            let holograms = state.waiting.indices.filter { state.waiting[$0].isProcessed }
+            if holograms.count > Self.mostHolograms, case .processed(let oldest) = state.waiting[holograms[0]] {
                 state.waiting[holograms[0]] = .dropped(timestampNs: oldest.info.timestampNs, reason: .unread)
             }
             return nil
@@ -91,7 +91,7 @@ public final class SessionEvents: AsyncSequence, Sendable {
 }
 
 extension SessionEvent {
-    fileprivate var isHologram: Bool {
+    fileprivate var isProcessed: Bool {
         if case .hologram = self { true } else { false }
     }
 }
@@ -120,7 +120,7 @@ final class Listener: SessionListener {
         self.end = end
     }
 
-    func onHologram(hologram: RawHologram) throws { tell(.hologram(try Hologram(hologram))) }
+    func onProcessed(hologram: RawHologram) throws { tell(.processed(try Hologram(hologram))) }
 
     func onDropped(timestampNs: UInt64, reason: DropReason) throws {
         tell(.dropped(timestampNs: timestampNs, reason: reason))

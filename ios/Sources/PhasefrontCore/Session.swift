@@ -14,8 +14,8 @@ public final class Session: Sendable {
     public let events: SessionEvents
     private let raw: RawSession
 
-    /// A session that runs in `mode`. In a live stream `listener` is called on the session's own thread, one event after
-    /// another, and no frame is processed while it is busy; without one, read ``events``.
+    /// A session that runs in `mode`. In a live stream `listener` is called on the session's own thread, one event
+    /// after another, and no frame is processed while it is busy; without one, read ``events``.
     ///
     /// - Throws: ``PhasefrontError``: options that cannot be meant or planned for.
     public init(
@@ -24,7 +24,7 @@ public final class Session: Sendable {
         let events = SessionEvents()
         self.events = events
         switch (mode, listener) {
-        case (.liveStream, nil):
+        case (.live, nil):
             let listener = Listener({ events.push($0) }, end: { events.finish() })
             raw = try RawSession(options: options, mode: mode, listener: listener)
         case (_, let listener):
@@ -76,7 +76,7 @@ public final class Session: Sendable {
     /// Says how hot the device is.
     public func setThermal(_ thermal: Thermal) throws { try raw.setThermal(thermal: thermal) }
 
-    /// Allows or forbids steps on the ladder.
+    /// Allows or forbids changes of the quality level.
     public func setQuality(_ quality: Quality) throws { try raw.setQuality(quality: quality) }
 
     /// What the session has done so far; of a closed one, what it did. Never waits for a frame.
@@ -89,8 +89,8 @@ public final class Session: Sendable {
 }
 
 extension SessionOptions {
-    /// What is usual for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the network
-    /// that is built in, by the plane sweep where that was not trained for it. Change what is not.
+    /// The default options for `display`: holograms of its resolution by `method` and AA-DPM, or, without one, by the
+    /// network that is built in, by the plane sweep where that was not trained for it. Change what is not.
     ///
     /// - Throws: ``PhasefrontError/Display(message:)`` for a display that cannot be.
     public init(display: Display = Display(), method: Method? = nil) throws {

@@ -92,7 +92,7 @@ final class ConformanceTests: XCTestCase {
         switch name {
         case "network": .trained(network: try network.get())
         case "sweep": .sweep
-        case "by-sharpness": .bySharpness(network: try network.get())
+        case "auto": .auto(network: try network.get())
         default: .trained(network: try model(name))
         }
     }

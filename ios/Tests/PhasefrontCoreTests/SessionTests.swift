@@ -117,11 +117,11 @@ final class SessionTests: XCTestCase {
 
     func testALiveStreamAnswersEveryFrameOnItsOwnThread() throws {
         let answered = Locked<(timestamps: [UInt64], threads: Set<Thread>)>(([], []))
-        let session = try Session(options(), mode: .liveStream) { event in
+        let session = try Session(options(), mode: .live) { event in
             answered.withLock {
                 $0.threads.insert(Thread.current)
                 switch event {
-                case .hologram(let hologram): $0.timestamps.append(hologram.info.timestampNs)
+                case .processed(let hologram): $0.timestamps.append(hologram.info.timestampNs)
                 case .dropped(let timestampNs, _): $0.timestamps.append(timestampNs)
                 default: XCTFail("\(event)")
                 }
@@ -138,7 +138,7 @@ final class SessionTests: XCTestCase {
     }
 
     func testAsyncEventsTellTheSame() async throws {
-        let session = try Session(options(), mode: .liveStream)
+        let session = try Session(options(), mode: .live)
         let submitting = Task.detached {
             for i in 1...50 as ClosedRange<UInt64> { try session.submit(still(timestampNs: i)) }
             try session.close()
@@ -146,7 +146,7 @@ final class SessionTests: XCTestCase {
         var timestamps: [UInt64] = []
         for await event in session.events {
             switch event {
-            case .hologram(let hologram): timestamps.append(hologram.info.timestampNs)
+            case .processed(let hologram): timestamps.append(hologram.info.timestampNs)
             case .dropped(let timestampNs, _): timestamps.append(timestampNs)
             default: XCTFail("\(event)")
             }
@@ -156,7 +156,7 @@ final class SessionTests: XCTestCase {
     }
 
     func testUnreadEventsHoldTwoHologramsAtMost() async throws {
-        let session = try Session(options(), mode: .liveStream)
+        let session = try Session(options(), mode: .live)
         for i in 1...8 as ClosedRange<UInt64> {
             try session.submit(still(timestampNs: i))
             while try session.statistics().pending > 0 { usleep(1000) }
@@ -174,7 +174,7 @@ final class SessionTests: XCTestCase {
     }
 
     func testACancelledReaderEnds() async throws {
-        let session = try Session(options(), mode: .liveStream)
+        let session = try Session(options(), mode: .live)
         let reading = Task { for await _ in session.events {} }
         try await Task.sleep(nanoseconds: 20_000_000)
         reading.cancel()
@@ -184,7 +184,7 @@ final class SessionTests: XCTestCase {
 
     func testALateFrameInAStreamHarmsNothing() throws {
         let made = DispatchSemaphore(value: 0)
-        let session = try Session(options(), mode: .liveStream) { if case .hologram = $0 { made.signal() } }
+        let session = try Session(options(), mode: .live) { if case .hologram = $0 { made.signal() } }
         try session.submit(still(timestampNs: 5))
         XCTAssertEqual(made.wait(timeout: .now() + 60), .success)
         assertRefused("5 ns") { try session.submit(still(timestampNs: 5)) }
@@ -195,7 +195,7 @@ final class SessionTests: XCTestCase {
     func testAListenerMayCloseItsSession() throws {
         let closed = DispatchSemaphore(value: 0)
         let box = Locked<Session?>(nil)
-        let session = try Session(options(), mode: .liveStream) { _ in
+        let session = try Session(options(), mode: .live) { _ in
             let own = box.withLock { $0 }
             do { try own?.close() } catch { XCTFail("\(error)") }
             closed.signal()
@@ -247,7 +247,7 @@ final class SessionTests: XCTestCase {
         let image = try Session(options(), mode: .image)
         assertRefused("not live") { try image.submit(still()) }
         for await event in image.events { XCTFail("\(event)") }
-        let live = try Session(options(), mode: .liveStream)
+        let live = try Session(options(), mode: .live)
         assertRefused("submitted") { try live.process(still()) }
         assertRefused("listener") { try Session(options(), mode: .video) { _ in } }
     }
@@ -269,10 +269,10 @@ final class SessionTests: XCTestCase {
                 return try Session(changed, mode: .image)
             }
         }
-        assertRefused("ladder is empty", make { $0.ladder = [] })
+        assertRefused("no quality levels", make { $0.qualityLevels = [] })
         assertRefused("0 threads", make { $0.threads = 0 })
         assertRefused("target rate", make { $0.targetRateHz = .nan })
-        assertRefused("no rung 3", make { $0.quality = .fixed(rung: 3) })
+        assertRefused("no quality level 3", make { $0.quality = .fixed(qualityLevel: 3) })
         let fine = try Target.ofDisplay(display: Display(width: 64, height: 48, pitchUm: 3.74))
         assertRefused("pitch") { try Session(SessionOptions(target: fine, network: network.get()), mode: .image) }
         let tiny = try Target.ofDisplay(display: Display(width: 32, height: 24))
@@ -299,7 +299,7 @@ final class SessionTests: XCTestCase {
     func testTheNetworkThatIsBuiltInIsUsual() throws {
         for offset in [0.0, 3, 12] {
             let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
-            guard case .trained = usual.ladder[0].method else { return XCTFail("\(usual.ladder)") }
+            guard case .trained = usual.qualityLevels[0].method else { return XCTFail("\(usual.qualityLevels)") }
             guard case .antiAlias = usual.encoding else { return XCTFail("\(usual.encoding)") }
             _ = try Session(usual, mode: .image).process(still())
         }
@@ -325,7 +325,7 @@ final class SessionTests: XCTestCase {
         options.midpointSteps = 1
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
         options.midpointSteps = 0
-        options.ladder[0].midpointSteps = 1
+        options.qualityLevels[0].midpointSteps = 1
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
         options = usual
         options.localSteps = 9
@@ -336,7 +336,7 @@ final class SessionTests: XCTestCase {
 
     func testWithoutANetworkTheSweepIsUsual() throws {
         let usual = try SessionOptions(display: Display(width: 64, height: 48, pitchUm: 3.74))
-        guard case .sweep = usual.ladder[0].method else { return XCTFail("\(usual.ladder)") }
+        guard case .sweep = usual.qualityLevels[0].method else { return XCTFail("\(usual.qualityLevels)") }
         _ = try Session(usual, mode: .image).process(still())
         assertRefused("pairs for 0, 6, 12 mm") { try builtInPair(offsetMm: 3) }
     }

@@ -5,7 +5,7 @@ use clap::Args;
 use phasefront::{Display, Method};
 use phasefront_lab::doctor::{self, Check, Machine};
 use phasefront_lab::{Result, gpu, models};
-use phasefront_models::usual_network;
+use phasefront_models::default_network;
 use serde::Serialize;
 use serde_json::json;
 
@@ -54,7 +54,7 @@ impl Doctor {
 impl Chosen {
     fn of(display: &Display) -> Result<Self> {
         let (height, width) = (display.height(), display.width());
-        let network = usual_network(display);
+        let network = default_network(display);
         let method = match &network {
             Some(network) => format!(
                 "auto: the plane sweep where depth is sharp, the network of {} layers where it is ragged",

@@ -21,7 +21,7 @@ use phasefront_lab::ldi::{Ldi, LdiLayer};
 use phasefront_lab::models::Precision;
 use phasefront_lab::point_based::{self, Occlusion};
 use phasefront_lab::{Error, Result, evaluate, gpu, models, output, packed, sm_lbm};
-use phasefront_models::usual_network;
+use phasefront_models::default_network;
 use serde::Serialize;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -511,7 +511,7 @@ impl Making {
 
     /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
     fn by_sharpness(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
-        let trained = self.network.is_some() || usual_network(display).is_some();
+        let trained = self.network.is_some() || default_network(display).is_some();
         Ok(match trained && !sharpness::measure(frame).is_sharp() {
             true => CoreMethod::Network,
             false => CoreMethod::Sweep,

@@ -184,7 +184,7 @@ impl Judge {
     }
 
     fn ways(&self, display: &phasefront::Display) -> Vec<Way> {
-        let trained = phasefront_models::usual_network(display).is_some();
+        let trained = phasefront_models::default_network(display).is_some();
         let usual = match trained {
             true => vec![CoreMethod::Sweep, CoreMethod::Network, CoreMethod::Seeded],
             false => vec![CoreMethod::Sweep],

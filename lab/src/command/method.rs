@@ -69,7 +69,7 @@ impl CoreMethod {
             }
             CoreMethod::Auto => {
                 let network = models::network(network.unwrap_or("8"), precision)?;
-                (Method::BySharpness(sweep, network), encoder.read()?)
+                (Method::Auto(sweep, network), encoder.read()?)
             }
         })
     }

@@ -1,5 +1,5 @@
-//! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and steadied
-//! video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
+//! `phasefront study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and temporally
+//! smoothed video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
 
 use super::flags::{DisplayFlags, check_used, progress_bar};
 use clap::{Args, ValueEnum};

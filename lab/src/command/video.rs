@@ -68,7 +68,7 @@ pub(crate) struct Video {
     #[command(flatten)]
     backend: BackendFlags,
     /// Which amplitude full light stands for
-    #[arg(long, value_enum, default_value_t = BrightnessName::Steady)]
+    #[arg(long, value_enum, default_value_t = BrightnessName::Smoothed)]
     brightness: BrightnessName,
     /// Frames a second of the input [default: a film's own; else 30]
     #[arg(long, value_name = "N")]
@@ -101,13 +101,13 @@ pub(crate) struct Video {
 #[derive(Clone, Copy, ValueEnum)]
 enum BrightnessName {
     /// What all but one pixel of a thousand stay under, smoothed over time
-    Steady,
+    Smoothed,
     /// Each frame's largest
     Max,
 }
 
-/// Warms a session up whose options asked for the backend `asked`. Warns where the GPU was asked for and does not serve;
-/// where it does, keeps what was compiled for it.
+/// Warms a session up whose options asked for the backend `asked`. Warns where the GPU was asked for and does not
+/// serve; where it does, keeps what was compiled for it.
 fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
     session.warm_up()?;
     match session.gpu() {
@@ -263,7 +263,7 @@ impl Video {
         let mut options = SessionOptions::new(target, method);
         options.encoder = encoder.options;
         options.encoder.brightness = match self.brightness {
-            BrightnessName::Steady => Brightness::Steady,
+            BrightnessName::Smoothed => Brightness::Smoothed,
             BrightnessName::Max => Brightness::FrameMax,
         };
         options.depth.range = match self.depth.range()? {
@@ -280,10 +280,10 @@ impl Video {
             options.quality = Quality::Adaptive;
             options.target_rate_hz = Some(rate);
             for part in [2, 4] {
-                let mut rung = options.ladder[0].clone();
-                rung.height = (height / part).max(1);
-                rung.width = (width / part).max(1);
-                options.ladder.push(rung);
+                let mut quality_level = options.quality_levels[0].clone();
+                quality_level.height = (height / part).max(1);
+                quality_level.width = (width / part).max(1);
+                options.quality_levels.push(quality_level);
             }
         }
         let info = HologramInfo {
@@ -350,7 +350,7 @@ impl Video {
         let listener = {
             let (bar, failure) = (bar.clone(), failure.clone());
             move |event| match event {
-                Event::Hologram(hologram) => {
+                Event::Processed(hologram) => {
                     bar.inc(1);
                     // The writer ends only when this thread does.
                     let _ = sender.send(hologram);
@@ -361,9 +361,10 @@ impl Video {
                     let mut failure = failure.lock().unwrap_or_else(|e| e.into_inner());
                     failure.get_or_insert((timestamp_ns, error));
                 }
-                Event::QualityChanged { change, .. } => {
-                    bar.println(format!("rung {} to {}: {:?}", change.from, change.to, change.reason))
-                }
+                Event::QualityChanged { change, .. } => bar.println(format!(
+                    "quality level {} to {}: {:?}",
+                    change.from, change.to, change.reason
+                )),
                 _ => {}
             }
         };
@@ -426,7 +427,7 @@ impl Video {
             },
             "seconds": seconds, "rate_hz": s.processed as f64 / seconds, "recent_rate_hz": s.rate_hz,
             "stage_ms": stages, "total_ms": ms(s.times.total()), "backend": s.backend.name,
-            "backend_reason": s.backend.why, "rung": s.rung, "scale_change": change, "memory_mb": memory_mb,
+            "backend_reason": s.backend.why, "quality_level": s.quality_level, "scale_change": change, "memory_mb": memory_mb,
         });
         sink.write_report(&result)?;
         super::print(

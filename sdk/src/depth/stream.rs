@@ -1,12 +1,12 @@
-//! The depth of a sequence of camera frames, each brought to the display: readings, alignment, steadying, range,
-//! refinement, in this order.
+//! The depth of a sequence of camera frames, each brought to the display: readings, alignment, temporal smoothing,
+//! range, refinement, in this order.
 
 use super::align::Cameras;
 use super::camera::{Alignment, CameraFrame};
 use super::image::{DepthFormat, DepthImage};
 use super::range::{DepthRange, RangeTracker};
 use super::refine::{RefineScratch, Refiner};
-use super::steady::Steadier;
+use super::smoothing::Smoother;
 use crate::error::{Error, Result};
 use crate::frame::{Crop, Orientation};
 use std::time::Duration;
@@ -78,7 +78,7 @@ pub struct DepthStream {
     options: DepthOptions,
     out: (usize, usize),
     range: RangeTracker,
-    steadier: Steadier,
+    smoother: Smoother,
     plan: Option<Plan>,
 }
 
@@ -93,7 +93,7 @@ impl DepthStream {
             options,
             out,
             range: RangeTracker::new(options.range),
-            steadier: Steadier::default(),
+            smoother: Smoother::default(),
             plan: None,
         })
     }
@@ -101,12 +101,12 @@ impl DepthStream {
     /// Forgets the frames before.
     pub fn reset(&mut self) {
         self.range.reset();
-        self.steadier.reset();
+        self.smoother.reset();
     }
 
     /// The normalized depth of `frame` into `depth`, (H, W) in \[0, 1], along the edges of `rgb`, (3, H, W), what
     /// [`Crop::cover`] shows of its colour. `elapsed` is the time since the frame before, None where there is none to
-    /// steady with. Frames of one layout allocate nothing after the first.
+    /// smooth with. Frames of one layout allocate nothing after the first.
     ///
     /// # Errors
     /// Depth without any usable reading.
@@ -153,7 +153,7 @@ impl DepthStream {
         let elapsed = elapsed.unwrap_or_default();
         let width = plan.upright().1;
         let metric = layout.format.is_metric();
-        self.steadier.steady(&mut plan.values, width, elapsed, metric);
+        self.smoother.smooth(&mut plan.values, width, elapsed, metric);
         let range_m = match metric {
             true => Some(self.range.next(&plan.values, elapsed)?),
             false => None,

@@ -46,9 +46,9 @@ pub struct EncoderScratch {
 
 impl EncoderScratch {
     /// Has fields end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         if let Some(prefilter) = &mut self.prefilter {
-            prefilter.heed(cancel);
+            prefilter.set_cancel(cancel);
         }
         self.cancel = cancel.clone();
     }

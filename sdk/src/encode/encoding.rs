@@ -82,9 +82,9 @@ pub(super) enum PrefilterScratch {
 
 impl PrefilterScratch {
     /// Has a network end where `cancel` is requested.
-    pub(super) fn heed(&mut self, cancel: &Cancel) {
+    pub(super) fn set_cancel(&mut self, cancel: &Cancel) {
         if let PrefilterScratch::Deep(scratch) = self {
-            scratch.heed(cancel);
+            scratch.set_cancel(cancel);
         }
     }
 }

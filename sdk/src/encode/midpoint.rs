@@ -64,7 +64,7 @@ pub struct MidpointScratch {
 
 impl MidpointScratch {
     /// Has steps end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
     }
 }

@@ -57,7 +57,7 @@ impl<'a> Plane<'a> {
 pub enum Rotation {
     /// Not at all.
     #[default]
-    None,
+    Upright,
     /// A quarter turn.
     Clockwise90,
     /// Half a turn.
@@ -99,7 +99,7 @@ impl Orientation {
     /// The upright picture's (H, W) of a sensor's (`height`, `width`).
     pub fn upright_shape(self, height: usize, width: usize) -> (usize, usize) {
         match self.rotation {
-            Rotation::None | Rotation::Half => (height, width),
+            Rotation::Upright | Rotation::Half => (height, width),
             Rotation::Clockwise90 | Rotation::Clockwise270 => (width, height),
         }
     }
@@ -107,7 +107,7 @@ impl Orientation {
     /// Whether the upright picture runs against the sensor along x and along y.
     pub(crate) fn flips(self) -> (bool, bool) {
         let (x, y) = match self.rotation {
-            Rotation::None => (false, false),
+            Rotation::Upright => (false, false),
             Rotation::Clockwise90 => (true, false),
             Rotation::Half => (true, true),
             Rotation::Clockwise270 => (false, true),
@@ -120,7 +120,7 @@ impl Orientation {
         let (_, upright_width) = self.upright_shape(height, width);
         let x = if self.mirrored { upright_width - 1 - x } else { x };
         match self.rotation {
-            Rotation::None => (x, y),
+            Rotation::Upright => (x, y),
             Rotation::Clockwise90 => (y, height - 1 - x),
             Rotation::Half => (width - 1 - x, height - 1 - y),
             Rotation::Clockwise270 => (width - 1 - y, x),
@@ -152,8 +152,8 @@ mod tests {
         let bytes = [1, 0, 2, 0, 3, 0, 9, 4, 0, 5, 0, 6];
         let plane = Plane::new(&bytes, 7, 2);
         for (rotation, mirrored, upright) in [
-            (Rotation::None, false, vec![1, 2, 3, 4, 5, 6]),
-            (Rotation::None, true, vec![3, 2, 1, 6, 5, 4]),
+            (Rotation::Upright, false, vec![1, 2, 3, 4, 5, 6]),
+            (Rotation::Upright, true, vec![3, 2, 1, 6, 5, 4]),
             (Rotation::Clockwise90, false, vec![4, 1, 5, 2, 6, 3]),
             (Rotation::Clockwise90, true, vec![1, 4, 2, 5, 3, 6]),
             (Rotation::Half, false, vec![6, 5, 4, 3, 2, 1]),

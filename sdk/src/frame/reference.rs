@@ -70,7 +70,7 @@ fn mean(
 fn turn(orientation: Orientation, x: f64, y: f64) -> (f64, f64) {
     use super::plane::Rotation;
     let (x, y) = match orientation.rotation {
-        Rotation::None => (x, y),
+        Rotation::Upright => (x, y),
         Rotation::Clockwise90 => (1.0 - y, x),
         Rotation::Half => (1.0 - x, 1.0 - y),
         Rotation::Clockwise270 => (y, 1.0 - x),

@@ -1,4 +1,4 @@
-//! The scale of a frame where brightness is steady, found without leaving the GPU. The twin of the core's
+//! The scale of a frame where brightness is smoothed, found without leaving the GPU. The twin of the core's
 //! `brightness.rs`.
 
 use super::Result;
@@ -11,13 +11,13 @@ const THREADS: usize = 256;
 const MOST_GROUPS: usize = 1024;
 
 /// Finds the scale of (3, H, W) fields in one buffer.
-pub(super) struct Steadier {
+pub(super) struct Smoother {
     past: Constants,
     bins: wgpu::Buffer,
     steps: [Dispatch; 2],
 }
 
-impl Steadier {
+impl Smoother {
     /// `found` is one u32: the bits of the scale's square.
     pub(super) fn new(device: &Device, field: &wgpu::Buffer, len: usize, found: &wgpu::Buffer) -> Result<Self> {
         let (count, over) = looked_at(len);
@@ -48,11 +48,11 @@ impl Steadier {
                 .program("the scale", source, "settle")
                 .on(device, &settled, [1, 1, 1])?,
         ];
-        Ok(Steadier { past, bins, steps })
+        Ok(Smoother { past, bins, steps })
     }
 
     /// Where the scale of the frame comes from that is submitted next.
-    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         let words = past.map_or(alone(), |past| [past.scale, past.share, 0.0, 0.0]);
         device
             .queue
@@ -93,8 +93,8 @@ mod tests {
                 given.iter_mut().step_by(STEP).take(spikes).for_each(bright);
                 let buffer = upload(&device, &given);
                 let found = device.buffer("the scale", 4).unwrap();
-                let steadier = device
-                    .guarded(|| Steadier::new(&device, &buffer, given.len(), &found))
+                let smoother = device
+                    .guarded(|| Smoother::new(&device, &buffer, given.len(), &found))
                     .unwrap();
                 for past in [
                     None,
@@ -103,11 +103,11 @@ mod tests {
                         share: 0.03,
                     }),
                 ] {
-                    steadier.heed(&device, past);
+                    smoother.set_past(&device, past);
                     let mut encoder = device.inner.create_command_encoder(&Default::default());
-                    steadier.reset(&mut encoder);
+                    smoother.reset(&mut encoder);
                     device.queue.submit([encoder.finish()]);
-                    run(&device, |pass| steadier.run(pass));
+                    run(&device, |pass| smoother.run(pass));
                     let bytes = device.read(&found, 4).unwrap();
                     let square = f32::from_le_bytes(bytes.try_into().unwrap());
                     let expected = Percentile::new().scale(&given, past);

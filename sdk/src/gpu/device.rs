@@ -355,7 +355,7 @@ mod tests {
             memory_percent: Some(1),
             ..Default::default()
         };
-        // Drivers in software do not heed what memory there is.
+        // Drivers in software do not respect what memory there is.
         let hardware = Device::open_with(&DeviceOptions::default(), &little);
         let device = opened(hardware.or_else(|_| Device::open_with(&software(), &little)));
         let most = device.limits.max_storage_buffer_binding_size.min(1 << 28) as usize;

@@ -10,7 +10,7 @@ mod midpoint;
 
 pub(super) use mean_phase::MeanPhase;
 
-use super::brightness::Steadier;
+use super::brightness::Smoother;
 use super::chain::ChainOptions;
 use super::device::Device;
 use super::{GpuError, Result};
@@ -81,11 +81,11 @@ pub(super) struct EncoderJob<'a> {
 
 /// The encoding of one field buffer into several buffers.
 pub(super) struct Encoder {
-    /// Of steady brightness.
-    steadier: Option<Steadier>,
+    /// Of smoothed brightness.
+    smoother: Option<Smoother>,
     filter: Filter,
     double_phase: DoublePhase,
-    /// One u32: the bits of the largest squared amplitude, or of the squared steady scale.
+    /// One u32: the bits of the largest squared amplitude, or of the squared smoothed scale.
     pub(super) largest: wgpu::Buffer,
     brightness: Brightness,
 }
@@ -97,15 +97,15 @@ impl Encoder {
         let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
         let (filter, filtered) = Filter::new(device, job, &frame)?;
         let largest = device.buffer("the largest amplitude", 4)?;
-        let steadier = match job.options.brightness {
-            Brightness::Steady => {
+        let smoother = match job.options.brightness {
+            Brightness::Smoothed => {
                 let len = 3 * height * width;
-                Some(Steadier::new(device, job.field, len, &largest)?)
+                Some(Smoother::new(device, job.field, len, &largest)?)
             }
             _ => None,
         };
         Ok(Encoder {
-            steadier,
+            smoother,
             filter,
             double_phase: {
                 let shared = Shared::new(device, job, &frame, &filtered, &largest)?;
@@ -116,12 +116,12 @@ impl Encoder {
         })
     }
 
-    /// Which frame the one follows that is submitted next: steady brightness and steps at the midpoint go on from
+    /// Which frame the one follows that is submitted next: smoothed brightness and steps at the midpoint go on from
     /// there.
-    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
-        self.double_phase.heed(device, past);
-        if let Some(steadier) = &self.steadier {
-            steadier.heed(device, past);
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
+        self.double_phase.set_past(device, past);
+        if let Some(smoother) = &self.smoother {
+            smoother.set_past(device, past);
         }
     }
 
@@ -130,16 +130,16 @@ impl Encoder {
         if self.brightness == Brightness::FrameMax {
             encoder.clear_buffer(&self.largest, 0, None);
         }
-        if let Some(steadier) = &self.steadier {
-            steadier.reset(encoder);
+        if let Some(smoother) = &self.smoother {
+            smoother.reset(encoder);
         }
     }
 
     /// Encodes into the buffers of that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
         // Of the field as it comes, as on the CPU.
-        if let Some(steadier) = &self.steadier {
-            steadier.run(pass);
+        if let Some(smoother) = &self.smoother {
+            smoother.run(pass);
         }
         self.double_phase.keep(pass);
         self.filter.run(pass);

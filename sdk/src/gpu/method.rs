@@ -100,7 +100,7 @@ impl MethodPlan {
                 let trained = Trained::new(device, network, how, size, &seeded, options)?;
                 (packer, Way::Seeded(sweep, Box::new(seeded), trained))
             }
-            Method::BySharpness(..) => {
+            Method::Auto(..) => {
                 return Err(GpuError::Refused(
                     "the sharpness of depth, which chooses between sweep and network, is measured on the CPU only; one of them alone is right"
                         .into(),

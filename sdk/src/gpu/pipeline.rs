@@ -256,7 +256,7 @@ impl GpuPipeline {
         self.submit_after(None, frame, deliver)
     }
 
-    /// [`GpuPipeline::submit`] for steady brightness, whose scale comes from `past`.
+    /// [`GpuPipeline::submit`] for smoothed brightness, whose scale comes from `past`.
     ///
     /// # Errors
     /// As [`GpuPipeline::submit`].
@@ -269,7 +269,7 @@ impl GpuPipeline {
         let device = self.device.clone();
         let submission = device.guarded(|| {
             self.method.upload(&device, frame)?;
-            self.encoder.heed(&device, past);
+            self.encoder.set_past(&device, past);
             Ok(device.queue.submit([self.commands(slot, deliver)]))
         })?;
         self.serial += 1;

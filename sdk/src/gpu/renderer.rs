@@ -111,7 +111,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Hands a frame in, in the formats of the job, whose steady brightness comes from `past`. [`super::FLIGHTS`] may
+    /// Hands a frame in, in the formats of the job, whose smoothed brightness comes from `past`. [`super::FLIGHTS`] may
     /// be on their way.
     ///
     /// # Errors

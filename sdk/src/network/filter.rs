@@ -29,7 +29,7 @@ pub struct FilterScratch {
 
 impl FilterScratch {
     /// Has runs end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
         self.fused.cancel = cancel.clone();
     }
 }

@@ -24,7 +24,7 @@ impl BrightnessTracker {
     }
 
     /// Hears which scale a frame got.
-    pub(super) fn heed(&mut self, scale: f32) {
+    pub(super) fn set_scale(&mut self, scale: f32) {
         self.current = Some(scale);
     }
 }
@@ -46,8 +46,8 @@ mod tests {
 
     fn scale(tracker: &mut BrightnessTracker, field: &[Complex32], elapsed: Option<u64>) -> f32 {
         let past = tracker.past(elapsed.map(Duration::from_millis));
-        let scale = Brightness::Steady.scale(field, past, &mut Percentile::new());
-        tracker.heed(scale.unwrap_or(f32::NAN));
+        let scale = Brightness::Smoothed.scale(field, past, &mut Percentile::new());
+        tracker.set_scale(scale.unwrap_or(f32::NAN));
         scale.unwrap_or(f32::NAN)
     }
 

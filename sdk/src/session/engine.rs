@@ -1,4 +1,4 @@
-//! Where CPU and GPU meet: what takes a frame on one rung of the ladder from amplitudes and depth to levels, and which
+//! Where CPU and GPU meet: what takes a frame on one quality level from amplitudes and depth to levels, and which
 //! of the two it is. The one place that falls back from the GPU to the CPU.
 
 use super::SessionOptions;
@@ -6,7 +6,7 @@ use super::brightness::BrightnessTracker;
 use super::on_cpu::OnCpu;
 #[cfg(feature = "gpu")]
 use super::on_gpu::{Failure, OnGpu};
-use super::quality::{Backend, Rung};
+use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
 use crate::cancel::Cancel;
 use crate::depth::camera::CameraFrame;
@@ -41,7 +41,8 @@ pub(super) struct Encoded {
     pub(super) encode: Duration,
 }
 
-/// What a session knows of its GPU: rungs share the device, and none of them tries one again that is of no use.
+/// What a session knows of its GPU: quality levels share the device, and none of them tries one again that is of no
+/// use.
 #[derive(Default)]
 pub(super) struct GpuState {
     #[cfg(feature = "gpu")]
@@ -50,16 +51,16 @@ pub(super) struct GpuState {
     refusal: Option<String>,
 }
 
-/// What a rung is planned from.
-pub(super) struct RungContext<'a> {
+/// What a quality level is planned from.
+pub(super) struct LevelContext<'a> {
     pub(super) options: &'a SessionOptions,
-    pub(super) rung: &'a Rung,
+    pub(super) quality_level: &'a QualityLevel,
     pub(super) gpu: &'a mut GpuState,
     /// Gives up a frame on the CPU.
     pub(super) cancel: &'a Cancel,
 }
 
-/// The plan of a rung.
+/// The plan of a quality level.
 pub(super) struct Engine {
     processor: Processor,
     /// Why it is the CPU though the GPU was asked for.
@@ -75,14 +76,14 @@ enum Processor {
 }
 
 impl Engine {
-    /// Plans a rung where it is asked for, or on the CPU where the GPU does not serve.
+    /// Plans a quality level where it is asked for, or on the CPU where the GPU does not serve.
     ///
     /// # Errors
     /// What the CPU refuses too.
-    pub(super) fn new(context: &mut RungContext<'_>) -> Result<Self> {
-        let asked = context.rung.backend.unwrap_or(context.options.backend);
-        let on_cpu = |context: &RungContext<'_>| -> Result<Processor> {
-            let cpu = OnCpu::new(context.options, context.rung, context.cancel)?;
+    pub(super) fn new(context: &mut LevelContext<'_>) -> Result<Self> {
+        let asked = context.quality_level.backend.unwrap_or(context.options.backend);
+        let on_cpu = |context: &LevelContext<'_>| -> Result<Processor> {
+            let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
             Ok(Processor::Cpu(Box::new(cpu)))
         };
         let (processor, refusal) = match asked {
@@ -101,12 +102,17 @@ impl Engine {
 
     /// The GPU, or why not.
     #[cfg(feature = "gpu")]
-    fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
-        let RungContext { options, rung, gpu, .. } = context;
+    fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
+        let LevelContext {
+            options,
+            quality_level,
+            gpu,
+            ..
+        } = context;
         if let Some(why) = &gpu.refusal {
             return Ok(Err(why.clone()));
         }
-        match OnGpu::new(options, rung, gpu.device.clone()) {
+        match OnGpu::new(options, quality_level, gpu.device.clone()) {
             Ok(on_gpu) => {
                 gpu.device = on_gpu.device().cloned();
                 Ok(Ok(Processor::Gpu(Box::new(on_gpu))))
@@ -117,7 +123,7 @@ impl Engine {
     }
 
     #[cfg(not(feature = "gpu"))]
-    fn on_gpu(context: &mut RungContext<'_>) -> Result<std::result::Result<Processor, String>> {
+    fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
         let GpuState {} = context.gpu;
         Ok(Err("no GPU: this library was built without it (feature gpu)".into()))
     }
@@ -148,7 +154,7 @@ impl Engine {
     #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // The context is for falling back.
     pub(super) fn process(
         &mut self,
-        context: &mut RungContext<'_>,
+        context: &mut LevelContext<'_>,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
         out: LevelsOut<'_>,
@@ -157,7 +163,7 @@ impl Engine {
             Processor::Cpu(cpu) => {
                 let past = brightness.past(input.elapsed);
                 let made = cpu.process(input.rgbd, past, out)?;
-                brightness.heed(made.scale);
+                brightness.set_scale(made.scale);
                 Ok(made)
             }
             #[cfg(feature = "gpu")]
@@ -176,7 +182,7 @@ impl Engine {
                         gpu.release();
                         context.gpu.device = None;
                         self.refusal = Some(context.gpu.refuse(&why));
-                        let cpu = OnCpu::new(context.options, context.rung, context.cancel)?;
+                        let cpu = OnCpu::new(context.options, context.quality_level, context.cancel)?;
                         self.processor = Processor::Cpu(Box::new(cpu));
                         self.report_is_new = true;
                         self.process(context, input, brightness, out)
@@ -189,7 +195,7 @@ impl Engine {
 
 #[cfg(feature = "gpu")]
 impl GpuState {
-    /// The reason in words; one that holds for all rungs is kept.
+    /// The reason in words; one that holds for all quality levels is kept.
     fn refuse(&mut self, why: &crate::gpu::GpuError) -> String {
         use crate::gpu::GpuError;
         let reason = why.to_string();
@@ -199,7 +205,7 @@ impl GpuState {
         reason
     }
 
-    /// The device that rungs share.
+    /// The device that quality levels share.
     pub(super) fn device(&self) -> Option<std::sync::Arc<crate::gpu::Device>> {
         self.device.clone()
     }

@@ -26,7 +26,7 @@ pub enum DropReason {
 #[non_exhaustive]
 pub enum Event {
     /// A frame became a hologram.
-    Hologram(Hologram),
+    Processed(Hologram),
     /// A frame was dropped.
     Dropped {
         /// Its timestamp.
@@ -41,11 +41,11 @@ pub enum Event {
         /// What is wrong with it.
         error: Error,
     },
-    /// The frames after this one are made on another rung of the ladder.
+    /// The frames after this one are made at another quality level.
     QualityChanged {
         /// The timestamp of the frame.
         timestamp_ns: u64,
-        /// From which rung to which, and why.
+        /// From which quality level to which, and why.
         change: QualityChange,
     },
     /// The session is closed and its memory is given back. This is the last event, told exactly once, also where

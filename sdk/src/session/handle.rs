@@ -48,8 +48,8 @@ pub(super) struct Shared {
 /// What the caller may change while a session runs.
 #[derive(Debug, Clone, Copy)]
 struct Control {
-    /// Rungs of the ladder.
-    rungs: usize,
+    /// How many quality levels there are.
+    quality_levels: usize,
     quality: Quality,
     thermal: Thermal,
 }
@@ -60,13 +60,13 @@ impl Shared {
     pub(super) fn new(options: SessionOptions) -> Result<Arc<Self>> {
         options.check()?;
         let control = Control {
-            rungs: options.ladder.len(),
+            quality_levels: options.quality_levels.len(),
             quality: options.quality,
             thermal: Thermal::Nominal,
         };
         let cancel = Cancel::default();
         let mut stages = Stages::new(options, cancel.clone())?;
-        let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.rung());
+        let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.quality_level());
         Ok(Arc::new(Shared {
             home: Home::here(),
             stages: Mutex::new(Some(stages)),
@@ -81,7 +81,7 @@ impl Shared {
         let made = stages.process(frame, past, thermal, quality)?;
         let mut recent = lock(&self.recent);
         recent.push(Instant::now(), made.hologram.times());
-        recent.rung = stages.rung();
+        recent.quality_level = stages.quality_level();
         if let Some(backend) = stages.new_report() {
             recent.backend = backend;
         }
@@ -197,13 +197,13 @@ impl SessionHandle {
         lock(&self.shared.control).thermal = thermal;
     }
 
-    /// Allows or forbids steps on the ladder, from the next frame on.
+    /// Allows or forbids changes of the quality level, from the next frame on.
     ///
     /// # Errors
-    /// A rung that is not on the ladder.
+    /// A quality level that the session does not have.
     pub fn set_quality(&self, quality: Quality) -> Result<()> {
         let mut control = lock(&self.shared.control);
-        quality.check(control.rungs)?;
+        quality.check(control.quality_levels)?;
         control.quality = quality;
         Ok(())
     }

@@ -31,7 +31,7 @@ impl<T: Copy + Default> Pool<T> {
     /// A buffer of `len` values of any content.
     pub(super) fn take(&self, len: usize) -> Pooled<T> {
         let mut kept = lock(&self.0);
-        // Buffers of another rung's size are of no use any more.
+        // Buffers of another quality level's size are of no use any more.
         kept.retain(|buffer| buffer.len() == len);
         let values = kept.pop().unwrap_or_else(|| vec![T::default(); len]);
         Pooled {
@@ -100,7 +100,7 @@ pub struct Hologram {
     pub(super) times: FrameTimes,
     pub(super) range_m: Option<(f32, f32)>,
     pub(super) valid_depth: f32,
-    pub(super) rung: usize,
+    pub(super) quality_level: usize,
     pub(super) viewer: Arc<Viewer>,
 }
 
@@ -110,7 +110,7 @@ impl std::fmt::Debug for Hologram {
             .field("timestamp_ns", &self.timestamp_ns)
             .field("shape", &self.shape)
             .field("scale", &self.scale)
-            .field("rung", &self.rung)
+            .field("quality_level", &self.quality_level)
             .finish_non_exhaustive()
     }
 }
@@ -185,9 +185,9 @@ impl Hologram {
         self.valid_depth
     }
 
-    /// The rung of the ladder that it was made on, 0 the best.
-    pub fn rung(&self) -> usize {
-        self.rung
+    /// The quality level that it was made at, 0 the best.
+    pub fn quality_level(&self) -> usize {
+        self.quality_level
     }
 
     /// What it is for.

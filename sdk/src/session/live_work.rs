@@ -47,7 +47,7 @@ impl Drop for LiveWork {
 pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) {
     match report {
         Report::Done { timestamp_ns, output } => {
-            listener(Event::Hologram(output.hologram));
+            listener(Event::Processed(output.hologram));
             if let Some(change) = output.change {
                 listener(Event::QualityChanged { timestamp_ns, change });
             }

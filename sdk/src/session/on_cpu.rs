@@ -1,8 +1,8 @@
-//! A rung of the ladder on the CPU: from amplitudes and depth to levels.
+//! A quality level on the CPU: from amplitudes and depth to levels.
 
 use super::SessionOptions;
 use super::engine::{Encoded, LevelsOut};
-use super::quality::Rung;
+use super::quality::QualityLevel;
 use super::statistics::BackendReport;
 use crate::brightness::Past;
 use crate::cancel::Cancel;
@@ -22,13 +22,13 @@ pub(super) struct OnCpu {
 }
 
 impl OnCpu {
-    pub(super) fn new(options: &SessionOptions, rung: &Rung, cancel: &Cancel) -> Result<Self> {
-        let (height, width) = (rung.height, rung.width);
-        let pipeline = Self::plan(options, rung)?;
+    pub(super) fn new(options: &SessionOptions, quality_level: &QualityLevel, cancel: &Cancel) -> Result<Self> {
+        let (height, width) = (quality_level.height, quality_level.width);
+        let pipeline = Self::plan(options, quality_level)?;
         let display = &options.target.display;
         let (bits, values) = (display.bits(), display.colours() * height * width);
         let mut scratch = pipeline.scratch();
-        scratch.heed(cancel);
+        scratch.set_cancel(cancel);
         Ok(OnCpu {
             scratch,
             pipeline,
@@ -41,17 +41,20 @@ impl OnCpu {
         })
     }
 
-    /// Whether `rung` can be planned.
+    /// Whether `quality_level` can be planned.
     ///
     /// # Errors
     /// As [`Self::new`], for less memory.
-    pub(super) fn check(options: &SessionOptions, rung: &Rung) -> Result<()> {
-        Self::plan(options, rung).map(|_| ())
+    pub(super) fn check(options: &SessionOptions, quality_level: &QualityLevel) -> Result<()> {
+        Self::plan(options, quality_level).map(|_| ())
     }
 
-    fn plan(options: &SessionOptions, rung: &Rung) -> Result<Pipeline> {
-        let (shape, method) = ((rung.height, rung.width), rung.method.clone());
-        Pipeline::new(shape, method, &options.target, rung.encoder(options))
+    fn plan(options: &SessionOptions, quality_level: &QualityLevel) -> Result<Pipeline> {
+        let (shape, method) = (
+            (quality_level.height, quality_level.width),
+            quality_level.method.clone(),
+        );
+        Pipeline::new(shape, method, &options.target, quality_level.encoder(options))
     }
 
     pub(super) fn report(&self) -> BackendReport {

@@ -1,9 +1,9 @@
-//! A rung of the ladder on the GPU: from a camera's colour and refined depth to levels.
+//! A quality level on the GPU: from a camera's colour and refined depth to levels.
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
 use super::engine::{Encoded, FrameInput};
-use super::quality::Rung;
+use super::quality::QualityLevel;
 use super::statistics::BackendReport;
 use crate::error::Error;
 use crate::gpu::{
@@ -26,7 +26,7 @@ pub struct GpuOptions {
 pub(super) enum Failure {
     /// It is lost or wrong; the next one goes on.
     Frame(Error),
-    /// The GPU is of no use for this rung.
+    /// The GPU is of no use for this quality level.
     Gpu(GpuError),
 }
 
@@ -43,19 +43,23 @@ impl From<GpuError> for Failure {
 pub(super) struct OnGpu(Renderer);
 
 impl OnGpu {
-    /// Plans `rung` on `device`, or on one that is opened and tried out.
-    pub(super) fn new(options: &SessionOptions, rung: &Rung, device: Option<Arc<Device>>) -> gpu::Result<Self> {
+    /// Plans `quality_level` on `device`, or on one that is opened and tried out.
+    pub(super) fn new(
+        options: &SessionOptions,
+        quality_level: &QualityLevel,
+        device: Option<Arc<Device>>,
+    ) -> gpu::Result<Self> {
         if options.target.display.bits() > 8 {
             return Err(GpuError::Refused(format!(
                 "it writes levels of up to 8 bits, the display has {}",
                 options.target.display.bits()
             )));
         }
-        let shape = (rung.height, rung.width);
+        let shape = (quality_level.height, quality_level.width);
         let job = Job {
-            encoder: rung.encoder(options).clone(),
+            encoder: quality_level.encoder(options).clone(),
             chain: options.gpu.chain,
-            ..Job::new(shape, rung.method.clone(), options.target.clone())
+            ..Job::new(shape, quality_level.method.clone(), options.target.clone())
         };
         Renderer::new(device, options.gpu.device.clone(), job).map(OnGpu)
     }
@@ -138,7 +142,7 @@ impl OnGpu {
             GpuError::Core(why) => Failure::Frame(why),
             why => Failure::Frame(Error::Lost(format!("{why}, and this frame with it"))),
         })?;
-        brightness.heed(report.scale);
+        brightness.set_scale(report.scale);
         let times = report.times.unwrap_or_default();
         Ok(Encoded {
             scale: report.scale,
@@ -167,7 +171,7 @@ mod tests {
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);
         options.gpu.device.name = Some("llvmpipe".into());
-        let mut gpu = opened(OnGpu::new(&options, &options.ladder[0], None));
+        let mut gpu = opened(OnGpu::new(&options, &options.quality_levels[0], None));
         let rgb = Array3::from_shape_fn((3, 21, 34), |(c, y, x)| ((c + y + x) % 9) as f32 / 8.0);
         let frame = RgbdFrame::new(rgb, Array2::from_elem((21, 34), 0.4)).unwrap();
         let mut brightness = BrightnessTracker::default();

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "gpu")]
 use super::on_gpu::GpuOptions;
-use super::quality::{self, Backend, Quality, Rung};
+use super::quality::{self, Backend, Quality, QualityLevel};
 use crate::depth::stream::DepthOptions;
 use crate::encode::EncoderOptions;
 use crate::error::{Error, Result};
@@ -10,15 +10,15 @@ use crate::method::Method;
 use crate::target::Target;
 use std::num::NonZeroUsize;
 
-/// What a session makes, and how. [`SessionOptions::new`] has what is usual; change what is not.
+/// What a session makes, and how. [`SessionOptions::new`] gives the defaults; change what differs.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct SessionOptions {
     /// What holograms are for.
     pub target: Target,
     /// Quality levels, the best first, [`MOST_QUALITY_LEVELS`] at most.
-    pub ladder: Vec<Rung>,
-    /// Whether the session may step on the ladder by itself.
+    pub quality_levels: Vec<QualityLevel>,
+    /// Whether the session may change its quality level by itself.
     pub quality: Quality,
     /// Frames a second that are aimed at: a live session drops frames that come sooner, and an adaptive one steps down
     /// where it cannot hold it. None takes frames as they come and never steps.
@@ -27,14 +27,14 @@ pub struct SessionOptions {
     pub encoder: EncoderOptions,
     /// What becomes of depth.
     pub depth: DepthOptions,
-    /// Where frames are computed, unless their rung says it.
+    /// Where frames are computed, unless their quality level says it.
     pub backend: Backend,
     /// Which GPU, and how.
     #[cfg(feature = "gpu")]
     pub gpu: GpuOptions,
     /// Threads to compute with, [`MOST_THREADS`] at most; None for as many as the device has, and no more than that.
     pub threads: Option<NonZeroUsize>,
-    /// Most pixels of a rung and of the modulator: what a session allocates is a multiple of them.
+    /// Most pixels of a quality level and of the modulator: what a session allocates is a multiple of them.
     pub most_pixels: usize,
 }
 
@@ -48,13 +48,13 @@ pub const MOST_QUALITY_LEVELS: usize = 16;
 pub const MOST_PIXELS: usize = 1 << 25;
 
 impl SessionOptions {
-    /// Holograms of the modulator's resolution by `method`: AA-DPM, steady brightness, near and far by percentiles, no
-    /// target rate.
+    /// Holograms of the modulator's resolution by `method`: AA-DPM, smoothed brightness, near and far by percentiles,
+    /// no target rate.
     pub fn new(target: impl Into<Target>, method: Method) -> Self {
         let target = target.into();
         let (height, width) = target.modulator();
         SessionOptions {
-            ladder: vec![Rung {
+            quality_levels: vec![QualityLevel {
                 method,
                 height,
                 width,
@@ -75,8 +75,8 @@ impl SessionOptions {
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        quality::check(&self.ladder, self.quality, self.target.modulator())?;
-        // Rungs are no larger than the modulator.
+        quality::check(&self.quality_levels, self.quality, self.target.modulator())?;
+        // Quality levels are no larger than the modulator.
         let (height, width) = self.target.modulator();
         if height.saturating_mul(width) > self.most_pixels {
             return Err(Error::Plan(format!(

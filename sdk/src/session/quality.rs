@@ -1,4 +1,4 @@
-//! The ladder of qualities, and when a session steps on it.
+//! Quality levels, and when a session changes between them.
 
 use super::{MOST_QUALITY_LEVELS, SessionOptions};
 use crate::encode::EncoderOptions;
@@ -9,7 +9,7 @@ use std::time::Duration;
 /// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its
 /// middle.
 #[derive(Debug, Clone)]
-pub struct Rung {
+pub struct QualityLevel {
     /// What makes the midpoint hologram.
     pub method: Method,
     /// Height of the hologram, pixels.
@@ -18,11 +18,12 @@ pub struct Rung {
     pub width: usize,
     /// Where it is computed; None for where all of the session is.
     pub backend: Option<Backend>,
-    /// How its field becomes levels; None for what the session has. So a rung may have fewer steps of correction.
+    /// How its field becomes levels; None for what the session has. So a quality level may have fewer steps of
+    /// correction.
     pub encoder: Option<EncoderOptions>,
 }
 
-impl Rung {
+impl QualityLevel {
     /// How its field becomes levels in a session of `options`.
     pub(super) fn encoder<'a>(&'a self, options: &'a SessionOptions) -> &'a EncoderOptions {
         self.encoder.as_ref().unwrap_or(&options.encoder)
@@ -36,7 +37,7 @@ pub enum Backend {
     #[default]
     Cpu,
     /// On the GPU, where this library was built for it (feature `gpu`), there is one, and it answers as the CPU does;
-    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen by sharpness are
+    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen automatically are
     /// the CPU's. [`super::Statistics::backend`] says which it is, and why.
     Gpu,
 }
@@ -44,21 +45,21 @@ pub enum Backend {
 /// Whether a session may change its quality.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
-    /// It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up where
-    /// there is room.
+    /// It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
+    /// where there is room.
     #[default]
     Adaptive,
-    /// It stays on this rung.
+    /// It stays at this quality level.
     Fixed(usize),
 }
 
 impl Quality {
     /// # Errors
-    /// A fixed rung that is not on a ladder of `rungs`.
-    pub(super) fn check(self, rungs: usize) -> Result<()> {
+    /// A fixed level that is not among `quality_levels`.
+    pub(super) fn check(self, quality_levels: usize) -> Result<()> {
         match self {
-            Quality::Fixed(rung) if rung >= rungs => Err(Error::Plan(format!(
-                "there is no rung {rung} on a ladder of {rungs}; the best is 0"
+            Quality::Fixed(quality_level) if quality_level >= quality_levels => Err(Error::Plan(format!(
+                "there is no quality level {quality_level} among {quality_levels}; the best is 0"
             ))),
             _ => Ok(()),
         }
@@ -68,14 +69,14 @@ impl Quality {
 /// How hot the device is, as its system says (iOS' ProcessInfo.thermalState, Android's PowerManager).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Thermal {
-    /// Nothing to heed.
+    /// Not warm: nothing is limited.
     #[default]
     Nominal,
     /// Warm: frames may take 85 % of the time that the target rate allows.
     Fair,
     /// Hot: half of it.
     Serious,
-    /// Too hot: the lowest rung.
+    /// Too hot: the lowest quality level.
     Critical,
 }
 
@@ -103,16 +104,17 @@ pub enum QualityReason {
     Thermal,
     /// The caller said so.
     Asked,
-    /// The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+    /// again.
     Refused,
 }
 
-/// A step on the ladder.
+/// A change of the quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct QualityChange {
-    /// The rung before.
+    /// The quality level before.
     pub from: usize,
-    /// The rung now; the one before where the step was [`QualityReason::Refused`].
+    /// The quality level now; the one before where the step was [`QualityReason::Refused`].
     pub to: usize,
     /// Why.
     pub reason: QualityReason,
@@ -131,10 +133,10 @@ const ROOM: f64 = 0.7;
 
 /// Decides on steps from what frames cost. Knows no clock and no frames.
 #[derive(Debug)]
-pub(super) struct Ladder {
-    /// Whether each rung can be planned, as far as is known.
-    rungs: Vec<bool>,
-    rung: usize,
+pub(super) struct LevelControl {
+    /// Whether each quality level can be planned, as far as is known.
+    quality_levels: Vec<bool>,
+    quality_level: usize,
     slow: u32,
     roomy: u32,
     roomy_needed: u32,
@@ -142,11 +144,11 @@ pub(super) struct Ladder {
     since_up: Option<u32>,
 }
 
-impl Ladder {
-    pub(super) fn new(rungs: usize, rung: usize) -> Self {
-        Ladder {
-            rungs: vec![true; rungs],
-            rung,
+impl LevelControl {
+    pub(super) fn new(quality_levels: usize, quality_level: usize) -> Self {
+        LevelControl {
+            quality_levels: vec![true; quality_levels],
+            quality_level,
             slow: 0,
             roomy: 0,
             roomy_needed: ROOMY_FRAMES,
@@ -154,8 +156,8 @@ impl Ladder {
         }
     }
 
-    pub(super) fn rung(&self) -> usize {
-        self.rung
+    pub(super) fn quality_level(&self) -> usize {
+        self.quality_level
     }
 
     /// Hears that a frame took `cost` of the `period` that the target rate allows; says whether to step.
@@ -166,12 +168,12 @@ impl Ladder {
         thermal: Thermal,
         quality: Quality,
     ) -> Option<QualityChange> {
-        if let Quality::Fixed(rung) = quality {
-            return self.step(rung, QualityReason::Asked);
+        if let Quality::Fixed(quality_level) = quality {
+            return self.step(quality_level, QualityReason::Asked);
         }
         if thermal == Thermal::Critical {
-            let lowest = self.rungs.iter().rposition(|plans| *plans);
-            return self.step(lowest.unwrap_or(self.rung), QualityReason::Thermal);
+            let lowest = self.quality_levels.iter().rposition(|plans| *plans);
+            return self.step(lowest.unwrap_or(self.quality_level), QualityReason::Thermal);
         }
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
@@ -189,7 +191,8 @@ impl Ladder {
             }
         }
         if self.slow >= SLOW_FRAMES
-            && let Some(below) = (self.rung + 1..self.rungs.len()).find(|rung| self.rungs[*rung])
+            && let Some(below) = (self.quality_level + 1..self.quality_levels.len())
+                .find(|quality_level| self.quality_levels[*quality_level])
         {
             if self.since_up.take().is_some() {
                 self.roomy_needed = (self.roomy_needed * 2).min(MOST_ROOMY_FRAMES);
@@ -201,7 +204,9 @@ impl Ladder {
             return self.step(below, reason);
         }
         if self.roomy >= self.roomy_needed
-            && let Some(above) = self.rungs[..self.rung].iter().rposition(|plans| *plans)
+            && let Some(above) = self.quality_levels[..self.quality_level]
+                .iter()
+                .rposition(|plans| *plans)
         {
             let change = self.step(above, QualityReason::Room);
             self.since_up = Some(0);
@@ -210,10 +215,10 @@ impl Ladder {
         None
     }
 
-    /// Takes back a step to a rung that cannot be planned, which is not tried again.
+    /// Takes back a step to a quality level that cannot be planned, which is not tried again.
     pub(super) fn refuse(&mut self, QualityChange { from, to, .. }: QualityChange) -> QualityChange {
-        self.rungs[to] = false;
-        self.rung = from;
+        self.quality_levels[to] = false;
+        self.quality_level = from;
         self.since_up = None;
         QualityChange {
             from,
@@ -223,11 +228,11 @@ impl Ladder {
     }
 
     fn step(&mut self, to: usize, reason: QualityReason) -> Option<QualityChange> {
-        let from = self.rung;
-        if to == from || !self.rungs[to] {
+        let from = self.quality_level;
+        if to == from || !self.quality_levels[to] {
             return None;
         }
-        self.rung = to;
+        self.quality_level = to;
         self.slow = 0;
         self.roomy = 0;
         Some(QualityChange { from, to, reason })
@@ -237,24 +242,24 @@ impl Ladder {
 /// # Errors
 /// No quality levels or too many, a fixed one that is not among them, or one with no pixels or more than the modulator
 /// has.
-pub(super) fn check(ladder: &[Rung], quality: Quality, modulator: (usize, usize)) -> Result<()> {
-    if ladder.is_empty() {
+pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator: (usize, usize)) -> Result<()> {
+    if quality_levels.is_empty() {
         return Err(Error::Plan(
-            "the ladder of qualities is empty; at least one rung is needed".into(),
+            "there are no quality levels; at least one is needed".into(),
         ));
     }
-    if ladder.len() > MOST_QUALITY_LEVELS {
+    if quality_levels.len() > MOST_QUALITY_LEVELS {
         return Err(Error::Plan(format!(
             "{} quality levels are too many; 1 to {MOST_QUALITY_LEVELS} are right",
-            ladder.len()
+            quality_levels.len()
         )));
     }
-    quality.check(ladder.len())?;
-    for (i, rung) in ladder.iter().enumerate() {
-        let (height, width) = (rung.height, rung.width);
+    quality.check(quality_levels.len())?;
+    for (i, quality_level) in quality_levels.iter().enumerate() {
+        let (height, width) = (quality_level.height, quality_level.width);
         if height == 0 || width == 0 || height > modulator.0 || width > modulator.1 {
             return Err(Error::Plan(format!(
-                "rung {i} is {width}×{height}; each side must be at least 1 and at most the modulator's {}×{}",
+                "quality level {i} is {width}×{height}; each side must be at least 1 and at most the modulator's {}×{}",
                 modulator.1, modulator.0
             )));
         }
@@ -268,14 +273,20 @@ mod tests {
 
     const PERIOD: Duration = Duration::from_millis(33);
 
-    /// Runs `frames` frames on a device whose rungs cost these milliseconds; gives the steps and the frame of each.
-    fn run(ladder: &mut Ladder, costs_ms: &[u64], thermal: Thermal, frames: usize) -> Vec<(usize, QualityChange)> {
+    /// Runs `frames` frames on a device whose quality levels cost these milliseconds; gives the steps and the frame of
+    /// each.
+    fn run(
+        control: &mut LevelControl,
+        costs_ms: &[u64],
+        thermal: Thermal,
+        frames: usize,
+    ) -> Vec<(usize, QualityChange)> {
         (0..frames)
             .filter_map(|frame| {
                 // Every 50th frame takes long for another reason.
                 let extra = if frame % 50 == 49 { 40 } else { 0 };
-                let cost = Duration::from_millis(costs_ms[ladder.rung()] + extra);
-                let change = ladder.observe(cost, Some(PERIOD), thermal, Quality::Adaptive);
+                let cost = Duration::from_millis(costs_ms[control.quality_level()] + extra);
+                let change = control.observe(cost, Some(PERIOD), thermal, Quality::Adaptive);
                 change.map(|change| (frame, change))
             })
             .collect()
@@ -283,8 +294,8 @@ mod tests {
 
     #[test]
     fn it_steps_down_soon_and_stays_where_frames_are_in_time() {
-        let mut ladder = Ladder::new(4, 0);
-        let steps = run(&mut ladder, &[90, 60, 28, 12], Thermal::Nominal, 5000);
+        let mut control = LevelControl::new(4, 0);
+        let steps = run(&mut control, &[90, 60, 28, 12], Thermal::Nominal, 5000);
         let to: Vec<_> = steps.iter().map(|(_, c)| (c.from, c.to, c.reason)).collect();
         assert_eq!(to, [(0, 1, QualityReason::TooSlow), (1, 2, QualityReason::TooSlow)]);
         assert!(steps[1].0 < 20);
@@ -292,13 +303,13 @@ mod tests {
 
     #[test]
     fn it_steps_up_where_there_is_room_and_tries_in_vain_ever_more_seldom() {
-        let mut ladder = Ladder::new(3, 2);
-        let steps = run(&mut ladder, &[10, 10, 10], Thermal::Nominal, 500);
-        assert_eq!(ladder.rung(), 0);
+        let mut control = LevelControl::new(3, 2);
+        let steps = run(&mut control, &[10, 10, 10], Thermal::Nominal, 500);
+        assert_eq!(control.quality_level(), 0);
         assert!(steps.iter().all(|(_, c)| c.reason == QualityReason::Room));
-        // Rung 1 leaves room, rung 0 is too slow: the classic seesaw.
-        let mut ladder = Ladder::new(2, 0);
-        let steps = run(&mut ladder, &[40, 15], Thermal::Nominal, 20_000);
+        // Quality level 1 leaves room, quality level 0 is too slow: the classic seesaw.
+        let mut control = LevelControl::new(2, 0);
+        let steps = run(&mut control, &[40, 15], Thermal::Nominal, 20_000);
         assert!(steps.len() < 40, "{}", steps.len());
         let ups: Vec<usize> = (steps.iter())
             .filter(|(_, c)| c.to == 0)
@@ -309,56 +320,57 @@ mod tests {
 
     #[test]
     fn it_heeds_heat() {
-        let mut ladder = Ladder::new(3, 0);
+        let mut control = LevelControl::new(3, 0);
         let costs = [25, 15, 5];
-        assert!(run(&mut ladder, &costs, Thermal::Nominal, 500).is_empty());
-        let steps = run(&mut ladder, &costs, Thermal::Serious, 500);
-        assert_eq!(ladder.rung(), 1);
+        assert!(run(&mut control, &costs, Thermal::Nominal, 500).is_empty());
+        let steps = run(&mut control, &costs, Thermal::Serious, 500);
+        assert_eq!(control.quality_level(), 1);
         assert_eq!(steps[0].1.reason, QualityReason::Thermal);
-        let steps = run(&mut ladder, &costs, Thermal::Critical, 500);
-        assert_eq!((steps.len(), steps[0].0, ladder.rung()), (1, 0, 2));
-        run(&mut ladder, &costs, Thermal::Nominal, 500);
-        assert_eq!(ladder.rung(), 0);
+        let steps = run(&mut control, &costs, Thermal::Critical, 500);
+        assert_eq!((steps.len(), steps[0].0, control.quality_level()), (1, 0, 2));
+        run(&mut control, &costs, Thermal::Nominal, 500);
+        assert_eq!(control.quality_level(), 0);
     }
 
     #[test]
-    fn a_rung_that_cannot_be_planned_is_stepped_over() {
-        let mut ladder = Ladder::new(3, 0);
-        let steps = |ladder: &mut Ladder, costs: &[u64]| run(ladder, costs, Thermal::Nominal, 500);
+    fn a_quality_level_that_cannot_be_planned_is_stepped_over() {
+        let mut control = LevelControl::new(3, 0);
+        let steps = |control: &mut LevelControl, costs: &[u64]| run(control, costs, Thermal::Nominal, 500);
         let down = QualityChange {
             from: 0,
             to: 1,
             reason: QualityReason::TooSlow,
         };
-        ladder.rung = 1;
-        assert_eq!(ladder.refuse(down).to, 0);
-        assert_eq!(ladder.rung(), 0);
-        let slow = steps(&mut ladder, &[90, 0, 28]);
+        control.quality_level = 1;
+        assert_eq!(control.refuse(down).to, 0);
+        assert_eq!(control.quality_level(), 0);
+        let slow = steps(&mut control, &[90, 0, 28]);
         assert_eq!((slow.len(), slow[0].1.to), (1, 2));
-        assert_eq!(steps(&mut ladder, &[10, 0, 10])[0].1.to, 0);
-        let asked =
-            |ladder: &mut Ladder, rung| ladder.observe(PERIOD, Some(PERIOD), Thermal::Nominal, Quality::Fixed(rung));
-        assert_eq!(asked(&mut ladder, 1), None);
-        assert_eq!(asked(&mut ladder, 2).map(|c| c.to), Some(2));
+        assert_eq!(steps(&mut control, &[10, 0, 10])[0].1.to, 0);
+        let asked = |control: &mut LevelControl, quality_level| {
+            control.observe(PERIOD, Some(PERIOD), Thermal::Nominal, Quality::Fixed(quality_level))
+        };
+        assert_eq!(asked(&mut control, 1), None);
+        assert_eq!(asked(&mut control, 2).map(|c| c.to), Some(2));
         // The lowest, too: heat takes the lowest that there is.
         let change = QualityChange { from: 0, to: 2, ..down };
-        ladder.refuse(change);
-        assert!(run(&mut ladder, &[90; 3], Thermal::Critical, 50).is_empty());
+        control.refuse(change);
+        assert!(run(&mut control, &[90; 3], Thermal::Critical, 50).is_empty());
     }
 
     #[test]
     fn the_caller_may_forbid_and_choose() {
-        let mut ladder = Ladder::new(3, 0);
+        let mut control = LevelControl::new(3, 0);
         let slow = Duration::from_secs(1);
         for _ in 0..100 {
-            let fixed = ladder.observe(slow, Some(PERIOD), Thermal::Critical, Quality::Fixed(0));
+            let fixed = control.observe(slow, Some(PERIOD), Thermal::Critical, Quality::Fixed(0));
             assert_eq!(fixed, None);
         }
-        let asked = ladder.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
+        let asked = control.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
         assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
         // Without a target rate there is nothing to hold.
         for _ in 0..100 {
-            assert_eq!(ladder.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
+            assert_eq!(control.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
         }
     }
 }

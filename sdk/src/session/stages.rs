@@ -2,11 +2,11 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
-use super::engine::{Engine, FrameInput, GpuState, LevelsOut, RungContext};
+use super::engine::{Engine, FrameInput, GpuState, LevelContext, LevelsOut};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::live::guarded;
 use super::on_cpu::OnCpu;
-use super::quality::{Ladder, Quality, QualityChange, Thermal};
+use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use super::threads::Threads;
 use crate::cancel::Cancel;
@@ -22,8 +22,8 @@ use std::time::Duration;
 /// A gap between frames after which the past is no guide.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
 
-/// Plans and memory of one rung.
-struct RungPlan {
+/// Plans and memory of one quality level.
+struct LevelPlan {
     engine: Engine,
     frame: RgbdFrame,
     depth: DepthStream,
@@ -32,7 +32,7 @@ struct RungPlan {
     picture: Vec<f32>,
 }
 
-impl RungPlan {
+impl LevelPlan {
     /// Colour and depth of `frame` become those of the hologram.
     fn take_in(
         &mut self,
@@ -76,10 +76,10 @@ pub(super) struct Stages {
     options: SessionOptions,
     /// Shared with the viewer, so that views need no other threads.
     pool: Arc<Threads>,
-    ladder: Ladder,
+    level_control: LevelControl,
     gpu: GpuState,
     /// None after a panic: it is made anew.
-    plan: Option<RungPlan>,
+    plan: Option<LevelPlan>,
     brightness: BrightnessTracker,
     viewer: Arc<Viewer>,
     levels: Pool<u8>,
@@ -101,15 +101,15 @@ impl Stages {
         let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
-            Quality::Fixed(rung) => rung,
+            Quality::Fixed(quality_level) => quality_level,
         };
-        // A rung that cannot be planned is better known now than at the first step down.
-        for (i, rung) in options.ladder.iter().enumerate().filter(|(i, _)| *i != start) {
-            let planned = pool.install(|| OnCpu::check(&options, rung));
-            planned.map_err(|why| why.of(&format!("rung {i}")))?;
+        // A quality level that cannot be planned is better known now than at the first step down.
+        for (i, quality_level) in options.quality_levels.iter().enumerate().filter(|(i, _)| *i != start) {
+            let planned = pool.install(|| OnCpu::check(&options, quality_level));
+            planned.map_err(|why| why.of(&format!("quality level {i}")))?;
         }
         let mut stages = Stages {
-            ladder: Ladder::new(options.ladder.len(), start),
+            level_control: LevelControl::new(options.quality_levels.len(), start),
             gpu: GpuState::default(),
             plan: None,
             brightness: BrightnessTracker::default(),
@@ -122,31 +122,31 @@ impl Stages {
             pool,
             options,
         };
-        stages.plan = Some(stages.plan_rung()?);
+        stages.plan = Some(stages.plan_level()?);
         Ok(stages)
     }
 
-    fn plan_rung(&mut self) -> Result<RungPlan> {
+    fn plan_level(&mut self) -> Result<LevelPlan> {
         let _stage = stage!("plan");
         let Stages {
             options,
             pool,
-            ladder,
+            level_control,
             gpu,
             cancel,
             ..
         } = self;
-        let rung = &options.ladder[ladder.rung()];
-        let shape = (rung.height, rung.width);
+        let quality_level = &options.quality_levels[level_control.quality_level()];
+        let shape = (quality_level.height, quality_level.width);
         let depth = DepthStream::new(options.depth, shape)?;
         let colours = options.target.display.colours();
-        let mut context = RungContext {
+        let mut context = LevelContext {
             options,
-            rung,
+            quality_level,
             gpu,
             cancel,
         };
-        Ok(RungPlan {
+        Ok(LevelPlan {
             engine: pool.install(|| Engine::new(&mut context))?,
             frame: RgbdFrame::black(colours, shape),
             depth,
@@ -169,8 +169,8 @@ impl Stages {
         self.last_ns = None;
     }
 
-    pub(super) fn rung(&self) -> usize {
-        self.ladder.rung()
+    pub(super) fn quality_level(&self) -> usize {
+        self.level_control.quality_level()
     }
 
     /// What runs the frames, where that is not what it was when this was last asked.
@@ -192,20 +192,20 @@ impl Stages {
             levels,
             options,
             gpu,
-            ladder,
+            level_control,
             cancel,
             ..
         } = self;
         cancel.clear();
-        let rung = &options.ladder[ladder.rung()];
-        let mut levels = levels.take(options.target.display.colours() * rung.height * rung.width);
+        let quality_level = &options.quality_levels[level_control.quality_level()];
+        let mut levels = levels.take(options.target.display.colours() * quality_level.height * quality_level.width);
         let mut brightness = BrightnessTracker::default();
         plan.frame.planes_mut().0.fill(0.0);
         let result = pool.install(|| {
             plan.engine.process(
-                &mut RungContext {
+                &mut LevelContext {
                     options,
-                    rung,
+                    quality_level,
                     gpu,
                     cancel,
                 },
@@ -225,10 +225,10 @@ impl Stages {
         result.map(|_| ())
     }
 
-    fn take_plan(&mut self) -> Result<RungPlan> {
+    fn take_plan(&mut self) -> Result<LevelPlan> {
         match self.plan.take() {
             Some(plan) => Ok(plan),
-            None => self.plan_rung(),
+            None => self.plan_level(),
         }
     }
 
@@ -251,23 +251,23 @@ impl Stages {
             .options
             .target_rate_hz
             .map(|rate| Duration::from_secs_f64(1.0 / rate));
-        let change = self.ladder.observe(start.elapsed(), period, thermal, quality);
+        let change = self.level_control.observe(start.elapsed(), period, thermal, quality);
         let change = change.map(|change| self.step(change));
         Ok(Made { hologram, change })
     }
 
-    /// Plans the rung that the ladder stands on; where that fails, stays on the one before. The frame is made either
+    /// Plans the quality level that was chosen; where that fails, stays on the one before. The frame is made either
     /// way.
     fn step(&mut self, change: QualityChange) -> QualityChange {
-        // The memory of the rung before goes first.
+        // The memory of the quality level before goes first.
         self.plan = None;
-        if let (Ok(plan), _) = guarded(|| self.plan_rung()) {
+        if let (Ok(plan), _) = guarded(|| self.plan_level()) {
             self.plan = Some(plan);
             return change;
         }
-        let change = self.ladder.refuse(change);
+        let change = self.level_control.refuse(change);
         // Should even this fail, the next frame tries it again, and says why.
-        self.plan = guarded(|| self.plan_rung()).0.ok();
+        self.plan = guarded(|| self.plan_level()).0.ok();
         change
     }
 
@@ -281,7 +281,7 @@ impl Stages {
         self.plan = Some(plan);
         taken?;
         given_up(&self.cancel)?;
-        self.brightness.heed(scale);
+        self.brightness.set_scale(scale);
         self.last_ns = Some(frame.timestamp_ns);
         Ok(())
     }
@@ -294,7 +294,7 @@ impl Stages {
             .filter(|gap| *gap <= LONGEST_GAP)
     }
 
-    fn run(&mut self, plan: &mut RungPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
+    fn run(&mut self, plan: &mut LevelPlan, frame: &CameraFrame<'_>, elapsed: Option<Duration>) -> Result<Hologram> {
         let Stages {
             pool,
             brightness,
@@ -302,13 +302,13 @@ impl Stages {
             words,
             depths,
             options,
-            ladder,
+            level_control,
             gpu,
             cancel,
             ..
         } = self;
-        let rung = &options.ladder[ladder.rung()];
-        let shape = (rung.height, rung.width);
+        let quality_level = &options.quality_levels[level_control.quality_level()];
+        let shape = (quality_level.height, quality_level.width);
         let display = &options.target.display;
         let values = display.colours() * shape.0 * shape.1;
         let mut levels = levels.take(values);
@@ -324,9 +324,9 @@ impl Stages {
                 *to = (d * 65535.0 + 0.5) as u16;
             }
             let encoded = plan.engine.process(
-                &mut RungContext {
+                &mut LevelContext {
                     options,
-                    rung,
+                    quality_level,
                     gpu,
                     cancel,
                 },
@@ -357,7 +357,7 @@ impl Stages {
             times,
             range_m: report.range_m,
             valid_depth: report.valid,
-            rung: ladder.rung(),
+            quality_level: level_control.quality_level(),
             viewer: self.viewer.clone(),
         })
     }
@@ -380,7 +380,7 @@ mod tests {
     use crate::display::Display;
     use crate::frame::{ColourFormat, ColourImage, Plane};
     use crate::method::Method;
-    use crate::session::quality::{QualityReason, Rung};
+    use crate::session::quality::{QualityLevel, QualityReason};
     use crate::sweep::Sweep;
 
     #[test]
@@ -388,12 +388,12 @@ mod tests {
         let display = Display::default().with_size(12, 16).unwrap();
         let sweep = Sweep::for_display(&display);
         let mut options = SessionOptions::new(display, Method::Sweep(sweep));
-        let best = options.ladder[0].clone();
-        options.ladder.push(best.clone());
+        let best = options.quality_levels[0].clone();
+        options.quality_levels.push(best.clone());
         let mut stages = Stages::new(options, Cancel::default()).unwrap();
         // What was fine at the start is not any more.
         let worse = Sweep { planes: 0, ..sweep };
-        stages.options.ladder[1] = Rung {
+        stages.options.quality_levels[1] = QualityLevel {
             method: Method::Sweep(worse),
             ..best
         };
@@ -410,7 +410,7 @@ mod tests {
         assert_eq!((change.from, change.to, change.reason), (0, 0, QualityReason::Refused));
         for time in 2..5 {
             let made = process(time).unwrap();
-            assert_eq!((made.hologram.rung(), made.change), (0, None));
+            assert_eq!((made.hologram.quality_level(), made.change), (0, None));
         }
     }
 }

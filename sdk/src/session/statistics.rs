@@ -62,7 +62,7 @@ impl Counts {
 pub struct FrameTimes {
     /// Colour: turned, converted, resized.
     pub colour: Duration,
-    /// Depth: read, aligned, steadied, refined.
+    /// Depth: read, aligned, smoothed over time, refined.
     pub depth: Duration,
     /// From the frame to the midpoint hologram; on a GPU with the ways there and back.
     pub method: Duration,
@@ -122,8 +122,8 @@ pub struct Statistics {
     pub times: FrameTimes,
     /// What runs the frames.
     pub backend: BackendReport,
-    /// The rung of the ladder, 0 the best.
-    pub rung: usize,
+    /// The quality level, 0 the best.
+    pub quality_level: usize,
     /// How often the listener panicked.
     pub listener_panics: u64,
 }
@@ -133,15 +133,15 @@ pub struct Statistics {
 pub(super) struct Recent {
     frames: VecDeque<(Instant, FrameTimes)>,
     pub(super) backend: BackendReport,
-    pub(super) rung: usize,
+    pub(super) quality_level: usize,
     pub(super) listener_panics: u64,
 }
 
 impl Recent {
-    pub(super) fn new(backend: BackendReport, rung: usize) -> Self {
+    pub(super) fn new(backend: BackendReport, quality_level: usize) -> Self {
         Recent {
             backend,
-            rung,
+            quality_level,
             ..Recent::default()
         }
     }
@@ -181,7 +181,7 @@ impl Recent {
                 encode: mean(|t| t.encode),
             },
             backend: self.backend.clone(),
-            rung: self.rung,
+            quality_level: self.quality_level,
             listener_panics: self.listener_panics,
         }
     }

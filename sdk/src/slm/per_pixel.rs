@@ -430,7 +430,7 @@ fn rounded(level: f32) -> u8 {
 const WHOLE: f32 = 8_388_608.0;
 
 /// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly
-/// where it has to heed values out of range.
+/// where it has to handle values out of range.
 fn whole(value: f32) -> f32 {
     let nearest = value + WHOLE - WHOLE;
     if nearest > value { nearest - 1.0 } else { nearest }

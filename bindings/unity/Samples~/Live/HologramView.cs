@@ -19,7 +19,7 @@ public sealed class HologramView : MonoBehaviour, IListener
     {
         using (var target = Target.FromToml($"width = {width}\nheight = {height}"))
         using (var options = SessionOptions.For(target))
-            session = Session.Open(options, RunningMode.LiveStream, this);
+            session = Session.Open(options, RunningMode.Live, this);
         texture = new Texture2D(width, height, TextureFormat.RGBA32, false, true);
         modulator.texture = texture;
     }
@@ -44,7 +44,7 @@ public sealed class HologramView : MonoBehaviour, IListener
             }
     }
 
-    public void OnHologram(Hologram hologram) => made.Enqueue(hologram);
+    public void OnProcessed(Hologram hologram) => made.Enqueue(hologram);
     public void OnDropped(ulong timestampNs, DropReason reason) { }
     public void OnFailed(ulong timestampNs, string message) => Debug.LogWarning(message);
     public void OnQualityChanged(ulong timestampNs, QualityChange change) { }

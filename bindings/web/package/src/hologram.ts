@@ -28,8 +28,8 @@ export interface HologramInfo {
   readonly rangeM: readonly [near: number, far: number] | null;
   /** The share of the depth image's pixels that had a usable reading. */
   readonly validDepth: number;
-  /** The rung of the ladder that it was made on, 0 the best. */
-  readonly rung: number;
+  /** The quality level that it was made at, 0 the best. */
+  readonly qualityLevel: number;
   readonly times: FrameTimes;
 }
 

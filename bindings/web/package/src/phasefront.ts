@@ -43,7 +43,7 @@ export {
   type Method,
   type Quality,
   type RunningMode,
-  type Rung,
+  type QualityLevel,
   type SessionOptions,
   type Statistics,
 } from "./session.js";

@@ -6,7 +6,7 @@ import { RawMethod, RawOptions, RawSession } from "./raw/phasefront_web.js";
 import { Target, type Display } from "./target.js";
 
 /**
- * How a session runs. `image` answers each frame by itself; `video` steadies depth and brightness from one to the next,
+ * How a session runs. `image` answers each frame by itself; `video` smooths depth and brightness over time,
  * and timestamps must rise. A live stream needs a thread of its own, which there is not here.
  */
 export type RunningMode = "image" | "video";
@@ -15,7 +15,7 @@ export type RunningMode = "image" | "video";
 export type Method =
   | { readonly kind: "trained"; readonly network: Network }
   | { readonly kind: "sweep" }
-  | { readonly kind: "by-sharpness"; readonly network: Network };
+  | { readonly kind: "auto"; readonly network: Network };
 
 /** How the field becomes phases; what is not said of an encoding is as published. */
 export type Encoding =
@@ -26,13 +26,13 @@ export type Encoding =
 
 /** Which amplitude full light stands for: near the frame's largest, moving smoothly; the largest; or this one. */
 export type Brightness =
-  { readonly kind: "steady" } | { readonly kind: "frame-max" } | { readonly kind: "fixed"; readonly scale: number };
+  { readonly kind: "smoothed" } | { readonly kind: "frame-max" } | { readonly kind: "fixed"; readonly scale: number };
 
-/** Whether the session steps on its ladder by itself, or stays on a rung, 0 the best. */
-export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly rung: number };
+/** Whether the session changes its quality level by itself, or stays at one, 0 the best. */
+export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly qualityLevel: number };
 
 /** One quality. A hologram smaller than the modulator is shown in its middle. */
-export interface Rung {
+export interface QualityLevel {
   readonly method: Method;
   readonly width: number;
   readonly height: number;
@@ -42,21 +42,21 @@ export interface Rung {
   readonly midpointSteps?: number;
 }
 
-/** What a session makes, and how; what is not said is usual. */
+/** What a session makes, and how; what is left out has its default. */
 export interface SessionOptions {
   /** What holograms are for: the paper's display unless it is said. */
   readonly target?: Target | Display;
   /** The built-in network where it was trained for the display, else the plane sweep, unless it is said. */
   readonly method?: Method;
   /** Qualities, the best first; `method` at the modulator's resolution unless it is said. */
-  readonly ladder?: readonly Rung[];
+  readonly qualityLevels?: readonly QualityLevel[];
   /** `adaptive` unless it is said. */
   readonly quality?: Quality;
   /** Frames a second that are aimed at; without it the session takes frames as they come and never steps. */
   readonly targetRateHz?: number;
   /** `anti-alias` unless it is said. */
   readonly encoding?: Encoding;
-  /** `steady` unless it is said. */
+  /** `smoothed` unless it is said. */
   readonly brightness?: Brightness;
   /** The share of full light below which phases are drawn to 0; what suits the encoding unless it is said. */
   readonly dark?: number;
@@ -68,7 +68,7 @@ export interface SessionOptions {
   readonly depthRange?: { readonly nearM: number; readonly farM: number };
   /** Readings less sure than this, 0 to 1, are none. */
   readonly leastConfidence?: number;
-  /** Most pixels of a rung and of the modulator. */
+  /** Most pixels of a quality level and of the modulator. */
   readonly mostPixels?: number;
 }
 
@@ -83,20 +83,20 @@ export interface Statistics {
   /** What runs the frames. */
   readonly backend: string;
   readonly backendWhy: string;
-  readonly rung: number;
+  readonly qualityLevel: number;
 }
 
 function rawMethod(method: Method): RawMethod {
   switch (method.kind) {
     case "trained":
       return RawMethod.trained(method.network.raw);
-    case "by-sharpness":
-      return RawMethod.bySharpness(method.network.raw);
+    case "auto":
+      return RawMethod.auto(method.network.raw);
     case "sweep":
       return RawMethod.sweep();
     default: {
       const { kind } = method as { kind: string };
-      throw new PhasefrontError("setting", `there is no method '${kind}'; there are trained, sweep, by-sharpness`);
+      throw new PhasefrontError("setting", `there is no method '${kind}'; there are trained, sweep, auto`);
     }
   }
 }
@@ -112,8 +112,8 @@ function setEncoder(raw: RawOptions, options: SessionOptions): void {
   raw.corrections(options.dark, options.localSteps, options.midpointSteps);
 }
 
-function rung(quality: Quality): number | undefined {
-  return quality.kind === "fixed" ? whole("the rung", quality.rung) : undefined;
+function qualityLevel(quality: Quality): number | undefined {
+  return quality.kind === "fixed" ? whole("the quality level", quality.qualityLevel) : undefined;
 }
 
 function rawOptions(options: SessionOptions): RawOptions {
@@ -121,20 +121,20 @@ function rawOptions(options: SessionOptions): RawOptions {
   return guard(() => {
     const raw = options.method
       ? RawOptions.withMethod(target.raw, rawMethod(options.method))
-      : RawOptions.usual(target.raw);
+      : RawOptions.withDefaults(target.raw);
     setEncoder(raw, options);
     if (options.depthRange) raw.depthRange(options.depthRange.nearM, options.depthRange.farM);
     if (options.leastConfidence !== undefined) raw.leastConfidence(options.leastConfidence);
     if (options.targetRateHz !== undefined) raw.targetRateHz(options.targetRateHz);
     if (options.mostPixels !== undefined) raw.mostPixels(whole("mostPixels", options.mostPixels));
-    if (options.ladder) {
-      raw.clearLadder();
-      for (const { method, width, height, localSteps, midpointSteps } of options.ladder) {
-        const [w, h] = [whole("the width of a rung", width), whole("the height of a rung", height)];
-        raw.pushRung(rawMethod(method), w, h, localSteps, midpointSteps);
+    if (options.qualityLevels) {
+      raw.clearQualityLevels();
+      for (const { method, width, height, localSteps, midpointSteps } of options.qualityLevels) {
+        const [w, h] = [whole("the width of a quality level", width), whole("the height of a quality level", height)];
+        raw.pushQualityLevel(rawMethod(method), w, h, localSteps, midpointSteps);
       }
     }
-    if (options.quality) raw.quality(rung(options.quality));
+    if (options.quality) raw.quality(qualityLevel(options.quality));
     return raw;
   });
 }
@@ -187,13 +187,13 @@ export class Session {
   }
 
   /**
-   * Allows or forbids steps on the ladder.
+   * Allows or forbids changes of the quality level.
    *
-   * @throws PhasefrontError `setting`: a rung that is not on the ladder.
+   * @throws PhasefrontError `setting`: a quality level that the session does not have.
    */
   setQuality(quality: Quality): void {
     const session = this.#open();
-    guard(() => session.setQuality(rung(quality)));
+    guard(() => session.setQuality(qualityLevel(quality)));
   }
 
   /** What the session has done so far. */

@@ -35,8 +35,8 @@ pub struct DeepScratch {
 
 impl DeepScratch {
     /// Has fields end where `cancel` is requested.
-    pub(crate) fn heed(&mut self, cancel: &Cancel) {
-        self.network.heed(cancel);
+    pub(crate) fn set_cancel(&mut self, cancel: &Cancel) {
+        self.network.set_cancel(cancel);
     }
 }
 

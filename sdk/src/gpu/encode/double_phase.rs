@@ -126,9 +126,9 @@ impl DoublePhase {
     }
 
     /// Which frame the one follows that is submitted next.
-    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         if let Some(local) = &self.local {
-            local.heed(device, past);
+            local.set_past(device, past);
         }
     }
 

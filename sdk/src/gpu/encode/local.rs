@@ -102,9 +102,9 @@ impl Local {
     }
 
     /// Which frame the one follows that is submitted next.
-    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         if let Last::Midpoint(midpoint) = &self.last {
-            midpoint.heed(device, past);
+            midpoint.set_past(device, past);
         }
     }
 

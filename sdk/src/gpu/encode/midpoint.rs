@@ -110,7 +110,7 @@ impl Midpoint {
     }
 
     /// Which frame the one follows that is submitted next.
-    pub(super) fn heed(&self, device: &Device, past: Option<Past>) {
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
         let bound = past.map_or(-1.0, |past| (STILL * past.scale).powi(2));
         (device.queue).write_buffer(&self.bound.buffer, 0, bytemuck::cast_slice(&[bound; 4]));
     }
@@ -203,7 +203,7 @@ mod tests {
                         .for_each(|value| *value *= Complex32::new(0.3, 0.6));
                 }
                 device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&values));
-                encoder.heed(&device, past);
+                encoder.set_past(&device, past);
                 run(&device, |pass| encoder.run(pass, 0));
                 let words = device.read(&buffers[0].levels, 4 * area).unwrap();
                 let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);

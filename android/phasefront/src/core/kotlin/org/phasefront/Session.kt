@@ -7,8 +7,8 @@ import kotlinx.coroutines.flow.Flow
 import kotlinx.coroutines.flow.flow
 
 /**
- * Frames in, holograms out. Every call may come from any thread, at any moment. [process], [warmUp] and [close] wait for a
- * frame: not for the main thread.
+ * Frames in, holograms out. Every call may come from any thread, at any moment. [process], [warmUp] and [close] wait
+ * for a frame: not for the main thread.
  *
  * ```kotlin
  * Session(sessionOptions(), RunningMode.IMAGE).use { session ->
@@ -29,18 +29,18 @@ public class Session(
     private val queue = EventQueue()
     private val raw: RawSession = when {
         listener != null -> RawSession(options, mode, Listener(listener))
-        mode == RunningMode.LIVE_STREAM -> RawSession(options, mode, Listener(queue::push, queue::finish))
+        mode == RunningMode.LIVE -> RawSession(options, mode, Listener(queue::push, queue::finish))
         else -> RawSession(options, mode, null)
     }
 
     init {
-        if (listener != null || mode != RunningMode.LIVE_STREAM) queue.finish()
+        if (listener != null || mode != RunningMode.LIVE) queue.finish()
     }
 
     /**
-     * What becomes of the frames of a live stream; for one reader. Empty where a listener hears it, and in the other running
-     * modes. Two holograms wait for the reader at most: the oldest gives way to a newer one and is told as dropped, as
-     * [DropReason.UNREAD], so a slow reader falls behind by little and memory stays flat.
+     * What becomes of the frames of a live stream; for one reader. Empty where a listener hears it, and in the other
+     * running modes. Two holograms wait for the reader at most: the oldest gives way to a newer one and is told as
+     * dropped, as [DropReason.UNREAD], so a slow reader falls behind by little and memory stays flat.
      */
     public val events: Flow<SessionEvent> = flow {
         while (true) emit(queue.take() ?: break)
@@ -64,11 +64,11 @@ public class Session(
     )
 
     /**
-     * Hands [frame] to a live stream, which copies it and goes on by itself: it never waits for a frame to be processed.
-     * Gives why the frame was dropped, if it was at once; that is an event, too.
+     * Hands [frame] to a live stream, which copies it and goes on by itself: it never waits for a frame to be
+     * processed. Gives why the frame was dropped, if it was at once; that is an event, too.
      *
-     * @throws PhasefrontException for a frame that is not usable or late, or a session that is no live stream or is closed.
-     * None of them harms the frames that follow.
+     * @throws PhasefrontException for a frame that is not usable or late, or a session that is no live stream or is
+     * closed. None of them harms the frames that follow.
      */
     public fun submit(frame: Frame): DropReason? = raw.submit(
         frame.colourBytes(0),
@@ -94,16 +94,16 @@ public class Session(
     /** Says how hot the device is. */
     public fun setThermal(thermal: Thermal): Unit = raw.setThermal(thermal)
 
-    /** Allows or forbids steps on the ladder. */
+    /** Allows or forbids changes of the quality level. */
     public fun setQuality(quality: Quality): Unit = raw.setQuality(quality)
 
     /** What the session has done so far; of a closed one, what it did. Never waits for a frame. */
     public fun statistics(): Statistics = raw.statistics()
 
     /**
-     * Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all events
-     * have been told; called by the listener of a session, it returns at once. [events] ends behind the last. Closing twice
-     * does nothing.
+     * Takes no more frames and gives the memory back; holograms that were handed out stay valid. When it returns, all
+     * events have been told; called by the listener of a session, it returns at once. [events] ends behind the last.
+     * Closing twice does nothing.
      */
     override fun close(): Unit = raw.shutDown()
 }
@@ -111,7 +111,7 @@ public class Session(
 /** What becomes of the frames of a live stream, in the order in which it happened. */
 public sealed interface SessionEvent {
     /** A frame became a hologram, which is the receiver's to close. */
-    public class Made(public val hologram: Hologram) : SessionEvent
+    public class Processed(public val hologram: Hologram) : SessionEvent
 
     /** A frame was dropped. */
     public data class Dropped(val timestampNs: Long, val reason: DropReason) : SessionEvent
@@ -119,13 +119,13 @@ public sealed interface SessionEvent {
     /** A frame could not be processed. The session goes on. */
     public data class Failed(val timestampNs: Long, val message: String) : SessionEvent
 
-    /** The frames after this one are made on another rung of the ladder. */
+    /** The frames after this one are made at another quality level. */
     public data class QualityChanged(val timestampNs: Long, val change: QualityChange) : SessionEvent
 }
 
 /**
- * What is usual for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the network that is
- * built in, by the plane sweep where that was not trained for it. Change what is not with `copy`.
+ * The default options for [display]: holograms of its resolution by [method] and AA-DPM, or, without one, by the
+ * network that is built in, by the plane sweep where that was not trained for it. Change what is not with `copy`.
  *
  * @throws PhasefrontException.Display for a display that cannot be.
  */
@@ -144,7 +144,7 @@ private class Listener(
     private val tell: (SessionEvent) -> Unit,
     private val end: () -> Unit = {},
 ) : SessionListener {
-    override fun onHologram(hologram: RawHologram) = attached { tell(SessionEvent.Made(Hologram(hologram))) }
+    override fun onProcessed(hologram: RawHologram) = attached { tell(SessionEvent.Processed(Hologram(hologram))) }
 
     override fun onDropped(timestampNs: ULong, reason: DropReason) = attached {
         tell(SessionEvent.Dropped(timestampNs.toLong(), reason))
@@ -178,16 +178,16 @@ internal class EventQueue {
         val given = synchronized(waiting) {
             if (finished) return@synchronized event
             waiting.add(event)
-            if (event !is SessionEvent.Made || ++holograms <= MOST_HOLOGRAMS) return@synchronized null
+            if (event !is SessionEvent.Processed || ++holograms <= MOST_HOLOGRAMS) return@synchronized null
             holograms--
-            val oldest = waiting.first { it is SessionEvent.Made } as SessionEvent.Made
+            val oldest = waiting.first { it is SessionEvent.Processed } as SessionEvent.Processed
             val dropped = SessionEvent.Dropped(oldest.hologram.info.timestampNs.toLong(), DropReason.UNREAD)
             val kept = waiting.map { if (it === oldest) dropped else it }
             waiting.clear()
             waiting.addAll(kept)
             oldest
         }
-        (given as? SessionEvent.Made)?.hologram?.close()
+        (given as? SessionEvent.Processed)?.hologram?.close()
         changed.trySend(Unit)
     }
 
@@ -196,7 +196,7 @@ internal class EventQueue {
         while (true) {
             synchronized(waiting) {
                 waiting.poll()?.let {
-                    if (it is SessionEvent.Made) holograms--
+                    if (it is SessionEvent.Processed) holograms--
                     return it
                 }
                 if (finished) return null

@@ -79,7 +79,7 @@ class ConformanceTest {
     private fun method(case: JSONObject): Method = when (val name = case.getString("method")) {
         "network" -> Method.Trained(network)
         "sweep" -> Method.Sweep
-        "by-sharpness" -> Method.BySharpness(network)
+        "auto" -> Method.Auto(network)
         else -> Method.Trained(model(name))
     }
 
@@ -99,7 +99,7 @@ class ConformanceTest {
             "band-limit" -> Encoding.BandLimit(1.0f)
             else -> Encoding.Deep(model(name))
         },
-        brightness = if (case.isNull("brightness")) Brightness.Steady else Brightness.Fixed(case.getDouble("brightness").toFloat()),
+        brightness = if (case.isNull("brightness")) Brightness.Smoothed else Brightness.Fixed(case.getDouble("brightness").toFloat()),
         depthRange = case.optJSONArray("range")?.let { DepthRange.Fixed(it.getDouble(0).toFloat(), it.getDouble(1).toFloat()) }
             ?: DepthRange.Percentiles,
     )

@@ -148,10 +148,10 @@ class SessionTest {
     fun aLiveStreamAnswersEveryFrameOnItsOwnThread() {
         val answered = Collections.synchronizedList(mutableListOf<Long>())
         val threads = Collections.synchronizedSet(mutableSetOf<Thread>())
-        val session = Session(options(), RunningMode.LIVE_STREAM) { event ->
+        val session = Session(options(), RunningMode.LIVE) { event ->
             threads.add(Thread.currentThread())
             when (event) {
-                is SessionEvent.Made -> event.hologram.use { answered.add(it.info.timestampNs.toLong()) }
+                is SessionEvent.Processed -> event.hologram.use { answered.add(it.info.timestampNs.toLong()) }
                 is SessionEvent.Dropped -> answered.add(event.timestampNs)
                 else -> error("$event")
             }
@@ -168,7 +168,7 @@ class SessionTest {
 
     @Test
     fun aFlowTellsTheSame() = runBlocking {
-        val session = Session(options(), RunningMode.LIVE_STREAM)
+        val session = Session(options(), RunningMode.LIVE)
         val submitting = thread {
             for (i in 1L..50L) session.submit(still(i))
             session.close()
@@ -177,7 +177,7 @@ class SessionTest {
         submitting.join()
         val timestamps = events.map {
             when (it) {
-                is SessionEvent.Made -> it.hologram.use { hologram -> hologram.info.timestampNs.toLong() }
+                is SessionEvent.Processed -> it.hologram.use { hologram -> hologram.info.timestampNs.toLong() }
                 is SessionEvent.Dropped -> it.timestampNs
                 else -> error("$it")
             }
@@ -187,7 +187,7 @@ class SessionTest {
 
     @Test
     fun anUnreadFlowHoldsTwoHologramsAtMost() = runBlocking {
-        val session = Session(options(), RunningMode.LIVE_STREAM)
+        val session = Session(options(), RunningMode.LIVE)
         for (i in 1L..8L) {
             session.submit(still(i))
             while (session.statistics().pending > 0UL) Thread.sleep(1)
@@ -195,19 +195,19 @@ class SessionTest {
         session.close()
         val events = session.events.toList()
         assertEquals(8, events.size)
-        assertEquals(2, events.count { it is SessionEvent.Made })
+        assertEquals(2, events.count { it is SessionEvent.Processed })
         assertEquals(6, events.count { it is SessionEvent.Dropped && it.reason == DropReason.UNREAD })
     }
 
     @Test
     fun aLateFrameInAStreamHarmsNothing() {
         val events = LinkedBlockingQueue<SessionEvent>()
-        Session(options(), RunningMode.LIVE_STREAM, events::add).use { session ->
+        Session(options(), RunningMode.LIVE, events::add).use { session ->
             session.submit(still(5))
-            assertIs<SessionEvent.Made>(events.poll(60, TimeUnit.SECONDS))
+            assertIs<SessionEvent.Processed>(events.poll(60, TimeUnit.SECONDS))
             assertRefused<PhasefrontException.Timestamp>("5 ns") { session.submit(still(5)) }
             assertNull(session.submit(still(6)))
-            assertIs<SessionEvent.Made>(events.poll(60, TimeUnit.SECONDS))
+            assertIs<SessionEvent.Processed>(events.poll(60, TimeUnit.SECONDS))
         }
     }
 
@@ -215,14 +215,14 @@ class SessionTest {
     fun whatAListenerThrowsIsCountedAndTheStreamGoesOn() {
         for (thrown in listOf(IllegalStateException("no thanks"), PhasefrontException.Frame("no thanks"))) {
             val heard = LinkedBlockingQueue<SessionEvent>()
-            val session = Session(options(), RunningMode.LIVE_STREAM) {
+            val session = Session(options(), RunningMode.LIVE) {
                 heard.add(it)
                 throw thrown
             }
             session.use {
                 for (i in 1L..3L) {
                     it.submit(still(i))
-                    assertIs<SessionEvent.Made>(heard.poll(60, TimeUnit.SECONDS))
+                    assertIs<SessionEvent.Processed>(heard.poll(60, TimeUnit.SECONDS))
                 }
             }
             assertEquals(3UL, session.statistics().listenerFailures)
@@ -233,7 +233,7 @@ class SessionTest {
     fun aListenerMayCloseItsSession() {
         val closed = CountDownLatch(1)
         lateinit var session: Session
-        session = Session(options(), RunningMode.LIVE_STREAM) {
+        session = Session(options(), RunningMode.LIVE) {
             session.close()
             closed.countDown()
         }
@@ -287,7 +287,7 @@ class SessionTest {
     @Test
     fun modesAreNotMixed() {
         image { session -> assertRefused<PhasefrontException.Session>("not live") { session.submit(still()) } }
-        Session(options(), RunningMode.LIVE_STREAM) {}.use { session ->
+        Session(options(), RunningMode.LIVE) {}.use { session ->
             assertRefused<PhasefrontException.Session>("submitted") { session.process(still()) }
         }
         assertRefused<PhasefrontException.Session>("listener") { Session(options(), RunningMode.IMAGE) {} }
@@ -317,7 +317,7 @@ class SessionTest {
     fun theNetworkThatIsBuiltInIsUsual() {
         for (offset in listOf(0.0, 3.0, 12.0)) {
             val usual = sessionOptions(display.copy(offsetMm = offset))
-            assertIs<Method.Trained>(usual.ladder[0].method)
+            assertIs<Method.Trained>(usual.qualityLevels[0].method)
             assertTrue(usual.encoding is Encoding.AntiAlias)
             Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         }
@@ -338,8 +338,8 @@ class SessionTest {
         assertContentEquals(levels(usual), levels(usual.copy(dark = 0.4f, localSteps = 1u)))
         assertTrue(!levels(usual).contentEquals(levels(usual.copy(localSteps = 0u))))
         assertTrue(!levels(usual).contentEquals(levels(usual.copy(midpointSteps = 1u))))
-        val rung = usual.ladder[0].copy(midpointSteps = 1u)
-        assertTrue(!levels(usual).contentEquals(levels(usual.copy(ladder = listOf(rung)))))
+        val qualityLevel = usual.qualityLevels[0].copy(midpointSteps = 1u)
+        assertTrue(!levels(usual).contentEquals(levels(usual.copy(qualityLevels = listOf(qualityLevel)))))
         assertRefused<PhasefrontException>("at most 8") { Session(usual.copy(localSteps = 9u), RunningMode.IMAGE) }
         assertRefused<PhasefrontException>("from 0 to 1") { Session(usual.copy(dark = 2f), RunningMode.IMAGE) }
     }
@@ -347,7 +347,7 @@ class SessionTest {
     @Test
     fun withoutANetworkTheSweepIsUsual() {
         val usual = sessionOptions(display.copy(pitchUm = 3.74))
-        assertIs<Method.Sweep>(usual.ladder[0].method)
+        assertIs<Method.Sweep>(usual.qualityLevels[0].method)
         Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         assertRefused<PhasefrontException.Network>("pairs for 0, 6, 12 mm") { builtInPair(3.0) }
     }
@@ -374,10 +374,10 @@ class SessionTest {
     @Test
     fun settingsThatCannotBeMeantAreNamed() {
         fun make(change: SessionOptions.() -> SessionOptions): () -> Any? = { Session(options().change(), RunningMode.IMAGE) }
-        assertRefused<PhasefrontException.Setting>("ladder is empty", make { copy(ladder = listOf()) })
+        assertRefused<PhasefrontException.Setting>("no quality levels", make { copy(qualityLevels = listOf()) })
         assertRefused<PhasefrontException.Setting>("0 threads", make { copy(threads = 0u) })
         assertRefused<PhasefrontException.Setting>("target rate", make { copy(targetRateHz = Double.NaN) })
-        assertRefused<PhasefrontException.Setting>("no rung 3", make { copy(quality = Quality.Fixed(3u)) })
+        assertRefused<PhasefrontException.Setting>("no quality level 3", make { copy(quality = Quality.Fixed(3u)) })
         val fine = Target.ofDisplay(display.copy(pitchUm = 3.74))
         assertRefused<PhasefrontException.Network>("pitch") { Session(sessionOptions(fine, network), RunningMode.IMAGE) }
         val tiny = Target.ofDisplay(Display(width = 32u, height = 24u))

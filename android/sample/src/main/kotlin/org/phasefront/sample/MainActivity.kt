@@ -32,8 +32,8 @@ import org.phasefront.thermalOf
 import org.phasefront.toBitmap
 
 /**
- * Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on, the
- * levels on an external screen where there is one, and what it costs.
+ * Camera or sample scene to hologram: what an eye sees that focuses where the slider says or the picture is tapped on,
+ * the levels on an external screen where there is one, and what it costs.
  */
 class MainActivity : Activity() {
     private lateinit var preview: ImageView
@@ -102,7 +102,7 @@ class MainActivity : Activity() {
     private fun run() {
         if (session != null) return
         try {
-            session = Session(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE_STREAM, ::heard)
+            session = Session(sessionOptions(hologramDisplay).copy(targetRateHz = 30.0), RunningMode.LIVE, ::heard)
         } catch (refused: PhasefrontException) {
             return say(refused.message.orEmpty())
         }
@@ -126,7 +126,7 @@ class MainActivity : Activity() {
 
     /** What becomes of frames, on the session's thread. */
     private fun heard(event: SessionEvent) {
-        if (event !is SessionEvent.Made) return
+        if (event !is SessionEvent.Processed) return
         val hologram = event.hologram
         val view = hologram.preview(zMm, hologramDisplay.width.toInt() / 2, hologramDisplay.height.toInt() / 2).use { it.toBitmap() }
         val levels: Bitmap? = output?.let { hologram.output().use { image -> image.toBitmap() } }

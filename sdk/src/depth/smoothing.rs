@@ -1,4 +1,4 @@
-//! Depth steadied over time: readings that agree with the frame before are averaged with it, readings that do not
+//! Temporal smoothing of depth: readings that agree with the frame before are averaged with it, readings that do not
 //! replace it at once, so that what moves leaves no trail.
 
 use std::time::Duration;
@@ -15,23 +15,23 @@ const NEIGHBOURS: usize = 2;
 
 /// Depth readings over time, at the sensor's resolution.
 #[derive(Debug, Clone, Default)]
-pub struct Steadier {
+pub struct Smoother {
     /// NaN where nothing is known.
     known: Vec<f32>,
     /// How long ago each was read.
     age: Vec<Duration>,
 }
 
-impl Steadier {
+impl Smoother {
     /// Forgets what it has seen.
     pub fn reset(&mut self) {
         self.known.clear();
     }
 
-    /// Replaces `readings`, (H, `width`), NaN for none, by the steadied ones; the last call was `elapsed` ago.
+    /// Replaces `readings`, (H, `width`), NaN for none, by the smoothed ones; the last call was `elapsed` ago.
     /// `metric` says that readings are metres; if not, they are normalized depth. Another size begins anew. Gives how
     /// many readings there are now.
-    pub fn steady(&mut self, readings: &mut [f32], width: usize, elapsed: Duration, metric: bool) -> usize {
+    pub fn smooth(&mut self, readings: &mut [f32], width: usize, elapsed: Duration, metric: bool) -> usize {
         if self.known.len() != readings.len() {
             self.known.clear();
             self.known.extend_from_slice(readings);
@@ -86,12 +86,12 @@ mod tests {
     #[test]
     fn noise_on_what_stands_still_shrinks() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
-        let mut steadier = Steadier::default();
+        let mut smoother = Smoother::default();
         let (mut before, mut after) = (0.0f64, 0.0f64);
         for frame in 0..40 {
             let mut readings: Vec<f32> = (0..400).map(|_| 2.0 + random.random_range(-0.02..0.02)).collect();
             let raw = readings.clone();
-            assert_eq!(steadier.steady(&mut readings, 20, FRAME, true), 400);
+            assert_eq!(smoother.smooth(&mut readings, 20, FRAME, true), 400);
             if frame > 10 {
                 let square = |v: &[f32]| v.iter().map(|v| f64::from(v - 2.0).powi(2)).sum::<f64>();
                 before += square(&raw);
@@ -104,14 +104,14 @@ mod tests {
     /// A near square moves over a far wall: wherever it is not, the wall is, in the very next frame.
     #[test]
     fn what_moves_leaves_no_trail() {
-        let mut steadier = Steadier::default();
+        let mut smoother = Smoother::default();
         for frame in 0..30 {
             let scene = |x: usize, y: usize| match (frame..frame + 6).contains(&x) && y > 4 {
                 true => 1.0,
                 false => 1.2,
             };
             let mut readings: Vec<f32> = (0..800).map(|i| scene(i % 40, i / 40)).collect();
-            steadier.steady(&mut readings, 40, FRAME, true);
+            smoother.smooth(&mut readings, 40, FRAME, true);
             let wrong = (0..800).filter(|i| (readings[*i] - scene(i % 40, i / 40)).abs() > 1e-5);
             assert_eq!(wrong.count(), 0, "{frame}");
         }
@@ -119,24 +119,24 @@ mod tests {
 
     #[test]
     fn a_missing_reading_is_held_where_its_surface_goes_on_and_not_for_long() {
-        let mut steadier = Steadier::default();
+        let mut smoother = Smoother::default();
         let mut readings = vec![2.0; 100];
-        steadier.steady(&mut readings, 10, FRAME, true);
+        smoother.smooth(&mut readings, 10, FRAME, true);
         let mut held = 0;
         for _ in 0..20 {
             let mut readings = vec![2.0; 100];
             readings[55] = f32::NAN;
-            held += usize::from(steadier.steady(&mut readings, 10, FRAME, true) == 100);
+            held += usize::from(smoother.smooth(&mut readings, 10, FRAME, true) == 100);
         }
         assert_eq!(held, 9);
         // All around it another surface: nothing speaks for the old one.
         let mut readings = vec![2.0; 100];
-        steadier.steady(&mut readings, 10, FRAME, true);
+        smoother.smooth(&mut readings, 10, FRAME, true);
         let mut readings = vec![3.0; 100];
         readings[55] = f32::NAN;
-        assert_eq!(steadier.steady(&mut readings, 10, FRAME, true), 99);
+        assert_eq!(smoother.smooth(&mut readings, 10, FRAME, true), 99);
         assert!(readings[55].is_nan());
         // Another size begins anew.
-        assert_eq!(steadier.steady(&mut [5.0, f32::NAN], 2, FRAME, true), 1);
+        assert_eq!(smoother.smooth(&mut [5.0, f32::NAN], 2, FRAME, true), 1);
     }
 }

@@ -1,0 +1,41 @@
+//! Makes a hologram of a picture and its depth map:
+//!
+//! ```sh
+//! cargo run --release --bin still -- samples/scene_rgb.jpg samples/scene_depth.png hologram.png
+//! phasefront refocus hologram.png --z-mm 2 -o near.png
+//! ```
+
+mod hologram_png;
+
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::{Display, ImageSession};
+use std::error::Error;
+use std::path::Path;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [rgb, depth, hologram] = &arguments[..] else {
+        return Err("three files are needed: still RGB DEPTH HOLOGRAM.png".into());
+    };
+
+    // A picture, and how far each of its points is: 0 the nearest, 255 the farthest.
+    let rgb = image::open(rgb)?.into_rgb8();
+    let depth = image::open(depth)?.into_luma8();
+    let size = |(width, height): (u32, u32)| (width as usize, height as usize);
+    let ((width, height), (depth_width, depth_height)) = (size(rgb.dimensions()), size(depth.dimensions()));
+
+    // A session plans its work once and then makes as many holograms as it gets frames. The display says what they are
+    // for: here the paper's, 8 µm pixels and three lasers, with as many pixels as the picture.
+    let display = Display::default().with_size(height, width)?;
+    let session = ImageSession::new(phasefront_models::session_options(display))?;
+
+    // A frame refers to the images' bytes: so many from one row to the next, and from one pixel to the next.
+    let colour = Plane::new(&rgb, 3 * width, 3);
+    let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[colour])?;
+    let depth = Plane::new(&depth, depth_width, 1);
+    let depth = DepthImage::new(DepthFormat::NormalizedU8, depth_width, depth_height, depth)?;
+    let made = session.process(&CameraFrame::new(0, colour, depth))?;
+
+    println!("{width}×{height} pixels in {:.0?}", made.times().total());
+    hologram_png::save(&made, Path::new(hologram))
+}
