@@ -17,8 +17,8 @@ mod event {
 }
 #[path = "../../sdk/src/session/computing.rs"]
 mod computing;
-#[path = "../../sdk/src/session/home.rs"]
-mod home;
+#[path = "../../sdk/src/session/process_id.rs"]
+mod process_id;
 #[path = "../../sdk/src/session/live.rs"]
 mod live;
 #[path = "../../sdk/src/session/queue.rs"]

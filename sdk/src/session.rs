@@ -14,7 +14,6 @@ mod engine;
 mod event;
 mod handle;
 mod hologram;
-mod home;
 mod live;
 mod live_work;
 mod on_cpu;
@@ -22,6 +21,7 @@ mod on_cpu;
 mod on_gpu;
 mod options;
 mod owned_frame;
+mod process_id;
 mod quality;
 mod queue;
 mod stages;
@@ -195,7 +195,7 @@ impl LiveSession {
     /// Colour and depth that do not belong together, a late frame, or a session that is closed or forked. None of them
     /// harms the frames that follow.
     pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Submission> {
-        self.shared.home.check()?;
+        self.shared.process.check()?;
         frame.check()?;
         let dropped = (self.live).submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))?;
         Ok(dropped.map_or(Submission::Queued, Submission::Dropped))

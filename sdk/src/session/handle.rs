@@ -1,15 +1,15 @@
 //! Controls of a session that all three kinds share.
 
 use super::computing::{self, Computing};
-use super::home::Home;
 use super::live::{Live, guarded, lock};
 use super::live_work::LiveWork;
 #[cfg(doc)]
 use super::on_gpu::GpuOptions;
 use super::options::SessionOptions;
+use super::process_id::ProcessId;
 use super::quality::{Quality, Thermal};
 use super::queue::{self, Gate, Queue};
-use super::stages::{Made, Stages};
+use super::stages::{FrameResult, Stages};
 use super::statistics::{Recent, Statistics};
 use crate::cancel::Cancel;
 use crate::clock::Instant;
@@ -37,7 +37,7 @@ pub(super) enum Frames {
 
 /// What callers and the session's thread share.
 pub(super) struct Shared {
-    pub(super) home: Home,
+    pub(super) process: ProcessId,
     /// None when the session has ended: its memory went back.
     pub(super) stages: Mutex<Option<Stages>>,
     control: Mutex<Control>,
@@ -68,7 +68,7 @@ impl Shared {
         let mut stages = Stages::new(options, cancel.clone())?;
         let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.quality_level());
         Ok(Arc::new(Shared {
-            home: Home::here(),
+            process: ProcessId::current(),
             stages: Mutex::new(Some(stages)),
             control: Mutex::new(control),
             recent: Mutex::new(recent),
@@ -76,7 +76,7 @@ impl Shared {
         }))
     }
 
-    pub(super) fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<Made> {
+    pub(super) fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<FrameResult> {
         let Control { quality, thermal, .. } = *lock(&self.control);
         let made = stages.process(frame, past, thermal, quality)?;
         let mut recent = lock(&self.recent);
@@ -115,7 +115,7 @@ impl Shared {
 impl SessionHandle {
     /// Lets `work` have the stages, once nobody else has them.
     pub(super) fn with_stages<T>(&self, work: impl FnOnce(&mut Option<Stages>) -> Result<T>) -> Result<T> {
-        self.shared.home.check()?;
+        self.shared.process.check()?;
         computing::check()?;
         let result = {
             let _computing = Computing::begin();
@@ -184,7 +184,7 @@ impl SessionHandle {
         match &self.frames {
             Frames::Answered(gate) => {
                 lock(gate).close();
-                if self.shared.home.is_here() {
+                if self.shared.process.is_current() {
                     self.shared.end();
                 }
             }

@@ -1,8 +1,8 @@
 //! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
 
 use super::computing::{self, Computing};
-use super::home::Home;
 use super::live::lock;
+use super::process_id::ProcessId;
 use super::statistics::FrameTimes;
 use super::threads::Threads;
 use crate::error::{Error, Result};
@@ -61,7 +61,7 @@ impl<T> Drop for Pooled<T> {
 
 /// What looking at results needs; shared by all of a session's.
 pub(super) struct Viewer {
-    home: Home,
+    process: ProcessId,
     target: Target,
     /// The session's threads, so that views are computed on no others.
     pool: Arc<Threads>,
@@ -78,7 +78,7 @@ struct ViewPlan {
 impl Viewer {
     pub(super) fn new(target: Target, pool: Arc<Threads>) -> Self {
         Viewer {
-            home: Home::here(),
+            process: ProcessId::current(),
             target,
             pool,
             plan: Mutex::new(None),
@@ -226,7 +226,7 @@ impl Hologram {
                 rgba.len()
             )));
         }
-        self.viewer.home.check()?;
+        self.viewer.process.check()?;
         computing::check()?;
         let _computing = Computing::begin();
         // Locked before the pool is entered, whose threads may else take up another view while this one waits.
@@ -263,7 +263,7 @@ impl Hologram {
     /// A z too far away, whose padded plane would have over 2²⁷ values, or a process that was forked from the
     /// session's.
     pub fn field(&self, z_m: f64) -> Result<Vec<Complex32>> {
-        self.viewer.home.check()?;
+        self.viewer.process.check()?;
         let seen = || seen_field(self.output_levels(), self.scale, self.target(), self.shape, z_m);
         self.viewer.pool.install(seen)
     }

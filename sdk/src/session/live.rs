@@ -3,7 +3,7 @@
 
 use super::computing;
 use super::event::DropReason;
-use super::home::Home;
+use super::process_id::ProcessId;
 use super::queue::{Queue, Ticket};
 use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
 use crate::cancel::Cancel;
@@ -91,7 +91,7 @@ thread_local! {
 
 /// A running live session.
 pub(super) struct Live<W: Work> {
-    home: Home,
+    process: ProcessId,
     shared: Arc<Shared<W::Frame>>,
     thread: Mutex<Option<JoinHandle<()>>>,
 }
@@ -119,7 +119,7 @@ impl<W: Work> Live<W> {
             })
             .map_err(|e| Error::Session(format!("its thread cannot be started: {e}")))?;
         Ok(Live {
-            home: Home::here(),
+            process: ProcessId::current(),
             shared,
             thread: Mutex::new(Some(thread)),
         })
@@ -179,7 +179,7 @@ impl<W: Work> Live<W> {
     /// listener may be waiting for this one. Nor does it wait on a thread that computes, which the session's may be
     /// waiting for.
     pub(super) fn close(&self) {
-        if !self.home.is_here() {
+        if !self.process.is_current() {
             return;
         }
         self.change(Queue::close);

@@ -6,7 +6,7 @@ use super::handle::Shared;
 use super::live::{Report, Work, lock};
 use super::owned_frame::OwnedFrame;
 use super::queue;
-use super::stages::Made;
+use super::stages::FrameResult;
 use crate::cancel::Cancel;
 use crate::error::Result;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ pub(super) struct LiveWork(pub(super) Arc<Shared>);
 
 impl Work for LiveWork {
     type Frame = OwnedFrame;
-    type Output = Made;
+    type Output = FrameResult;
 
-    fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<Made> {
+    fn process(&mut self, frame: &OwnedFrame, fresh: bool) -> Result<FrameResult> {
         let _computing = Computing::begin();
         let mut stages = lock(&self.0.stages);
         let stages = stages.as_mut().ok_or_else(queue::closed)?;
@@ -44,7 +44,7 @@ impl Drop for LiveWork {
 }
 
 /// Tells `listener` the events of a report.
-pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<Made>) {
+pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<FrameResult>) {
     match report {
         Report::Done { timestamp_ns, output } => {
             listener(Event::Processed(output.hologram));

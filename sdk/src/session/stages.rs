@@ -90,7 +90,7 @@ pub(super) struct Stages {
 }
 
 /// What a frame became.
-pub(super) struct Made {
+pub(super) struct FrameResult {
     pub(super) hologram: Hologram,
     pub(super) change: Option<QualityChange>,
 }
@@ -239,7 +239,7 @@ impl Stages {
         past: bool,
         thermal: Thermal,
         quality: Quality,
-    ) -> Result<Made> {
+    ) -> Result<FrameResult> {
         let start = Instant::now();
         let elapsed = self.elapsed(frame, past);
         let mut plan = self.take_plan()?;
@@ -253,7 +253,7 @@ impl Stages {
             .map(|rate| Duration::from_secs_f64(1.0 / rate));
         let change = self.level_control.observe(start.elapsed(), period, thermal, quality);
         let change = change.map(|change| self.step(change));
-        Ok(Made { hologram, change })
+        Ok(FrameResult { hologram, change })
     }
 
     /// Plans the quality level that was chosen; where that fails, stays on the one before. The frame is made either

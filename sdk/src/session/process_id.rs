@@ -5,32 +5,29 @@ use crate::error::{Error, Result};
 
 /// A process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Home(u32);
+pub(super) struct ProcessId(u32);
 
-impl Home {
+impl ProcessId {
     /// The one that runs.
-    pub(super) fn here() -> Self {
-        Home(match cfg!(unix) {
-            true => std::process::id(),
-            // Processes are not forked.
-            false => 0,
-        })
+    pub(super) fn current() -> Self {
+        // Only Unix forks processes, and WebAssembly has no ids.
+        ProcessId(if cfg!(unix) { std::process::id() } else { 0 })
     }
 
     /// Whether this is still the process.
-    pub(super) fn is_here(self) -> bool {
-        self == Home::here()
+    pub(super) fn is_current(self) -> bool {
+        self == ProcessId::current()
     }
 
     /// # Errors
     /// Another process.
     pub(super) fn check(self) -> Result<()> {
-        match self.is_here() {
-            true => Ok(()),
-            false => Err(Error::Session(
+        if !self.is_current() {
+            return Err(Error::Session(
                 "it was made before this process was forked, and its threads stayed behind; make a new one after the fork"
                     .into(),
-            )),
+            ));
         }
+        Ok(())
     }
 }
