@@ -9,25 +9,19 @@ pub use phasefront_models::Precision;
 use std::path::Path;
 use std::sync::Arc;
 
-/// The name of the bundled seeded network.
-pub const SEEDED: &str = "seeded-6";
-
 /// The name of the bundled pairs of a network and its pre-filter, for the deep double phase method: the one for the
 /// offset is meant.
 pub const DEEP: &str = "ddpm-8";
 
 /// The networks that are files of the source tree's `models`, not bundled, by name.
-const FILES: [&str; 11] = [
-    "ddpm-15",
+const FILES: [&str; 8] = [
     "ddpm-8-12mm",
     "ddpm-8-6mm",
-    "ddpm-seeded-6",
     "half-8",
     "ldi3-15",
     "rgbd-15-cylinder",
     "rgbd-15-wide",
     "rgbd-30",
-    "seeded-6-80",
     "seeded-8-80",
 ];
 

@@ -290,7 +290,7 @@ fn depth_is_turned_round() {
 fn names_of_networks_are_listed_and_a_deep_field_is_told() {
     let folder = Folder::new().with_frame();
     let list = folder.succeeds(&["networks"]);
-    for name in ["ddpm-8", "rgbd-8", "rgbd-15", "seeded-6"] {
+    for name in ["ddpm-8", "rgbd-8", "rgbd-15"] {
         assert_eq!(
             list.lines()
                 .filter(|line| line.starts_with(&format!("{name} ")))
@@ -670,17 +670,11 @@ fn a_flag_that_would_change_nothing_is_refused() {
     let folder = Folder::new().with_frame();
     let file = format!("{MODELS}/rgbd-8-int8.onnx");
     for (flags, with) in [
-        (
-            &["--method", "sweep", "--network", "8"][..],
-            "--method network, seeded or auto",
-        ),
-        (
-            &["--method", "layers", "--network", "8"],
-            "--method network, seeded or auto",
-        ),
+        (&["--method", "sweep", "--network", "8"][..], "--method network or auto"),
+        (&["--method", "layers", "--network", "8"], "--method network or auto"),
         (
             &["--method", "points", "--precision", "f32"],
-            "--method network, seeded or auto",
+            "--method network or auto",
         ),
         (&["--network", &file, "--precision", "f32"], "bundled networks"),
         (
@@ -851,10 +845,7 @@ fn networks_that_cannot_be_used_are_named() {
         (
             "none that is bundled",
             made(&["--network", "9"]),
-            &[
-                "bundled network (rgbd-8, rgbd-15, seeded-6, ddpm-8)",
-                "--network FILE.onnx",
-            ],
+            &["bundled network (rgbd-8, rgbd-15, ddpm-8)", "--network FILE.onnx"],
         ),
         (
             "one of the source tree",

@@ -78,10 +78,6 @@ pub const NETWORKS: &[Model] = &[
         name: "rgbd-15",
         files: files!("rgbd-15"),
     },
-    Model {
-        name: "seeded-6",
-        files: files!("seeded-6"),
-    },
 ];
 
 /// The network of [`NETWORKS`] called `name`, where it is compiled in in this precision.

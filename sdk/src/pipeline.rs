@@ -227,7 +227,7 @@ mod tests {
         let (height, width) = (19, 33);
         let display = Display::from_toml("width = 33\nheight = 19\noffset_mm = 6").unwrap();
         let target = Target::from(display.clone());
-        let seeded = network(include_bytes!("../../models/seeded-6.onnx"));
+        let seeded = network(include_bytes!("../../models/seeded-8-80.onnx"));
         let int8 = network(include_bytes!("../../models/rgbd-8-int8.onnx"));
         let sweep = Sweep::of_planes(&display, 8);
         let deep = network(include_bytes!("../../models/ddpm-8-6mm-prefilter.onnx"));

@@ -15,6 +15,7 @@ wavelengths_nm = [638.0, 520.0, 450.0]
 volume_depth_mm = 12.0
 """
 INT8_MINUTES = 10.0
+SEED_PLANES = 80
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ NETWORKS = {
     "rgbd-15": Network(0.2, ("--layers", "15")),
     "rgbd-30": Network(0.25, ("--layers", "30")),
     "rgbd-15-wide": Network(0.2, ("--layers", "15"), wide=True),
-    "seeded-6": Network(0.1, ("--layers", "6", "--input", "seeded")),
+    "seeded-8-80": Network(0.1, ("--layers", "8", "--input", "seeded")),
     "ddpm-8": _pair(0),
     "ddpm-8-6mm": _pair(6),
     "ddpm-8-12mm": _pair(12),
@@ -83,7 +84,7 @@ def steps(settings: Settings) -> Iterator[Step]:
             deep = ("--planes", 2 * settings.planes, "--display", folder / "deep.toml")
             yield _step(f"data {kind}{DEEP}", *made, folder / f"{kind}{DEEP}", "--", *scenes, *deep)
         if any(network.seeded for network in chosen.values()):
-            more = ("--", "--refined", 3) if settings.size % 4 == 0 else ()
+            more = ("--", "--planes", SEED_PLANES) + (("--refined", 3) if settings.size % 4 == 0 else ())
             given = ("--data", folder / kind, "-o", folder / f"seeds-{kind}", "--phasefront", settings.phasefront)
             yield _step(f"seeds {kind}", "seeds", *given, *more)
     for name, network in chosen.items():

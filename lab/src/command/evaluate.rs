@@ -31,7 +31,7 @@ pub(crate) struct Evaluate {
     )]
     method: Vec<MethodName>,
     /// Networks to judge, separated by commas: one that comes along, or an ONNX file
-    #[arg(long, value_name = "8|15|seeded-6|FILE,…", value_delimiter = ',')]
+    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that bundled networks compute in [default: int8]
     #[arg(long, value_enum)]

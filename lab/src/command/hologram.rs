@@ -66,8 +66,7 @@ pub(crate) struct Making {
     /// and no --network]
     #[arg(long, value_enum)]
     method: Option<Method>,
-    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8; seeded-6 with --method
-    /// seeded]
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
     #[arg(long, value_name = "NAME|FILE")]
     network: Option<String>,
     /// Numbers that a bundled network computes in [default: int8]
@@ -426,12 +425,12 @@ impl Making {
 
     /// Refuses flags that the method does not take.
     fn check_flags(&self) -> Result<()> {
-        use CoreMethod::{Auto, Network, Seeded, Sweep};
+        use CoreMethod::{Auto, Network, Sweep};
         let method = self.method();
         let any = |of: &[CoreMethod]| matches!(method, Method::Core(core) if of.contains(&core));
-        let (sweeps, trained) = (any(&[Sweep, Auto]), any(&[Network, Seeded, Auto]));
+        let (sweeps, trained) = (any(&[Sweep, Auto]), any(&[Network, Auto]));
         let planes = sweeps || matches!(method, Method::Layers | Method::Points);
-        let network = "--method network, seeded or auto";
+        let network = "--method network or auto";
         check_used(&[
             ("--network", self.network.is_some(), trained, network),
             ("--precision", self.precision.is_some(), trained, network),
@@ -458,7 +457,7 @@ impl Making {
             && method != CoreMethod::Network
         {
             return Err(Error::Input(
-                "--method sweep, seeded and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
+                "--method sweep and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
                     .into(),
             ));
         }
@@ -479,7 +478,7 @@ impl Making {
             && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())
         {
             return Err(Error::Input(
-                "--backend gpu runs --method network, sweep, seeded and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
+                "--backend gpu runs --method network, sweep and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
                     .into(),
             ));
         }

@@ -30,7 +30,7 @@ pub(crate) struct Judge {
     /// Folder of a layered depth image
     #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
     ldi: Option<PathBuf>,
-    /// Methods [default: sweep and, where they were trained for the display, network and seeded]
+    /// Methods [default: sweep and, where one was trained for the display, network]
     #[arg(long, value_enum, value_delimiter = ',')]
     method: Vec<CoreMethod>,
     /// Encoders, each as published, corrected as is usual, and corrected for a still
@@ -186,7 +186,7 @@ impl Judge {
     fn ways(&self, display: &phasefront::Display) -> Vec<Way> {
         let trained = phasefront_models::default_network(display).is_some();
         let usual = match trained {
-            true => vec![CoreMethod::Sweep, CoreMethod::Network, CoreMethod::Seeded],
+            true => vec![CoreMethod::Sweep, CoreMethod::Network],
             false => vec![CoreMethod::Sweep],
         };
         let methods = if self.method.is_empty() {

@@ -14,8 +14,6 @@ pub(crate) enum CoreMethod {
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, any display
     Sweep,
-    /// The plane sweep corrected by a network that was trained on it
-    Seeded,
     /// The plane sweep where depth is sharp, a network where it is ragged
     Auto,
 }
@@ -36,7 +34,6 @@ impl CoreMethod {
         match self {
             CoreMethod::Network => "network",
             CoreMethod::Sweep => "sweep",
-            CoreMethod::Seeded => "seeded",
             CoreMethod::Auto => "auto",
         }
     }
@@ -63,10 +60,6 @@ impl CoreMethod {
                 (Method::trained(network), encoder)
             }
             CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
-            CoreMethod::Seeded => {
-                let network = models::network(network.unwrap_or(models::SEEDED), precision)?;
-                (Method::Seeded(network), encoder.read()?)
-            }
             CoreMethod::Auto => {
                 let network = models::network(network.unwrap_or("8"), precision)?;
                 (Method::Auto(sweep, network), encoder.read()?)

@@ -35,7 +35,7 @@ export class Network {
   }
 
   /**
-   * The int8 network of this name that is in the module: `rgbd-8`, `rgbd-15` or `seeded-6`.
+   * The int8 network of this name that is in the module: `rgbd-8` or `rgbd-15`.
    *
    * @throws PhasefrontError `network`: another name.
    */
