@@ -2,7 +2,7 @@
 //! that is not counted. Then the usual sweep of frames of that size that are all of one depth, and as bad as can be:
 //! another depth at each pixel, and near and far in turn.
 //!
-//!     cargo run --release --example sweep_speed -- samples/scene_rgb.jpg samples/scene_depth.png \
+//!     cargo bench --bench sweep -- $PWD/samples/scene_rgb.jpg $PWD/samples/scene_depth.png \
 //!         [THREADS] [PLANES TAPS LAYERS TILE]
 
 use ndarray::Array2;
@@ -18,7 +18,7 @@ use std::time::Instant;
 const FRAMES: usize = 7;
 
 fn main() -> Result<()> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let [rgb, depth, rest @ ..] = &arguments[..] else {
         return Err(phasefront_lab::Error::Input(
             "two files are needed: colour and depth".into(),
