@@ -36,7 +36,7 @@ use chain::Chain;
 pub(crate) use fused::int8_layers;
 use fused::{FieldOf, FusedChain, FusedScratch};
 use num_complex::Complex32;
-pub use phasefront_kernels::{Isa, f32_peak, int8_peak};
+pub use phasefront_kernels::Isa;
 use prost::Message;
 #[cfg(feature = "tract")]
 use stock::StockPlan;

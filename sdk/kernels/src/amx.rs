@@ -20,7 +20,7 @@ use std::cell::RefCell;
 use std::sync::OnceLock;
 
 /// Lines of a tile, and pixels of a line.
-const TILE: usize = 16;
+pub(crate) const TILE: usize = 16;
 /// Filters computed together: a tile of 16 and one of 8.
 const FILTERS: usize = 24;
 /// Words of weights for one step: 16 words for each filter.
@@ -143,7 +143,7 @@ fn pack(taps: &Taps<'_>) -> Vec<i32> {
 
 /// The tiles' shapes: 0 and 1 sums of 16 filters, 2 and 3 of 8; 4 and 5 their weights; 6 and 7 pixels.
 #[repr(C, align(64))]
-struct TileConfig {
+pub(crate) struct TileConfig {
     palette: u8,
     start_row: u8,
     reserved: [u8; 14],
@@ -151,7 +151,7 @@ struct TileConfig {
     rows: [u8; 16],
 }
 
-static CONFIG: TileConfig = TileConfig {
+pub(crate) static CONFIG: TileConfig = TileConfig {
     palette: 1,
     start_row: 0,
     reserved: [0; 14],
@@ -409,22 +409,4 @@ fn last_filters(
             }
         }
     });
-}
-
-/// Multiply-accumulates in tiles, for the machine's peak.
-pub(crate) fn burn(rounds: u64) -> u64 {
-    // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
-    unsafe {
-        asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",
-            in(reg) &raw const CONFIG, options(nostack, readonly));
-        for _ in 0..rounds {
-            asm!(
-                "tdpbsud tmm0, tmm4, tmm6",
-                "tdpbsud tmm1, tmm4, tmm7",
-                options(nostack, nomem)
-            );
-        }
-        asm!("tilerelease", options(nostack, nomem));
-    }
-    rounds * 2 * (TILE * TILE * TILE * GROUP) as u64
 }

@@ -8,7 +8,6 @@ use crate::OUTPUTS;
 use crate::f32;
 use crate::int8::{self, GROUP, Packed, Rounding, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, SourceRow, Window, last_row_by_blocks};
-use std::arch::asm;
 use std::arch::x86_64::*;
 use std::hint::black_box;
 
@@ -344,48 +343,4 @@ pub(crate) fn rescale_row(row: &mut [u8], factor: f32, zero_point: u8, geometry:
     }
     // SAFETY: as above.
     unsafe { compiled(row, factor, zero_point, geometry) }
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn int8_burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "avx2")]
-    fn run(rounds: u64) {
-        let x = black_box(_mm256_setzero_si256());
-        let mut sums = [x; 12];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = _mm256_add_epi32(*sum, _mm256_madd_epi16(*sum, x));
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0} */", inout(ymm_reg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: the caller has found the features.
-    unsafe { run(rounds) };
-    rounds * 12 * 16
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn f32_burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "avx2,fma")]
-    fn run(rounds: u64) {
-        let x = black_box(_mm256_setzero_ps());
-        let mut sums = [x; 12];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = _mm256_fmadd_ps(x, x, *sum);
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0} */", inout(ymm_reg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: the caller has found the features.
-    unsafe { run(rounds) };
-    rounds * 12 * 8
 }

@@ -4,9 +4,7 @@
 use crate::OUTPUTS;
 use crate::f32::{Kernels, Packed};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
-use std::arch::asm;
 use std::arch::x86_64::*;
-use std::hint::black_box;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
@@ -130,26 +128,4 @@ fn last_block(layer: &Packed, rows: &[&[f32]; 3], x: usize, values: &mut [[f32; 
             unsafe { _mm512_storeu_ps(values.as_mut_ptr(), *sum) };
         }
     }
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "avx512f")]
-    fn run(rounds: u64) {
-        let x = black_box(_mm512_setzero_ps());
-        let mut sums = [x; 24];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = _mm512_fmadd_ps(x, x, *sum);
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0} */", inout(zmm_reg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: the caller has found the features.
-    unsafe { run(rounds) };
-    rounds * 24 * 16
 }

@@ -5,9 +5,7 @@ use crate::OUTPUTS;
 use crate::avx2::{quantise_row, rescale_row};
 use crate::int8::{GROUP, Kernels, Packed, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
-use std::arch::asm;
 use std::arch::x86_64::*;
-use std::hint::black_box;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
@@ -230,26 +228,4 @@ fn pack_groups([a, b, c, d]: [__m512i; GROUP]) -> __m512i {
     let bytes = _mm512_packus_epi16(_mm512_packs_epi32(a, b), _mm512_packs_epi32(c, d));
     let turn = _mm512_set4_epi32(0x0f0b_0703, 0x0e0a_0602, 0x0d09_0501, 0x0c08_0400);
     _mm512_shuffle_epi8(bytes, turn)
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "avx512f,avx512bw,avx512vnni")]
-    fn run(rounds: u64) {
-        let x = black_box(_mm512_setzero_si512());
-        let mut sums = [x; 24];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = _mm512_dpbusd_epi32(*sum, x, x);
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0} */", inout(zmm_reg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: the caller has found the features.
-    unsafe { run(rounds) };
-    rounds * 24 * 64
 }

@@ -20,6 +20,7 @@ mod f32;
 pub mod fir;
 mod int8;
 mod isa;
+#[cfg(feature = "peak")]
 mod peak;
 mod places;
 mod tiles;
@@ -50,6 +51,7 @@ mod simd128;
 pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
+#[cfg(feature = "peak")]
 pub use peak::{f32_peak, int8_peak};
 pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
 pub use wavefront::{Band, Rows, Scratch, Tiling};

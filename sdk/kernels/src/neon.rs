@@ -7,8 +7,6 @@ use crate::f32;
 use crate::int8::{self, GROUP, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, last_row_by_blocks};
 use std::arch::aarch64::*;
-use std::arch::asm;
-use std::hint::black_box;
 
 /// The f32 kernels.
 pub(crate) const KERNELS: f32::Kernels = f32::Kernels {
@@ -168,28 +166,6 @@ impl<'a> Dots<'a> {
             groups: layer.groups,
         }
     }
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "neon")]
-    fn run(rounds: u64) {
-        let x = black_box(vdupq_n_f32(0.0));
-        let mut sums = [x; 24];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = vfmaq_f32(*sum, x, x);
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0:v} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: NEON is part of every ARM64 processor.
-    unsafe { run(rounds) };
-    rounds * 24 * 4
 }
 
 /// The int8 kernels around one instruction set's `load` of 16 bytes of pixels and `dot::<LANE>(sum, pixels, weights)`.

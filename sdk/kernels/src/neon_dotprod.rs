@@ -10,7 +10,6 @@ use crate::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, re
 use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
 use std::arch::aarch64::*;
 use std::arch::asm;
-use std::hint::black_box;
 
 /// The kernels, where the processor has what they need.
 pub(crate) fn kernels() -> Option<Kernels> {
@@ -40,7 +39,7 @@ unsafe fn load(pixels: *const u8) -> int8x16_t {
 /// `sum + dot(pixels, weights[LANE])` for each of four pixels.
 #[inline]
 #[target_feature(enable = "neon,dotprod")]
-fn dot<const LANE: usize>(sum: int32x4_t, pixels: int8x16_t, weights: int8x16_t) -> int32x4_t {
+pub(crate) fn dot<const LANE: usize>(sum: int32x4_t, pixels: int8x16_t, weights: int8x16_t) -> int32x4_t {
     let mut result = sum;
     // SAFETY: registers alone; the feature is the function's.
     unsafe {
@@ -49,26 +48,4 @@ fn dot<const LANE: usize>(sum: int32x4_t, pixels: int8x16_t, weights: int8x16_t)
             options(pure, nomem, nostack, preserves_flags));
     }
     result
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn burn(rounds: u64) -> u64 {
-    #[target_feature(enable = "neon,dotprod")]
-    fn run(rounds: u64) {
-        let (x, w) = (black_box(vdupq_n_s8(0)), black_box(vdupq_n_s8(0)));
-        let mut sums = [black_box(vdupq_n_s32(0)); 24];
-        for _ in 0..rounds {
-            for sum in &mut sums {
-                *sum = dot::<0>(*sum, x, w);
-            }
-            // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
-            unsafe {
-                asm!("/* {0:v} */", inout(vreg) sums[0], options(nomem, nostack, preserves_flags));
-            }
-        }
-        black_box(sums);
-    }
-    // SAFETY: the caller has found the features.
-    unsafe { run(rounds) };
-    rounds * 24 * 16
 }

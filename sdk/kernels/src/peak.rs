@@ -1,31 +1,102 @@
-//! The multiply-accumulates that an instruction set does here at its best: registers alone, no memory. What a kernel is
-//! measured against, in the same run, on the same threads.
+//! The multiply-accumulates that an instruction set does here at its best: registers alone, no memory. A kernel is
+//! measured against this, in the same run, on the same threads.
+#![allow(unsafe_code)]
 
 use crate::Isa;
+#[cfg(target_arch = "aarch64")]
+use std::arch::aarch64::*;
+use std::arch::asm;
+#[cfg(target_arch = "x86_64")]
+use std::arch::x86_64::*;
+use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 /// Rounds between looks at the clock.
 const ROUNDS: u64 = 10_000;
 
 /// Runs rounds of multiply-accumulates in registers and yields how many it did.
-pub(crate) type Burn = fn(u64) -> u64;
+type Burn = fn(u64) -> u64;
+
+/// A [`Burn`] of `$sums` registers, all `$zero` at first, by `$features`: `$step` does `$lanes` multiply-accumulates.
+macro_rules! burn {
+    ($name:ident, $features:literal, $register:ident $text:literal, $sums:literal x $lanes:literal, $zero:expr,
+        |$sum:ident, $x:ident| $step:expr) => {
+        fn $name(rounds: u64) -> u64 {
+            #[target_feature(enable = $features)]
+            fn run(rounds: u64) {
+                let $x = black_box($zero);
+                let mut sums = [$x; $sums];
+                for _ in 0..rounds {
+                    for sum in &mut sums {
+                        let $sum = *sum;
+                        *sum = $step;
+                    }
+                    // SAFETY: empty; it only hides a register's value, so that the rounds are not folded.
+                    unsafe {
+                        asm!($text, inout($register) sums[0], options(nomem, nostack, preserves_flags));
+                    }
+                }
+                black_box(sums);
+            }
+            // SAFETY: the caller has found the features.
+            unsafe { run(rounds) };
+            rounds * $sums * $lanes
+        }
+    };
+}
+
+#[cfg(target_arch = "x86_64")]
+burn!(avx2_int8, "avx2", ymm_reg "/* {0} */", 12 x 16, _mm256_setzero_si256(),
+    |sum, x| _mm256_add_epi32(sum, _mm256_madd_epi16(sum, x)));
+#[cfg(target_arch = "x86_64")]
+burn!(avx2_f32, "avx2,fma", ymm_reg "/* {0} */", 12 x 8, _mm256_setzero_ps(), |sum, x| _mm256_fmadd_ps(x, x, sum));
+#[cfg(target_arch = "x86_64")]
+burn!(avx512, "avx512f", zmm_reg "/* {0} */", 24 x 16, _mm512_setzero_ps(), |sum, x| _mm512_fmadd_ps(x, x, sum));
+#[cfg(target_arch = "x86_64")]
+burn!(avx512_vnni, "avx512f,avx512bw,avx512vnni", zmm_reg "/* {0} */", 24 x 64, _mm512_setzero_si512(),
+    |sum, x| _mm512_dpbusd_epi32(sum, x, x));
+#[cfg(target_arch = "aarch64")]
+burn!(neon, "neon", vreg "/* {0:v} */", 24 x 4, vdupq_n_f32(0.0), |sum, x| vfmaq_f32(sum, x, x));
+#[cfg(target_arch = "aarch64")]
+burn!(neon_dotprod, "neon,dotprod", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
+    |sum, x| crate::neon_dotprod::dot::<0>(sum, vreinterpretq_s8_s32(x), vreinterpretq_s8_s32(x)));
+#[cfg(target_arch = "aarch64")]
+burn!(neon_i8mm, "neon,i8mm", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
+    |sum, x| crate::neon_i8mm::dot::<0>(sum, vreinterpretq_u8_s32(x), vreinterpretq_s8_s32(x)));
+
+#[cfg(target_arch = "x86_64")]
+fn amx(rounds: u64) -> u64 {
+    use crate::amx::{CONFIG, TILE};
+    // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
+    unsafe {
+        asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",
+            in(reg) &raw const CONFIG, options(nostack, readonly));
+        for _ in 0..rounds {
+            asm!(
+                "tdpbsud tmm0, tmm4, tmm6",
+                "tdpbsud tmm1, tmm4, tmm7",
+                options(nostack, nomem)
+            );
+        }
+        asm!("tilerelease", options(nostack, nomem));
+    }
+    rounds * 2 * (TILE * TILE * TILE * crate::int8::GROUP) as u64
+}
 
 /// Multiply-accumulates a second of all threads of the current rayon pool together, with the int8 instructions of
-/// `isa`; `None` where it has none here, or none of its own (portable).
+/// `isa`; `None` where this processor lacks them, for plain Rust, and on WebAssembly.
 pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
     let burn: Burn = match isa {
         #[cfg(target_arch = "x86_64")]
-        Isa::Amx => crate::amx::burn,
+        Isa::Amx => amx,
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx512Vnni => crate::avx512_vnni::burn,
+        Isa::Avx512Vnni => avx512_vnni,
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => crate::avx2::int8_burn,
+        Isa::Avx2 => avx2_int8,
         #[cfg(target_arch = "aarch64")]
-        Isa::NeonDotprod => crate::neon_dotprod::burn,
+        Isa::NeonDotprod => neon_dotprod,
         #[cfg(target_arch = "aarch64")]
-        Isa::NeonI8mm => crate::neon_i8mm::burn,
-        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => crate::simd128::int8_burn,
+        Isa::NeonI8mm => neon_i8mm,
         _ => return None,
     };
     Isa::int8().contains(&isa).then(|| rate(burn, duration))
@@ -35,13 +106,11 @@ pub fn int8_peak(isa: Isa, duration: Duration) -> Option<f64> {
 pub fn f32_peak(isa: Isa, duration: Duration) -> Option<f64> {
     let burn: Burn = match isa {
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx512 => crate::avx512::burn,
+        Isa::Avx512 => avx512,
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => crate::avx2::f32_burn,
+        Isa::Avx2 => avx2_f32,
         #[cfg(target_arch = "aarch64")]
-        Isa::Neon => crate::neon::burn,
-        #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => crate::simd128::f32_burn,
+        Isa::Neon => neon,
         _ => return None,
     };
     Isa::f32().contains(&isa).then(|| rate(burn, duration))

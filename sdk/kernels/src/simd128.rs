@@ -9,7 +9,6 @@ use crate::f32;
 use crate::int8::{self, GROUP, Packed, SkipSum, Taps, quantise_row, rescale_row};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
 use std::arch::wasm32::*;
-use std::hint::black_box;
 
 pub(crate) const INT8: int8::Kernels = int8::Kernels {
     pack,
@@ -261,31 +260,4 @@ fn f32_sums<const O: usize>(
         }
     }
     sums
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn int8_burn(rounds: u64) -> u64 {
-    let x = black_box(i32x4_splat(0));
-    // Each hidden by itself, so that they are not found to be one.
-    let mut sums: [v128; 12] = std::array::from_fn(|_| black_box(x));
-    for _ in 0..rounds {
-        for sum in &mut sums {
-            *sum = i32x4_add(*sum, i32x4_dot_i16x8(*sum, x));
-        }
-    }
-    black_box(sums);
-    rounds * 12 * 8
-}
-
-/// Multiply-accumulates in registers, for the machine's peak.
-pub(crate) fn f32_burn(rounds: u64) -> u64 {
-    let x = black_box(f32x4_splat(0.0));
-    let mut sums: [v128; 12] = std::array::from_fn(|_| black_box(x));
-    for _ in 0..rounds {
-        for sum in &mut sums {
-            *sum = f32x4_add(*sum, f32x4_mul(*sum, x));
-        }
-    }
-    black_box(sums);
-    rounds * 12 * 4
 }

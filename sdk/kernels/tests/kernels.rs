@@ -612,6 +612,7 @@ fn instruction_sets_that_this_processor_lacks_are_noted() {
     }
 }
 
+#[cfg(feature = "peak")]
 #[test]
 fn every_instruction_set_but_the_portable_one_has_a_peak() {
     let duration = std::time::Duration::from_millis(1);
