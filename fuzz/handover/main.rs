@@ -3,20 +3,6 @@
 //! again.
 #![allow(dead_code)]
 
-#[path = "../../sdk/src/cancel.rs"]
-mod cancel;
-
-#[path = "../../sdk/src/caught.rs"]
-mod caught;
-
-mod error {
-    pub use phasefront::{Error, Result};
-}
-
-mod clock {
-    pub use std::time::Instant;
-}
-
 mod session;
 
 fn main() {

@@ -1,4 +1,4 @@
-//! The core's own files, with shuttle's threads and locks, and what is done with them.
+//! The session's own files, with shuttle's threads and locks, and what is done with them.
 
 mod sync {
     pub(super) use shuttle::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -17,17 +17,17 @@ mod event {
 }
 #[path = "../../sdk/src/session/computing.rs"]
 mod computing;
-#[path = "../../sdk/src/session/process_id.rs"]
-mod process_id;
 #[path = "../../sdk/src/session/live.rs"]
 mod live;
+#[path = "../../sdk/src/session/process_id.rs"]
+mod process_id;
 #[path = "../../sdk/src/session/queue.rs"]
 mod queue;
 #[path = "../../sdk/src/session/statistics.rs"]
 mod statistics;
 
-use crate::error::{Error, Result};
 use live::{Live, Report, Work};
+use phasefront::{Error, Result};
 use queue::Queue;
 use shuttle::rand::{Rng, thread_rng};
 use shuttle::sync::atomic::{AtomicU64, Ordering};

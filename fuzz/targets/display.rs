@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use phasefront::{Display, Method, ImageSession, SessionOptions, Sweep};
+use phasefront::{Display, ImageSession, Method, SessionOptions, Sweep};
 
 fuzz_target!(|text: &str| {
     match Display::from_toml(text) {

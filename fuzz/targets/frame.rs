@@ -7,9 +7,9 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, ConfidenceFormat, DepthFormat, DepthImage, Intrinsics,
     Orientation, Plane, Rotation, YuvEncoding, YuvMatrix,
 };
-use phasefront::unstable::depth::stream::{DepthOptions, DepthStream};
-use phasefront::unstable::frame::ColourPlan;
-use phasefront::{Display, EncoderOptions, Encoding, Method, Result, VideoSession, SessionOptions, Sweep};
+use phasefront_core::depth::stream::{DepthOptions, DepthStream};
+use phasefront_core::frame::ColourPlan;
+use phasefront::{Display, EncoderOptions, Encoding, Method, Result, SessionOptions, Sweep, VideoSession};
 use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 use std::time::Duration;
@@ -40,7 +40,11 @@ impl Numbers<'_> {
     /// Any float, often a usual one.
     fn float(&mut self) -> f64 {
         match self.byte() % 4 {
-            0 => f64::from_bits(std::array::from_fn::<u64, 8, _>(|_| self.byte() as u64).iter().fold(0, |a, b| a << 8 | b)),
+            0 => f64::from_bits(
+                std::array::from_fn::<u64, 8, _>(|_| self.byte() as u64)
+                    .iter()
+                    .fold(0, |a, b| a << 8 | b),
+            ),
             _ => self.byte() as f64 / 4.0,
         }
     }
@@ -81,7 +85,9 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         ColourFormat::Yuv420(yuv),
     ]);
     let (width, height) = (numbers.size(), numbers.size());
-    let strides: Vec<_> = (0..numbers.byte() % 4).map(|_| (numbers.size().wrapping_mul(4), numbers.size())).collect();
+    let strides: Vec<_> = (0..numbers.byte() % 4)
+        .map(|_| (numbers.size().wrapping_mul(4), numbers.size()))
+        .collect();
     let depth_format = numbers.of(&[
         DepthFormat::MetresF32,
         DepthFormat::MetresF16,
@@ -96,7 +102,12 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
     let depth_strides = (numbers.size().wrapping_mul(4), numbers.size());
     let confidence = numbers.byte();
     let orientation = Orientation {
-        rotation: numbers.of(&[Rotation::Upright, Rotation::Clockwise90, Rotation::Half, Rotation::Clockwise270]),
+        rotation: numbers.of(&[
+            Rotation::Upright,
+            Rotation::Clockwise90,
+            Rotation::Half,
+            Rotation::Clockwise270,
+        ]),
         mirrored: numbers.of(&[false, true]),
     };
     let cameras = (numbers.byte() % 3 == 0).then(|| {
@@ -111,7 +122,10 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
         cameras
     });
     let memory = numbers.0;
-    let planes: Vec<_> = strides.iter().map(|(row, pixel)| Plane::new(memory, *row, *pixel)).collect();
+    let planes: Vec<_> = strides
+        .iter()
+        .map(|(row, pixel)| Plane::new(memory, *row, *pixel))
+        .collect();
     let colour = ColourImage::new(format, width, height, &planes)?;
     let plane = Plane::new(memory, depth_strides.0, depth_strides.1);
     let mut depth = DepthImage::new(depth_format, depth_width, depth_height, plane)?;

@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use num_complex::Complex32;
 use phasefront::Network;
-use phasefront::unstable::network::Source;
+use phasefront_core::method::network::Source;
 
 /// Planes of one value.
 struct Flat;

@@ -26,7 +26,7 @@ from run import CACHE
 
 
 class Chain(nn.Module):
-    """The residual chain of the paper: see sdk/src/network/chain.rs."""
+    """The residual chain of the paper: see sdk/core/src/method/network/chain.rs."""
 
     def __init__(self, layers, filters=24, inputs=4):
         super().__init__()

@@ -71,50 +71,31 @@
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
-mod brightness;
-mod cancel;
-mod caught;
-mod clock;
-mod depth;
-pub mod device;
-mod display;
-mod encode;
-mod error;
-mod file;
-mod frame;
-#[cfg(feature = "gpu")]
-mod gpu;
-mod illumination;
-mod keys;
-mod method;
-mod modulator;
-mod network;
-pub mod output;
-mod panel;
-mod pipeline;
-mod preview;
-mod refocus;
-mod registration;
-mod seeded;
-pub mod session;
-mod slm;
-mod stage;
-mod sweep;
-pub mod target;
-mod wave;
-
+pub mod device {
+    //! Modulators that can be bought, as data.
+    pub use phasefront_core::output::modulator::*;
+}
 pub mod input;
+pub mod output {
+    //! Levels to the images that a modulator takes, and back.
+    pub use phasefront_core::output::{BitPlanes, Cells, Layout, Levels, Output, Placement, Split};
+}
+pub mod session;
+pub mod target {
+    //! What a hologram is made for: a display, its modulator's response, its lasers' light, its correction.
+    pub use phasefront_core::display::target::*;
+}
 #[cfg_attr(surface, doc(hidden))]
 pub mod unstable;
 
-pub use brightness::Brightness;
-pub use display::Display;
-pub use encode::{EncoderOptions, Encoding};
-pub use error::{Error, Result};
-pub use frame::RgbdFrame;
-pub use method::Method;
-pub use network::Network;
-pub use pipeline::{FrameReport, Pipeline, PipelineScratch, StageTimes};
+pub use phasefront_core::display::Display;
+pub use phasefront_core::display::target::Target;
+pub use phasefront_core::encode::brightness::Brightness;
+pub use phasefront_core::encode::{EncoderOptions, Encoding};
+pub use phasefront_core::frame::RgbdFrame;
+pub use phasefront_core::method::Method;
+pub use phasefront_core::method::network::Network;
+pub use phasefront_core::method::sweep::Sweep;
+pub use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch, StageTimes};
+pub use phasefront_core::runtime::error::{Error, Result};
 pub use session::{Hologram, ImageSession, LiveSession, SessionOptions, VideoSession};
-pub use sweep::Sweep;
-pub use target::Target;

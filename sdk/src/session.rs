@@ -6,7 +6,7 @@
 //!
 //! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
 //! happens to a frame; `engine` is where CPU and GPU meet; `quality` chooses the quality level. One frame by itself,
-//! without a camera's formats, is [`crate::Pipeline`]'s.
+//! without a camera's formats, is [`phasefront_core::pipeline::Pipeline`]'s.
 
 mod brightness;
 mod computing;
@@ -38,12 +38,12 @@ pub use options::{MOST_PIXELS, MOST_QUALITY_LEVELS, MOST_THREADS, SessionOptions
 pub use quality::{Backend, Quality, QualityChange, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
-use crate::depth::camera::CameraFrame;
-use crate::error::{Error, Result};
 use handle::{Frames, Shared};
 use live::{Live, guarded, lock};
 use live_work::{LiveWork, tell};
 use owned_frame::OwnedFrame;
+use phasefront_core::depth::camera::CameraFrame;
+use phasefront_core::runtime::error::{Error, Result};
 use queue::Gate;
 use stages::Stages;
 use std::fmt::{Debug, Formatter};

@@ -1,77 +1,24 @@
-//! The rooms of the core as they are inside, for the laboratory, the tests and the benchmarks. Nothing here is
-//! promised: it changes without notice, in any release.
-
-/// Depth: units, holes, alignment, temporal smoothing, refinement.
-pub mod depth {
-    pub use crate::depth::*;
-}
-/// From a complex field to phases.
-pub mod encode {
-    pub use crate::encode::*;
-}
-/// Messages on one line.
-pub mod error {
-    pub use crate::caught::caught;
-    pub use crate::error::Line;
-}
-/// Bounded reading of files.
-pub mod file {
-    pub use crate::file::*;
-}
-/// Camera images to amplitudes.
-pub mod frame {
-    pub use crate::frame::*;
-}
-/// The whole frame on the GPU.
+//! A shim that goes away.
+pub use phasefront_core::depth;
+pub use phasefront_core::display::illumination;
+pub use phasefront_core::display::panel;
+pub use phasefront_core::display::response as slm;
+pub use phasefront_core::encode;
+pub use phasefront_core::frame;
+pub use phasefront_core::method;
+pub use phasefront_core::method::network;
+pub use phasefront_core::method::seeded;
+pub use phasefront_core::method::sweep;
+pub use phasefront_core::optics as wave;
+pub use phasefront_core::pipeline::display_plan as modulator;
+pub use phasefront_core::runtime::file;
+pub use phasefront_core::runtime::keys;
+pub use phasefront_core::view::preview;
+pub use phasefront_core::view::refocus;
 #[cfg(feature = "gpu")]
-pub mod gpu {
-    pub use crate::gpu::*;
-}
-/// Keys of files, and messages about unknown ones.
-pub mod keys {
-    pub use crate::keys::*;
-}
-/// Plans of methods.
-pub mod method {
-    pub use crate::method::{MethodPlan, MethodScratch};
-}
-/// From a field to the modulator's levels.
-pub mod modulator {
-    pub use crate::modulator::*;
-}
-/// The lasers' light.
-pub mod illumination {
-    pub use crate::illumination::*;
-}
-/// The networks' chain, plans and oracle.
-pub mod network {
-    pub use crate::network::*;
-}
-/// What a panel adds to the response.
-pub mod panel {
-    pub use crate::panel::*;
-}
-/// Small views of holograms.
-pub mod preview {
-    pub use crate::preview::*;
-}
-/// Views of holograms, at full resolution.
-pub mod refocus {
-    pub use crate::refocus::*;
-}
-/// Networks that correct the sweep's field.
-pub mod seeded {
-    pub use crate::seeded::*;
-}
-/// Phases to levels.
-pub mod slm {
-    pub use crate::slm::*;
-}
-/// The plane sweep.
-pub mod sweep {
-    pub use crate::sweep::*;
-}
-/// Diffraction.
-pub mod wave {
-    pub use crate::wave::*;
+pub use phasefront_gpu as gpu;
+/// Messages.
+pub mod error {
+    pub use phasefront_core::runtime::caught::caught;
+    pub use phasefront_core::runtime::error::Line;
 }

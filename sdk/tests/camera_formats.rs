@@ -5,7 +5,7 @@ mod camera;
 
 use camera::{Noise, colour_formats};
 use phasefront::input::{Orientation, Rotation};
-use phasefront::unstable::frame::{ColourPlan, reference};
+use phasefront_core::frame::{ColourPlan, reference};
 use rand::{RngExt, SeedableRng};
 
 fn orientations() -> impl Iterator<Item = Orientation> {

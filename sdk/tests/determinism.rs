@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
+#[path = "../../tests/network_models.rs"]
 mod network_models;
 
 use camera::{Scene, frame};

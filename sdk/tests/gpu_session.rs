@@ -11,7 +11,7 @@ use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
 use phasefront::session::{Backend, DropReason, Event, Quality};
 use phasefront::target::Response;
-use phasefront::unstable::gpu::{ChainOptions, Float};
+use phasefront_gpu::{ChainOptions, Float};
 use phasefront::{
     Brightness, Display, Error, ImageSession, LiveSession, Method, Network, SessionOptions, Sweep, VideoSession,
 };
@@ -292,7 +292,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
     half.quality_levels[0].method = Method::Network(Arc::new(network));
     half.gpu.chain.float = Float::F16;
-    let device = phasefront::unstable::gpu::Device::open(&half.gpu.device).unwrap();
+    let device = phasefront_gpu::Device::open(&half.gpu.device).unwrap();
     if !device.has_half() {
         cases.push((half, "shader-f16"));
     }

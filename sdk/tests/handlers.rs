@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
+#[path = "../../tests/counting.rs"]
 mod counting;
 
 use camera::{Scene, frame, options};

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
+#[path = "../../tests/network_models.rs"]
 mod network_models;
 
 use camera::{Scene, frame};
@@ -12,14 +13,14 @@ use num_complex::Complex32;
 use phasefront::input::DepthFormat;
 use phasefront::output::{Layout, Levels, Output, Placement};
 use phasefront::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
-use phasefront::unstable::encode::Encoder;
-use phasefront::unstable::preview::Preview;
-use phasefront::unstable::refocus::{Refocus, phase_only_field};
-use phasefront::unstable::slm::per_pixel;
 use phasefront::{
     Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, SessionOptions, Sweep, Target,
     VideoSession,
 };
+use phasefront_core::display::response::per_pixel;
+use phasefront_core::encode::Encoder;
+use phasefront_core::view::preview::Preview;
+use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use std::sync::Arc;
 
 const W: usize = 75;

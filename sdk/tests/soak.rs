@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod camera;
+#[path = "../../tests/counting.rs"]
 mod counting;
 
 use camera::{Scene, depth, frame, options};

@@ -3,7 +3,7 @@
 //! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of
 //! noise would make the whole picture flicker.
 
-use crate::brightness::Past;
+use phasefront_core::encode::brightness::Past;
 use std::time::Duration;
 
 /// Time in which the scale goes 63 % of the way to where it should be.
@@ -32,8 +32,8 @@ impl BrightnessTracker {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brightness::{Brightness, LEAST, MOST, Percentile, STEP};
     use num_complex::Complex32;
+    use phasefront_core::encode::brightness::{Brightness, LEAST, MOST, Percentile, STEP};
 
     fn field(level: f32, spikes: usize) -> Vec<Complex32> {
         (0..34_000)

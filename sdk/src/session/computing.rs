@@ -2,7 +2,7 @@
 //! run on them. Such a handler may call any session, but a call that waited for one there might wait for ever.
 
 use super::sync::thread_local;
-use crate::error::{Error, Result};
+use phasefront_core::runtime::error::{Error, Result};
 use std::cell::Cell;
 
 thread_local! {

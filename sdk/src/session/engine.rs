@@ -8,10 +8,10 @@ use super::on_cpu::OnCpu;
 use super::on_gpu::{Failure, OnGpu};
 use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
-use crate::cancel::Cancel;
-use crate::depth::camera::CameraFrame;
-use crate::error::Result;
-use crate::frame::RgbdFrame;
+use phasefront_core::depth::camera::CameraFrame;
+use phasefront_core::frame::RgbdFrame;
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::error::Result;
 use std::time::Duration;
 
 /// A frame that is ready to become a hologram.
@@ -46,7 +46,7 @@ pub(super) struct Encoded {
 #[derive(Default)]
 pub(super) struct GpuState {
     #[cfg(feature = "gpu")]
-    device: Option<std::sync::Arc<crate::gpu::Device>>,
+    device: Option<std::sync::Arc<phasefront_gpu::Device>>,
     #[cfg(feature = "gpu")]
     refusal: Option<String>,
 }
@@ -117,7 +117,7 @@ impl Engine {
                 gpu.device = on_gpu.device().cloned();
                 Ok(Ok(Processor::Gpu(Box::new(on_gpu))))
             }
-            Err(crate::gpu::GpuError::Core(why)) => Err(why),
+            Err(phasefront_gpu::GpuError::Core(why)) => Err(why),
             Err(why) => Ok(Err(gpu.refuse(&why))),
         }
     }
@@ -196,8 +196,8 @@ impl Engine {
 #[cfg(feature = "gpu")]
 impl GpuState {
     /// The reason in words; one that holds for all quality levels is kept.
-    fn refuse(&mut self, why: &crate::gpu::GpuError) -> String {
-        use crate::gpu::GpuError;
+    fn refuse(&mut self, why: &phasefront_gpu::GpuError) -> String {
+        use phasefront_gpu::GpuError;
         let reason = why.to_string();
         if let GpuError::None(_) | GpuError::Wrong(_) | GpuError::Lost(_) = why {
             self.refusal = Some(reason.clone());
@@ -206,7 +206,7 @@ impl GpuState {
     }
 
     /// The device that quality levels share.
-    pub(super) fn device(&self) -> Option<std::sync::Arc<crate::gpu::Device>> {
+    pub(super) fn device(&self) -> Option<std::sync::Arc<phasefront_gpu::Device>> {
         self.device.clone()
     }
 }

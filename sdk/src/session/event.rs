@@ -2,7 +2,7 @@
 
 use super::hologram::Hologram;
 use super::quality::QualityChange;
-use crate::error::Error;
+use phasefront_core::runtime::error::Error;
 
 /// Why a frame was not made into a hologram, without fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

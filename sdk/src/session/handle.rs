@@ -11,10 +11,10 @@ use super::quality::{Quality, Thermal};
 use super::queue::{self, Gate, Queue};
 use super::stages::{FrameResult, Stages};
 use super::statistics::{Recent, Statistics};
-use crate::cancel::Cancel;
-use crate::clock::Instant;
-use crate::depth::camera::CameraFrame;
-use crate::error::Result;
+use phasefront_core::depth::camera::CameraFrame;
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::clock::Instant;
+use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
@@ -209,10 +209,10 @@ impl SessionHandle {
     }
 
     /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to
-    /// a handler of logs while a session computes. Its [`crate::gpu::Device::programs`], kept for [`GpuOptions`] of the
+    /// a handler of logs while a session computes. Its [`phasefront_gpu::Device::programs`], kept for [`GpuOptions`] of the
     /// next start, save compiling.
     #[cfg(feature = "gpu")]
-    pub fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
+    pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
         let gpu = self.with_stages(|stages| Ok(stages.as_ref().and_then(Stages::gpu)));
         gpu.ok().flatten()
     }

@@ -5,13 +5,13 @@ use super::live::lock;
 use super::process_id::ProcessId;
 use super::statistics::FrameTimes;
 use super::threads::Threads;
-use crate::error::{Error, Result};
-use crate::output::Levels;
-use crate::preview::{Preview, PreviewScratch, check_screen};
-use crate::refocus::seen_field;
-use crate::stage::stage;
-use crate::target::Target;
 use num_complex::Complex32;
+use phasefront_core::display::target::Target;
+use phasefront_core::output::Levels;
+use phasefront_core::runtime::error::{Error, Result};
+use phasefront_core::runtime::stage::stage;
+use phasefront_core::view::preview::{Preview, PreviewScratch, check_screen};
+use phasefront_core::view::refocus::seen_field;
 use std::sync::{Arc, Mutex, Weak};
 
 /// Buffers that a session keeps for the results to come; what is over goes back to the system.
@@ -142,7 +142,7 @@ impl Hologram {
         self.words.as_ref().map(|words| &words.values[..])
     }
 
-    /// The levels as [`crate::output::Output`] takes them.
+    /// The levels as [`phasefront_core::output::Output`] takes them.
     pub fn output_levels(&self) -> Levels<'_> {
         match self.words() {
             Some(words) => Levels::Words(words),

@@ -6,9 +6,9 @@ use super::event::DropReason;
 use super::process_id::ProcessId;
 use super::queue::{Queue, Ticket};
 use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};
-use crate::cancel::Cancel;
-use crate::caught::caught;
-use crate::error::{Error, Result};
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::caught::caught;
+use phasefront_core::runtime::error::{Error, Result};
 use std::cell::Cell;
 use std::sync::PoisonError;
 

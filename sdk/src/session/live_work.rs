@@ -7,8 +7,8 @@ use super::live::{Report, Work, lock};
 use super::owned_frame::OwnedFrame;
 use super::queue;
 use super::stages::FrameResult;
-use crate::cancel::Cancel;
-use crate::error::Result;
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::error::Result;
 use std::sync::Arc;
 
 /// The work of a live session's thread.

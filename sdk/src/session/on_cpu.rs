@@ -4,12 +4,12 @@ use super::SessionOptions;
 use super::engine::{Encoded, LevelsOut};
 use super::quality::QualityLevel;
 use super::statistics::BackendReport;
-use crate::brightness::Past;
-use crate::cancel::Cancel;
-use crate::error::Result;
-use crate::frame::RgbdFrame;
-use crate::pipeline::{Pipeline, PipelineScratch};
 use num_complex::Complex32;
+use phasefront_core::encode::brightness::Past;
+use phasefront_core::frame::RgbdFrame;
+use phasefront_core::pipeline::{Pipeline, PipelineScratch};
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::error::Result;
 
 /// Plan and memory.
 pub(super) struct OnCpu {

@@ -5,11 +5,11 @@ use super::brightness::BrightnessTracker;
 use super::engine::{Encoded, FrameInput};
 use super::quality::QualityLevel;
 use super::statistics::BackendReport;
-use crate::error::Error;
-use crate::gpu::{
-    self, ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError, InFlight, Job, Renderer,
+use phasefront_core::runtime::error::Error;
+use phasefront_core::runtime::stage::{Stage, stage};
+use phasefront_gpu::{
+    ChainOptions, Colour, ColourData, Depth, Device, DeviceOptions, Frame, GpuError, InFlight, Job, Renderer,
 };
-use crate::stage::{Stage, stage};
 use std::sync::Arc;
 
 /// Which GPU a session computes on, and how.
@@ -48,7 +48,7 @@ impl OnGpu {
         options: &SessionOptions,
         quality_level: &QualityLevel,
         device: Option<Arc<Device>>,
-    ) -> gpu::Result<Self> {
+    ) -> Result<Self, GpuError> {
         if options.target.display.bits() > 8 {
             return Err(GpuError::Refused(format!(
                 "it writes levels of up to 8 bits, the display has {}",
@@ -155,12 +155,19 @@ impl OnGpu {
 }
 
 #[cfg(test)]
+#[path = "../../../tests/driver.rs"]
+mod driver;
+
+#[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
+    use super::driver::opened;
     use super::*;
-    use crate::gpu::opened;
-    use crate::{Display, Method, Network, RgbdFrame};
     use ndarray::{Array2, Array3};
+    use phasefront_core::display::Display;
+    use phasefront_core::frame::RgbdFrame;
+    use phasefront_core::method::Method;
+    use phasefront_core::method::network::Network;
     use std::time::Duration;
 
     /// A device that goes while a frame is on it takes this frame along and no other.

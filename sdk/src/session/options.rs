@@ -3,11 +3,11 @@
 #[cfg(feature = "gpu")]
 use super::on_gpu::GpuOptions;
 use super::quality::{self, Backend, Quality, QualityLevel};
-use crate::depth::stream::DepthOptions;
-use crate::encode::EncoderOptions;
-use crate::error::{Error, Result};
-use crate::method::Method;
-use crate::target::Target;
+use phasefront_core::depth::stream::DepthOptions;
+use phasefront_core::display::target::Target;
+use phasefront_core::encode::EncoderOptions;
+use phasefront_core::method::Method;
+use phasefront_core::runtime::error::{Error, Result};
 use std::num::NonZeroUsize;
 
 /// What a session makes, and how. [`SessionOptions::new`] gives the defaults; change what differs.

@@ -1,10 +1,10 @@
 //! A camera frame copied into the session's own memory: what a live session keeps when the camera takes its buffer
 //! back.
 
-use crate::depth::camera::{Alignment, CameraFrame};
-use crate::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
-use crate::error::Result;
-use crate::frame::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront_core::depth::camera::{Alignment, CameraFrame};
+use phasefront_core::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
+use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront_core::runtime::error::Result;
 
 /// Memory of one plane, with its strides.
 #[derive(Debug, Default)]

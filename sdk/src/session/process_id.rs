@@ -1,7 +1,7 @@
 //! The process that a session was made in. A fork copies a session but not its threads, so that its copy would wait for
 //! them for ever.
 
-use crate::error::{Error, Result};
+use phasefront_core::runtime::error::{Error, Result};
 
 /// A process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

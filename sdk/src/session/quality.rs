@@ -1,9 +1,9 @@
 //! Quality levels, and when a session changes between them.
 
 use super::{MOST_QUALITY_LEVELS, SessionOptions};
-use crate::encode::EncoderOptions;
-use crate::error::{Error, Result};
-use crate::method::Method;
+use phasefront_core::encode::EncoderOptions;
+use phasefront_core::method::Method;
+use phasefront_core::runtime::error::{Error, Result};
 use std::time::Duration;
 
 /// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its

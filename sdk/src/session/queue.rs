@@ -3,8 +3,8 @@
 
 use super::event::DropReason;
 use super::statistics::Counts;
-use crate::cancel::Cancel;
-use crate::error::{Error, Result};
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::error::{Error, Result};
 use std::collections::VecDeque;
 
 /// What each call must pass first: open, and later than the last frame.

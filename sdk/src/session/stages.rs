@@ -9,13 +9,13 @@ use super::on_cpu::OnCpu;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use super::threads::Threads;
-use crate::cancel::Cancel;
-use crate::clock::Instant;
-use crate::depth::camera::CameraFrame;
-use crate::depth::stream::{DepthReport, DepthStream};
-use crate::error::{Error, Result};
-use crate::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
-use crate::stage::stage;
+use phasefront_core::depth::camera::CameraFrame;
+use phasefront_core::depth::stream::{DepthReport, DepthStream};
+use phasefront_core::frame::{ColourPlan, ColourScratch, RgbdFrame, luminance};
+use phasefront_core::runtime::cancel::Cancel;
+use phasefront_core::runtime::clock::Instant;
+use phasefront_core::runtime::error::{Error, Result};
+use phasefront_core::runtime::stage::stage;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -180,7 +180,7 @@ impl Stages {
     }
 
     #[cfg(feature = "gpu")]
-    pub(super) fn gpu(&self) -> Option<Arc<crate::gpu::Device>> {
+    pub(super) fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
         self.gpu.device()
     }
 
@@ -376,12 +376,12 @@ fn given_up(cancel: &Cancel) -> Result<()> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::depth::image::{DepthFormat, DepthImage};
-    use crate::display::Display;
-    use crate::frame::{ColourFormat, ColourImage, Plane};
-    use crate::method::Method;
     use crate::session::quality::{QualityLevel, QualityReason};
-    use crate::sweep::Sweep;
+    use phasefront_core::depth::image::{DepthFormat, DepthImage};
+    use phasefront_core::display::Display;
+    use phasefront_core::frame::{ColourFormat, ColourImage, Plane};
+    use phasefront_core::method::Method;
+    use phasefront_core::method::sweep::Sweep;
 
     #[test]
     fn a_step_that_fails_loses_no_frame_and_is_told() {

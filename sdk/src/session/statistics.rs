@@ -1,7 +1,7 @@
 //! What a session has done so far, and how fast.
 
 use super::event::DropReason;
-use crate::clock::Instant;
+use phasefront_core::runtime::clock::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 

@@ -2,7 +2,7 @@
 
 use super::computing::Computing;
 use super::options::MOST_THREADS;
-use crate::error::{Error, Result};
+use phasefront_core::runtime::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
 

@@ -5,7 +5,7 @@ mod driver;
 
 use phasefront::SessionOptions;
 use phasefront::session::Backend;
-use phasefront::unstable::gpu::{Device, DeviceOptions};
+use phasefront_gpu::{Device, DeviceOptions};
 
 /// The options of the tests on the GPU.
 pub(crate) fn on_gpu(options: SessionOptions) -> SessionOptions {

@@ -1,0 +1,288 @@
+//! Depth as sensors and files give it, to normalized depth: units, range, holes; and the depth images of phones,
+//! aligned with colour, smoothed over time, and refined to the display's resolution.
+//!
+//! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
+
+pub mod align;
+pub mod camera;
+pub mod image;
+pub mod range;
+pub mod refine;
+pub mod refine_reference;
+pub mod sharpness;
+pub mod smoothing;
+pub mod stream;
+
+use crate::runtime::error::{Error, Result};
+use ndarray::{Array2, ArrayView2};
+
+/// What the numbers of a depth image mean. But for [`DepthUnit::Normalized`], 0, negative numbers and
+/// what is not finite mean no reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DepthUnit {
+    /// Already 0 nearest to 1 farthest; only NaN means no reading.
+    Normalized,
+    /// Metres from the camera.
+    Metres,
+    /// Millimetres from the camera.
+    Millimetres,
+    /// Inverse metres.
+    Disparity,
+    /// A sensor's own units, so many a metre.
+    Raw {
+        /// Units in a metre; 5000 in the TUM RGB-D benchmark.
+        units_per_m: f64,
+    },
+}
+
+impl DepthUnit {
+    /// The distance of a reading in metres, or `None` where it is no reading.
+    pub fn metres(self, value: f32) -> Option<f32> {
+        let valid = value.is_finite() && value > 0.0;
+        valid.then(|| match self {
+            DepthUnit::Normalized | DepthUnit::Metres => value,
+            DepthUnit::Millimetres => value / 1000.0,
+            DepthUnit::Disparity => 1.0 / value,
+            DepthUnit::Raw { units_per_m } => (f64::from(value) / units_per_m) as f32,
+        })
+    }
+}
+
+/// Normalized depth and how it was made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NormalizedDepth {
+    /// (H, W), 0 nearest, 1 farthest, no holes.
+    pub depth: Array2<f32>,
+    /// Metres at d = 0 and at d = 1; `None` where the input was normalized already.
+    pub range_m: Option<(f32, f32)>,
+    /// Pixels that had no reading.
+    pub filled: usize,
+    /// Pixels that lie before near or beyond far, and became 0 or 1.
+    pub clipped: usize,
+}
+
+/// Share of the pixels that near and far may clip; beyond it nothing is left of the depth.
+const MOST_CLIPPED: f64 = 0.99;
+
+/// Normalizes `depth`, (H, W), of `unit`: pixels with no reading take the nearest reading's, and
+/// `near_m` and `far_m` (metres) become 0 and 1, by default the 1st and 99th percentile of the readings;
+/// what lies beyond them is clamped.
+///
+/// # Errors
+/// An empty image, no reading at all, a normalized value outside \[0, 1], near or far for normalized depth, a range
+/// that is no range, or one that hardly any reading lies in.
+pub fn normalize(
+    depth: ArrayView2<'_, f32>,
+    unit: DepthUnit,
+    near_m: Option<f32>,
+    far_m: Option<f32>,
+) -> Result<NormalizedDepth> {
+    if depth.is_empty() {
+        return Err(Error::Frame("the depth image is empty".into()));
+    }
+    if let DepthUnit::Raw { units_per_m } = unit
+        && !(units_per_m.is_finite() && units_per_m > 0.0)
+    {
+        return Err(Error::Frame(format!(
+            "a depth scale of {units_per_m} units a metre means nothing; it must be above 0"
+        )));
+    }
+    let normalized = unit == DepthUnit::Normalized;
+    let given = near_m.is_some() || far_m.is_some();
+    if normalized && given {
+        return Err(Error::Frame(
+            "near and far are metres and normalized depth has no unit; leave them out, or name the unit of the depth's numbers".into(),
+        ));
+    }
+    let mut metres = depth.mapv(|v| match normalized {
+        true => v,
+        false => unit.metres(v).unwrap_or(f32::NAN),
+    });
+    if normalized && let Some(bad) = metres.iter().find(|v| !v.is_nan() && !(0.0..=1.0).contains(*v)) {
+        return Err(Error::Frame(format!(
+            "normalized depth holds {bad}; it must lie in 0..=1, or another depth unit be named"
+        )));
+    }
+    let filled = fill_nearest(&mut metres)?;
+    if normalized {
+        return Ok(NormalizedDepth {
+            depth: metres,
+            range_m: None,
+            filled,
+            clipped: 0,
+        });
+    }
+    let (near, far) = match (near_m, far_m) {
+        (Some(near), Some(far)) => (near, far),
+        _ => {
+            let (low, high) = percentiles(depth.iter().filter_map(|&v| unit.metres(v)).collect());
+            (near_m.unwrap_or(low), far_m.unwrap_or(high))
+        }
+    };
+    let least = metres.iter().copied().fold(f32::INFINITY, f32::min);
+    let most = metres.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    if !(near.is_finite() && far.is_finite() && near >= 0.0 && (near < far || !given && near == far)) {
+        return Err(Error::Frame(format!(
+            "near {near} m and far {far} m are no range; near must lie before far, both in metres; the depth lies from {least} m to {most} m"
+        )));
+    }
+    let clipped = metres.iter().filter(|m| !(near..=far).contains(*m)).count();
+    if given && clipped as f64 > MOST_CLIPPED * metres.len() as f64 {
+        return Err(Error::Frame(format!(
+            "near {near} m and far {far} m leave nothing of the depth, which lies from {least} m to {most} m; both are metres"
+        )));
+    }
+    // One distance everywhere has no extent: it lies in the middle of the volume.
+    let depth = match near < far {
+        true => metres.mapv(|m| ((m - near) / (far - near)).clamp(0.0, 1.0)),
+        false => metres.mapv(|_| 0.5),
+    };
+    Ok(NormalizedDepth {
+        depth,
+        range_m: Some((near, far)),
+        filled,
+        clipped,
+    })
+}
+
+/// The 1st and 99th percentile of `readings`, which are not empty and hold no NaN.
+fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
+    let last = readings.len() - 1;
+    let mut at = |q: f64| {
+        let i = (q * last as f64).round() as usize;
+        *readings.select_nth_unstable_by(i, f32::total_cmp).1
+    };
+    (at(0.01), at(0.99))
+}
+
+/// Gives each NaN of `depth` the value of a nearest reading (in steps along rows and columns), in
+/// O(H·W); gives how many there were.
+///
+/// # Errors
+/// If nothing but NaN is there.
+pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
+    let holes = depth.iter().filter(|v| v.is_nan()).count();
+    if holes == depth.len() {
+        return Err(Error::Frame(
+            "depth has no reading at all; at least one pixel must be valid".into(),
+        ));
+    }
+    if holes > 0 {
+        let width = depth.dim().1;
+        let mut filled: Vec<f32> = depth.iter().copied().collect();
+        fill_from_nearest(&mut filled, width, &mut Vec::new(), &mut Vec::new());
+        depth.iter_mut().zip(filled).for_each(|(to, v)| *to = v);
+    }
+    Ok(holes)
+}
+
+/// Gives each NaN of `depth`, rows of `width`, the value of a nearest reading in steps along rows and columns.
+/// `front` and `next` are working memory. There must be a reading.
+fn fill_from_nearest(depth: &mut [f32], width: usize, front: &mut Vec<u32>, next: &mut Vec<u32>) {
+    // A wave that starts at all readings at once reaches every hole from a nearest one.
+    front.clear();
+    front.extend((0..depth.len() as u32).filter(|i| !depth[*i as usize].is_nan()));
+    while !front.is_empty() {
+        next.clear();
+        for &i in front.iter() {
+            let i = i as usize;
+            let x = i % width;
+            let neighbours = [
+                (i >= width).then(|| i - width),
+                (i + width < depth.len()).then(|| i + width),
+                (x > 0).then(|| i - 1),
+                (x + 1 < width).then(|| i + 1),
+            ];
+            for n in neighbours.into_iter().flatten() {
+                if depth[n].is_nan() {
+                    depth[n] = depth[i];
+                    next.push(n as u32);
+                }
+            }
+        }
+        std::mem::swap(front, next);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use ndarray::array;
+
+    #[test]
+    fn each_unit_gives_metres_or_no_reading() {
+        let raw = DepthUnit::Raw { units_per_m: 5000.0 };
+        assert_eq!(DepthUnit::Metres.metres(2.5), Some(2.5));
+        assert_eq!(DepthUnit::Millimetres.metres(2500.0), Some(2.5));
+        assert_eq!(DepthUnit::Disparity.metres(0.4), Some(2.5));
+        assert_eq!(raw.metres(12500.0), Some(2.5));
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert_eq!(DepthUnit::Metres.metres(bad), None);
+        }
+    }
+
+    #[test]
+    fn range_defaults_to_percentiles_of_what_is_valid() {
+        let mut depth = Array2::from_shape_fn((10, 101), |(_, x)| 1.0 + x as f32 / 100.0);
+        depth[(0, 0)] = 0.0;
+        depth[(9, 9)] = f32::NAN;
+        depth[(5, 5)] = 1000.0;
+        let n = normalize(depth.view(), DepthUnit::Metres, None, None).unwrap();
+        assert_eq!(n.filled, 2);
+        let (near, far) = n.range_m.unwrap();
+        assert!((near - 1.01).abs() < 0.011 && (far - 1.99).abs() < 0.011);
+        assert_eq!(n.depth[(5, 5)], 1.0);
+        assert!((n.depth[(3, 50)] - 0.5).abs() < 0.01);
+    }
+
+    #[test]
+    fn holes_take_the_nearest_reading() {
+        let nan = f32::NAN;
+        let mut depth = array![[nan, nan, nan, 0.7], [0.2, nan, nan, nan], [nan, nan, nan, nan]];
+        assert_eq!(fill_nearest(&mut depth).unwrap(), 10);
+        assert_eq!(depth[(2, 0)], 0.2);
+        assert_eq!(depth[(1, 3)], 0.7);
+        assert!(depth.iter().all(|v| *v == 0.2 || *v == 0.7));
+        assert!(fill_nearest(&mut Array2::from_elem((2, 2), nan)).is_err());
+    }
+
+    #[test]
+    fn what_cannot_be_meant_is_refused() {
+        let d = array![[0.5, 2.0]];
+        for (unit, near, far, word) in [
+            (DepthUnit::Normalized, None, None, "normalized"),
+            (DepthUnit::Metres, Some(2.0), Some(1.0), "no range"),
+            (DepthUnit::Metres, Some(1.0), Some(1.0), "no range"),
+            (DepthUnit::Metres, Some(f32::NAN), None, "no range"),
+            (DepthUnit::Raw { units_per_m: 0.0 }, None, None, "scale"),
+            (DepthUnit::Normalized, Some(0.5), None, "near and far are metres"),
+            (DepthUnit::Metres, Some(500.0), None, "from 0.5 m to 2 m"),
+            (
+                DepthUnit::Metres,
+                Some(500.0),
+                Some(4000.0),
+                "leave nothing of the depth, which lies from 0.5 m to 2 m; both are metres",
+            ),
+            (DepthUnit::Metres, Some(0.1), Some(0.2), "leave nothing"),
+        ] {
+            let e = normalize(d.view(), unit, near, far).unwrap_err();
+            assert!(e.to_string().contains(word), "{e}");
+        }
+        let none = normalize(array![[0.0, 0.0]].view(), DepthUnit::Metres, None, None);
+        assert!(none.unwrap_err().to_string().contains("no reading"));
+    }
+
+    #[test]
+    fn what_lies_beyond_near_and_far_is_counted() {
+        let d = array![[0.5, 1.0, 2.0, 4.0]];
+        let n = normalize(d.view(), DepthUnit::Metres, Some(1.0), Some(2.0)).unwrap();
+        assert_eq!((n.depth, n.clipped), (array![[0.0, 0.0, 1.0, 1.0]], 2));
+    }
+
+    #[test]
+    fn one_distance_everywhere_is_the_middle_of_the_volume() {
+        let n = normalize(array![[2.0, 0.0]].view(), DepthUnit::Metres, None, None).unwrap();
+        assert_eq!(n.depth, array![[0.5, 0.5]]);
+    }
+}

@@ -1,0 +1,321 @@
+//! Depth images and confidence maps as phones give them, to metres and confidences in 0..=1.
+
+use crate::frame::{Plane, check_size};
+use crate::runtime::error::{Error, Result};
+use half::f16;
+
+/// How a depth image lies in memory: one plane, numbers in little-endian byte order. But for the normalized ones, 0,
+/// negative numbers and what is not finite mean no reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum DepthFormat {
+    /// Metres, 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
+    MetresF32,
+    /// Metres, 16-bit floats: AVFoundation's DepthFloat16.
+    MetresF16,
+    /// Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
+    DisparityF32,
+    /// Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
+    DisparityF16,
+    /// Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
+    MillimetresU16,
+    /// Android's DEPTH16: millimetres in the lower 13 bits; in the upper 3 a confidence, 0 for 100 %, 1 for none, n
+    /// for (n − 1)/7. Not the same as [`Self::MillimetresU16`]: taken for it, all but the surest readings are off by
+    /// 8 metres and more, without a sign of it.
+    AndroidDepth16,
+    /// 0 nearest to 255 farthest; every pixel is a reading.
+    NormalizedU8,
+    /// 0 nearest to 65535 farthest; every pixel is a reading.
+    NormalizedU16,
+}
+
+impl DepthFormat {
+    /// Bytes of a pixel.
+    pub fn pixel_bytes(self) -> usize {
+        match self {
+            DepthFormat::NormalizedU8 => 1,
+            DepthFormat::MetresF32 | DepthFormat::DisparityF32 => 4,
+            _ => 2,
+        }
+    }
+
+    /// Whether readings are distances; if not, they are normalized depth.
+    pub fn is_metric(self) -> bool {
+        !matches!(self, DepthFormat::NormalizedU8 | DepthFormat::NormalizedU16)
+    }
+
+    /// The reading in `pixel`, [`Self::pixel_bytes`] of them, and its confidence: metres, or normalized depth where
+    /// the format is; NaN where there is none.
+    pub fn reading(self, pixel: &[u8]) -> (f32, f32) {
+        let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
+        let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
+        let f32_at = || f32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+        let metres = |m: f32| {
+            if m.is_finite() && m > 0.0 { m } else { f32::NAN }
+        };
+        match self {
+            DepthFormat::MetresF32 => (metres(f32_at()), 1.0),
+            DepthFormat::MetresF16 => (metres(f16_at()), 1.0),
+            DepthFormat::DisparityF32 => (metres(1.0 / f32_at()), 1.0),
+            DepthFormat::DisparityF16 => (metres(1.0 / f16_at()), 1.0),
+            DepthFormat::MillimetresU16 => (metres(f32::from(u16_at()) / 1000.0), 1.0),
+            DepthFormat::AndroidDepth16 => {
+                let (millimetres, code) = (u16_at() & 0x1fff, u16_at() >> 13);
+                let confidence = match code {
+                    0 => 1.0,
+                    code => f32::from(code - 1) / 7.0,
+                };
+                (metres(f32::from(millimetres) / 1000.0), confidence)
+            }
+            DepthFormat::NormalizedU8 => (f32::from(pixel[0]) / 255.0, 1.0),
+            DepthFormat::NormalizedU16 => (f32::from(u16_at()) / 65535.0, 1.0),
+        }
+    }
+}
+
+/// How a confidence map lies in memory: one plane of bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ConfidenceFormat {
+    /// 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+    LowMediumHigh,
+    /// 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+    U8,
+}
+
+impl ConfidenceFormat {
+    /// The confidence that `byte` stands for, in 0..=1.
+    pub fn confidence(self, byte: u8) -> f32 {
+        match self {
+            ConfidenceFormat::LowMediumHigh => f32::from(byte.min(2)) / 2.0,
+            ConfidenceFormat::U8 => f32::from(byte) / 255.0,
+        }
+    }
+}
+
+/// A depth image with its confidence map, borrowed.
+#[derive(Debug, Clone, Copy)]
+pub struct DepthImage<'a> {
+    format: DepthFormat,
+    width: usize,
+    height: usize,
+    plane: Plane<'a>,
+    confidence: Option<(ConfidenceFormat, Plane<'a>)>,
+}
+
+impl<'a> DepthImage<'a> {
+    /// A depth image of `width` × `height` pixels in `plane`.
+    ///
+    /// # Errors
+    /// [`Error::Frame`] that names an empty or too large image, a stride that is too small, or too few bytes.
+    pub fn new(format: DepthFormat, width: usize, height: usize, plane: Plane<'a>) -> Result<Self> {
+        check_size("depth", width, height)?;
+        plane.check("depth", width, height, format.pixel_bytes())?;
+        Ok(DepthImage {
+            format,
+            width,
+            height,
+            plane,
+            confidence: None,
+        })
+    }
+
+    /// The same with a confidence map of `width` × `height` pixels. A reading is as sure as the less sure of the map
+    /// and what the depth's own format says.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and a map of another size than the depth's.
+    pub fn with_confidence(
+        mut self,
+        format: ConfidenceFormat,
+        width: usize,
+        height: usize,
+        plane: Plane<'a>,
+    ) -> Result<Self> {
+        if (width, height) != (self.width, self.height) {
+            return Err(Error::Frame(format!(
+                "confidence is {width}×{height} and depth {}×{}; they must be alike",
+                self.width, self.height
+            )));
+        }
+        plane.check("confidence", width, height, 1)?;
+        self.confidence = Some((format, plane));
+        Ok(self)
+    }
+
+    /// How it lies in memory.
+    pub fn format(&self) -> DepthFormat {
+        self.format
+    }
+
+    /// (H, W) as the sensor gives it.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// The plane of readings.
+    pub fn plane(&self) -> Plane<'a> {
+        self.plane
+    }
+
+    /// The confidence map.
+    pub fn confidence(&self) -> Option<(ConfidenceFormat, Plane<'a>)> {
+        self.confidence
+    }
+
+    /// The readings, as the sensor's picture lies, into `values`, (H, W): metres or normalized depth, NaN where there
+    /// is none or its confidence is under `least`; and the confidences in 0..=1 into `confidence`, (H, W), 0 where
+    /// there is no reading. Gives how many readings there are. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `values` or `confidence` has not H·W values.
+    pub fn readings(&self, least: f32, values: &mut [f32], confidence: &mut [f32]) -> usize {
+        assert_eq!(values.len(), self.width * self.height);
+        assert_eq!(confidence.len(), self.width * self.height);
+        let rows = values
+            .chunks_exact_mut(self.width)
+            .zip(confidence.chunks_exact_mut(self.width));
+        let mut valid = 0;
+        for (y, (values, confidences)) in rows.enumerate() {
+            for (x, (value, confidence)) in values.iter_mut().zip(confidences).enumerate() {
+                let at = y * self.plane.row_stride + x * self.plane.pixel_stride;
+                let pixel = &self.plane.bytes[at..at + self.format.pixel_bytes()];
+                let (reading, mut sure) = self.format.reading(pixel);
+                if let Some((format, plane)) = self.confidence {
+                    let byte = plane.bytes[y * plane.row_stride + x * plane.pixel_stride];
+                    sure = sure.min(format.confidence(byte));
+                }
+                let is_reading = !reading.is_nan() && sure >= least;
+                (*value, *confidence) = match is_reading {
+                    true => (reading, sure),
+                    false => (f32::NAN, 0.0),
+                };
+                valid += usize::from(is_reading);
+            }
+        }
+        valid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn each_format_reads_as_its_platform_says() {
+        let f16_bytes = |v: f32| f16::from_f32(v).to_le_bytes().to_vec();
+        let cases = [
+            (DepthFormat::MetresF32, 2.5f32.to_le_bytes().to_vec(), 2.5, 1.0),
+            (DepthFormat::MetresF16, f16_bytes(2.5), 2.5, 1.0),
+            (DepthFormat::DisparityF32, 0.4f32.to_le_bytes().to_vec(), 2.5, 1.0),
+            (DepthFormat::DisparityF16, f16_bytes(0.5), 2.0, 1.0),
+            (DepthFormat::MillimetresU16, 9000u16.to_le_bytes().to_vec(), 9.0, 1.0),
+            (DepthFormat::AndroidDepth16, 2500u16.to_le_bytes().to_vec(), 2.5, 1.0),
+            (
+                DepthFormat::AndroidDepth16,
+                (1 << 13 | 2500u16).to_le_bytes().to_vec(),
+                2.5,
+                0.0,
+            ),
+            (
+                DepthFormat::AndroidDepth16,
+                (7 << 13 | 8191u16).to_le_bytes().to_vec(),
+                8.191,
+                6.0 / 7.0,
+            ),
+            (DepthFormat::NormalizedU8, vec![0], 0.0, 1.0),
+            (DepthFormat::NormalizedU8, vec![255], 1.0, 1.0),
+            (DepthFormat::NormalizedU16, vec![0xff, 0xff], 1.0, 1.0),
+        ];
+        for (format, bytes, metres, confidence) in cases {
+            assert_eq!(bytes.len(), format.pixel_bytes());
+            let (value, sure) = format.reading(&bytes);
+            assert!(
+                (value - metres).abs() < 1e-6 && sure == confidence,
+                "{format:?} {value}"
+            );
+        }
+        for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+            assert!(DepthFormat::MetresF32.reading(&bad.to_le_bytes()).0.is_nan());
+            assert!(DepthFormat::MetresF16.reading(&f16_bytes(bad)).0.is_nan());
+            assert!(DepthFormat::DisparityF16.reading(&f16_bytes(bad)).0.is_nan() || bad.is_infinite());
+        }
+        assert!(DepthFormat::MillimetresU16.reading(&[0, 0]).0.is_nan());
+        assert!(DepthFormat::AndroidDepth16.reading(&[0, 0x20]).0.is_nan());
+    }
+
+    /// Strides at random against each pixel by itself.
+    #[test]
+    fn any_strides_read_alike() {
+        use rand::{RngExt, SeedableRng};
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        for format in [
+            DepthFormat::MetresF32,
+            DepthFormat::MetresF16,
+            DepthFormat::DisparityF32,
+            DepthFormat::DisparityF16,
+            DepthFormat::MillimetresU16,
+            DepthFormat::AndroidDepth16,
+            DepthFormat::NormalizedU8,
+            DepthFormat::NormalizedU16,
+        ] {
+            for confidences in [None, Some(ConfidenceFormat::LowMediumHigh), Some(ConfidenceFormat::U8)] {
+                let (w, h) = (random.random_range(1..20), random.random_range(1..20));
+                let n = format.pixel_bytes();
+                let pixel = n + random.random_range(0..3);
+                let row = (w - 1) * pixel + n + random.random_range(0..9);
+                let bytes: Vec<u8> = (0..(h - 1) * row + (w - 1) * pixel + n)
+                    .map(|_| random.random())
+                    .collect();
+                let map: Vec<u8> = (0..h * (2 * w + 1)).map(|_| random.random_range(0..=255)).collect();
+                let mut image = DepthImage::new(format, w, h, Plane::new(&bytes, row, pixel)).unwrap();
+                if let Some(format) = confidences {
+                    image = image
+                        .with_confidence(format, w, h, Plane::new(&map, 2 * w + 1, 2))
+                        .unwrap();
+                }
+                let (mut values, mut sure) = (vec![9.0; w * h], vec![9.0; w * h]);
+                let valid = image.readings(0.4, &mut values, &mut sure);
+                assert_eq!(valid, values.iter().filter(|v| !v.is_nan()).count());
+                for y in 0..h {
+                    for x in 0..w {
+                        let (value, own) = format.reading(&bytes[y * row + x * pixel..][..n]);
+                        let map = confidences.map_or(1.0, |f| f.confidence(map[y * (2 * w + 1) + 2 * x]));
+                        let (is, is_sure) = (values[y * w + x], sure[y * w + x]);
+                        match value.is_nan() || own.min(map) < 0.4 {
+                            true => assert!(is.is_nan() && is_sure == 0.0),
+                            false => assert!(is == value && is_sure == own.min(map)),
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn images_that_are_not_whole_are_named() {
+        let bytes = [0; 60];
+        let image = |w, h, row, pixel| DepthImage::new(DepthFormat::MetresF32, w, h, Plane::new(&bytes, row, pixel));
+        for (refused, word) in [
+            (image(0, 3, 20, 4), "empty"),
+            (image(7680, 4320, 30720, 4), "too large"),
+            (image(5, 4, 20, 4), "60 bytes are too few"),
+            (image(5, 3, 19, 4), "row stride of 19"),
+            (image(5, 3, 20, 2), "pixel stride of 2"),
+            (
+                image(5, 3, 20, 4)
+                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 4, 3, Plane::new(&bytes, 4, 1))),
+                "confidence is 4×3 and depth 5×3",
+            ),
+            (
+                image(5, 3, 20, 4)
+                    .and_then(|i| i.with_confidence(ConfidenceFormat::U8, 5, 3, Plane::new(&bytes, 4, 1))),
+                "confidence: a row stride of 4",
+            ),
+        ] {
+            let message = refused.map(|_| ()).map_err(|e| e.to_string());
+            assert!(message.as_ref().is_err_and(|m| m.contains(word)), "{word}: {message:?}");
+        }
+    }
+}

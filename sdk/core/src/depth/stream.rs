@@ -1,0 +1,234 @@
+//! The depth of a sequence of camera frames, each brought to the display: readings, alignment, temporal smoothing,
+//! range, refinement, in this order.
+
+use super::align::Cameras;
+use super::camera::{Alignment, CameraFrame};
+use super::image::{DepthFormat, DepthImage};
+use super::range::{DepthRange, RangeTracker};
+use super::refine::{RefineScratch, Refiner};
+use super::smoothing::Smoother;
+use crate::frame::{Crop, Orientation};
+use crate::runtime::error::{Error, Result};
+use std::time::Duration;
+
+/// What a session makes of depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthOptions {
+    /// Which metres are shown at the ends of the volume.
+    pub range: DepthRange,
+    /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+    pub least_confidence: f32,
+}
+
+impl Default for DepthOptions {
+    /// Percentiles; readings of low confidence are left out.
+    fn default() -> Self {
+        DepthOptions {
+            range: DepthRange::Percentiles,
+            least_confidence: 0.25,
+        }
+    }
+}
+
+impl DepthOptions {
+    /// # Errors
+    /// A range that is none, or a confidence outside 0..=1.
+    pub fn check(&self) -> Result<()> {
+        if !(0.0..=1.0).contains(&self.least_confidence) {
+            return Err(Error::Plan(format!(
+                "a least confidence of {} means nothing; it must lie in 0..=1",
+                self.least_confidence
+            )));
+        }
+        self.range.check()
+    }
+}
+
+/// What became of a frame's depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DepthReport {
+    /// Metres at the near and the far end of the volume; None for normalized depth.
+    pub range_m: Option<(f32, f32)>,
+    /// The share of the sensor's pixels that had a usable reading.
+    pub valid: f32,
+}
+
+/// What the plans and the memory of a [`DepthStream`] are for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Layout {
+    format: DepthFormat,
+    sensor: (usize, usize),
+    orientation: Orientation,
+    colour: (usize, usize),
+    cameras: Option<Cameras>,
+}
+
+struct Plan {
+    layout: Layout,
+    refiner: Refiner,
+    scratch: RefineScratch,
+    values: Vec<f32>,
+    confidence: Vec<f32>,
+    /// What `values` and `confidence` become when they are aligned or turned.
+    moved: (Vec<f32>, Vec<f32>),
+}
+
+/// The depth of a sequence of frames for one display shape.
+pub struct DepthStream {
+    options: DepthOptions,
+    out: (usize, usize),
+    range: RangeTracker,
+    smoother: Smoother,
+    plan: Option<Plan>,
+}
+
+impl DepthStream {
+    /// Depth for (H, W) = `out`.
+    ///
+    /// # Errors
+    /// As [`DepthOptions::check`].
+    pub fn new(options: DepthOptions, out: (usize, usize)) -> Result<Self> {
+        options.check()?;
+        Ok(DepthStream {
+            options,
+            out,
+            range: RangeTracker::new(options.range),
+            smoother: Smoother::default(),
+            plan: None,
+        })
+    }
+
+    /// Forgets the frames before.
+    pub fn reset(&mut self) {
+        self.range.reset();
+        self.smoother.reset();
+    }
+
+    /// The normalized depth of `frame` into `depth`, (H, W) in \[0, 1], along the edges of `rgb`, (3, H, W), what
+    /// [`Crop::cover`] shows of its colour. `elapsed` is the time since the frame before, None where there is none to
+    /// smooth with. Frames of one layout allocate nothing after the first.
+    ///
+    /// # Errors
+    /// Depth without any usable reading.
+    ///
+    /// # Panics
+    /// If `rgb` has not 3·H·W values or `depth` H·W.
+    pub fn next(
+        &mut self,
+        frame: &CameraFrame<'_>,
+        elapsed: Option<Duration>,
+        rgb: &[f32],
+        depth: &mut [f32],
+    ) -> Result<DepthReport> {
+        let image = &frame.depth;
+        let layout = Layout {
+            format: image.format(),
+            sensor: image.shape(),
+            orientation: frame.orientation,
+            colour: frame.colour.shape(),
+            cameras: match frame.alignment {
+                Alignment::Aligned => None,
+                Alignment::Cameras(cameras) => Some(cameras),
+            },
+        };
+        if elapsed.is_none()
+            || self
+                .plan
+                .as_ref()
+                .is_some_and(|plan| plan.layout.format != layout.format)
+        {
+            self.reset();
+        }
+        if self.plan.as_ref().is_none_or(|plan| plan.layout != layout) {
+            self.plan = Some(Plan::new(layout, self.out)?);
+        }
+        let plan = self.plan.as_mut().expect("made above");
+        let found = plan.readings(image, self.options.least_confidence);
+        if found == 0 {
+            return Err(Error::Frame(format!(
+                "depth has no usable reading in {}×{} pixels; at least one must be valid and of confidence {} or more",
+                layout.sensor.1, layout.sensor.0, self.options.least_confidence
+            )));
+        }
+        let elapsed = elapsed.unwrap_or_default();
+        let width = plan.upright().1;
+        let metric = layout.format.is_metric();
+        self.smoother.smooth(&mut plan.values, width, elapsed, metric);
+        let range_m = match metric {
+            true => Some(self.range.next(&plan.values, elapsed)?),
+            false => None,
+        };
+        if let Some((near, far)) = range_m {
+            // One distance everywhere has no extent: it lies in the middle of the volume.
+            let (scale, shift) = match near < far {
+                true => (1.0 / (far - near), -near / (far - near)),
+                false => (0.0, 0.5),
+            };
+            for value in &mut plan.values {
+                *value = (*value * scale + shift).clamp(0.0, 1.0);
+            }
+        }
+        plan.refiner
+            .refine(&plan.values, &plan.confidence, rgb, depth, &mut plan.scratch)?;
+        Ok(DepthReport {
+            range_m,
+            valid: found as f32 / plan.values.len() as f32,
+        })
+    }
+}
+
+impl Plan {
+    fn new(layout: Layout, out: (usize, usize)) -> Result<Self> {
+        let (height, width) = layout.sensor;
+        let upright = layout.orientation.upright_shape(height, width);
+        let colour = layout.orientation.upright_shape(layout.colour.0, layout.colour.1);
+        let crop =
+            Crop::cover(colour, out).scaled(upright.1 as f64 / colour.1 as f64, upright.0 as f64 / colour.0 as f64);
+        let refiner = Refiner::new(upright, crop, out)?;
+        let scratch = refiner.scratch();
+        let plane = || vec![f32::NAN; height * width];
+        Ok(Plan {
+            layout,
+            refiner,
+            scratch,
+            values: plane(),
+            confidence: plane(),
+            moved: (plane(), plane()),
+        })
+    }
+
+    fn upright(&self) -> (usize, usize) {
+        let (height, width) = self.layout.sensor;
+        self.layout.orientation.upright_shape(height, width)
+    }
+
+    /// The readings of `image`, aligned with the colour and upright, into `values` and `confidence`; gives how many.
+    fn readings(&mut self, image: &DepthImage<'_>, least: f32) -> usize {
+        let mut found = image.readings(least, &mut self.values, &mut self.confidence);
+        if let Some(cameras) = self.layout.cameras {
+            found = cameras.reproject(
+                self.layout.sensor,
+                self.layout.colour,
+                (&self.values, &self.confidence),
+                (&mut self.moved.0, &mut self.moved.1),
+            );
+            self.take_moved();
+        }
+        if self.layout.orientation != Orientation::default() {
+            let (_, width) = self.upright();
+            for i in 0..self.values.len() {
+                let sensor = self.layout.sensor;
+                let (x, y) = self.layout.orientation.sensor_pixel(i % width, i / width, sensor);
+                self.moved.0[i] = self.values[y * sensor.1 + x];
+                self.moved.1[i] = self.confidence[y * sensor.1 + x];
+            }
+            self.take_moved();
+        }
+        found
+    }
+
+    fn take_moved(&mut self) {
+        std::mem::swap(&mut self.values, &mut self.moved.0);
+        std::mem::swap(&mut self.confidence, &mut self.moved.1);
+    }
+}

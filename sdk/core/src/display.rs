@@ -1,0 +1,349 @@
+//! The physics of one holographic display, checked once, at construction.
+//!
+//! Lengths are metres inside (`_m`); the TOML form has mm, µm and nm, named so.
+
+pub mod illumination;
+pub mod panel;
+pub mod registration;
+pub mod response;
+pub mod target;
+
+use crate::runtime::error::{Error, Result};
+use crate::runtime::keys;
+use serde::{Deserialize, Serialize};
+
+/// One spatial light modulator, its lasers, and the volume it shows.
+///
+/// z runs toward the viewer. The midpoint hologram lies at z = 0 and the volume spans
+/// z ∈ \[−V/2, V/2\]; the modulator lies at z = `offset_m`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "DisplayToml", into = "DisplayToml")]
+pub struct Display {
+    width: usize,
+    height: usize,
+    pitch_m: f64,
+    wavelengths_m: Vec<f64>,
+    volume_depth_m: f64,
+    offset_m: f64,
+    bits: u32,
+    aperture_radius: f64,
+}
+
+/// The file's form of a [`Display`]: what is left out has the value of [`Display::default`].
+#[derive(Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct DisplayToml {
+    width: usize,
+    height: usize,
+    pitch_um: f64,
+    wavelengths_nm: Vec<f64>,
+    volume_depth_mm: f64,
+    offset_mm: f64,
+    bits: u32,
+    aperture_radius: f64,
+}
+
+impl Default for Display {
+    /// The paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm around the modulator, 8 bits, an aperture as wide
+    /// as the first order.
+    fn default() -> Self {
+        Display {
+            width: 1920,
+            height: 1080,
+            pitch_m: 8e-6,
+            wavelengths_m: vec![638e-9, 520e-9, 450e-9],
+            volume_depth_m: 6e-3,
+            offset_m: 0.0,
+            bits: 8,
+            aperture_radius: 1.0,
+        }
+    }
+}
+
+impl Default for DisplayToml {
+    fn default() -> Self {
+        Display::default().into()
+    }
+}
+
+impl From<Display> for DisplayToml {
+    fn from(d: Display) -> Self {
+        // Multiplying by 1e9 leaves the last digit off (637.9999…): files should say 638.
+        let round = |x: f64| (x * 1e6).round() / 1e6;
+        DisplayToml {
+            width: d.width,
+            height: d.height,
+            pitch_um: round(d.pitch_m * 1e6),
+            wavelengths_nm: d.wavelengths_m.iter().map(|l| round(l * 1e9)).collect(),
+            volume_depth_mm: round(d.volume_depth_m * 1e3),
+            offset_mm: round(d.offset_m * 1e3),
+            bits: d.bits,
+            aperture_radius: d.aperture_radius,
+        }
+    }
+}
+
+impl TryFrom<DisplayToml> for Display {
+    type Error = Error;
+
+    fn try_from(t: DisplayToml) -> Result<Self> {
+        // Dividing by a power of ten rounds once: 638/1e9 is the f64 nearest to 638e-9.
+        let display = Display {
+            width: t.width,
+            height: t.height,
+            pitch_m: t.pitch_um / 1e6,
+            wavelengths_m: t.wavelengths_nm.iter().map(|l| l / 1e9).collect(),
+            volume_depth_m: t.volume_depth_mm / 1e3,
+            offset_m: t.offset_mm / 1e3,
+            bits: t.bits,
+            aperture_radius: t.aperture_radius,
+        };
+        display.check()?;
+        Ok(display)
+    }
+}
+
+impl Display {
+    /// Reads the TOML form.
+    ///
+    /// ```
+    /// let display = phasefront::Display::from_toml("pitch_um = 3.74\nwidth = 3840\nheight = 2160")?;
+    /// assert_eq!(display.pitch_m(), 3.74e-6);
+    /// # Ok::<(), phasefront::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// Text that is not TOML, an unknown key, or a value out of its range.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(|e| {
+            let message = keys::message(&e);
+            Error::Display(match e.span() {
+                Some(span) => {
+                    let line = text[..span.start.min(text.len())].matches('\n').count() + 1;
+                    format!("line {line}: {message}")
+                }
+                None => message,
+            })
+        })
+    }
+
+    fn check(&self) -> Result<()> {
+        let refuse = |what: String| Err(Error::Display(what));
+        if self.width == 0 || self.height == 0 || self.width > 65536 || self.height > 65536 {
+            return refuse(format!(
+                "width and height are {}×{}; each must lie in 1..=65536",
+                self.width, self.height
+            ));
+        }
+        if !(0.1e-6..=1e-3).contains(&self.pitch_m) {
+            return refuse(format!("pitch_um is {}; it must lie in 0.1..=1000", self.pitch_m * 1e6));
+        }
+        if ![1, 3].contains(&self.wavelengths_m.len()) {
+            return refuse(format!(
+                "wavelengths_nm has {} lasers; three are right, for red, green and blue, or one",
+                self.wavelengths_m.len()
+            ));
+        }
+        for l in &self.wavelengths_m {
+            if !(100e-9..=20e-6).contains(l) {
+                return refuse(format!("a wavelength is {} nm; each must lie in 100..=20000", l * 1e9));
+            }
+            if *l > 2.0 * self.pitch_m {
+                return refuse(format!(
+                    "a wavelength of {} nm needs a pitch of at least half of it; pitch_um is {}",
+                    l * 1e9,
+                    self.pitch_m * 1e6
+                ));
+            }
+        }
+        if self.wavelengths_m.windows(2).any(|pair| pair[1] > pair[0]) {
+            let mut right = self.wavelengths_m.clone();
+            right.sort_by(|a, b| b.total_cmp(a));
+            return refuse(format!(
+                "wavelengths_nm is {}; three lasers stand in the order red, green, blue, the longest first: {}",
+                nm(&self.wavelengths_m),
+                nm(&right)
+            ));
+        }
+        if !(self.volume_depth_m > 0.0 && self.volume_depth_m <= 1.0) {
+            return refuse(format!(
+                "volume_depth_mm is {}; it must lie above 0 and up to 1000",
+                self.volume_depth_m * 1e3
+            ));
+        }
+        if !self.offset_m.is_finite() || self.offset_m.abs() > 10.0 {
+            return refuse(format!(
+                "offset_mm is {}; it must lie in -10000..=10000",
+                self.offset_m * 1e3
+            ));
+        }
+        if !(1..=10).contains(&self.bits) {
+            return refuse(format!("bits is {}; it must lie in 1..=10", self.bits));
+        }
+        if !(0.25..=1.25).contains(&self.aperture_radius) {
+            return refuse(format!(
+                "aperture_radius is {}; it must lie in 0.25..=1.25, where 1 is the whole first order",
+                self.aperture_radius
+            ));
+        }
+        Ok(())
+    }
+
+    /// Pixels along x.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Pixels along y.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Distance between neighbouring pixels, metres.
+    pub fn pitch_m(&self) -> f64 {
+        self.pitch_m
+    }
+
+    /// Wavelengths in the order red, green, blue, or that of the one laser, metres.
+    pub fn wavelengths_m(&self) -> &[f64] {
+        &self.wavelengths_m
+    }
+
+    /// The longest of them, whose light spreads farthest, metres.
+    pub fn longest_wavelength_m(&self) -> f64 {
+        self.wavelengths_m.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// How many lasers it has, C: 3 or 1. Frames, fields, levels and views have as many planes.
+    pub fn colours(&self) -> usize {
+        self.wavelengths_m.len()
+    }
+
+    /// Depth V of the volume, metres.
+    pub fn volume_depth_m(&self) -> f64 {
+        self.volume_depth_m
+    }
+
+    /// z of the modulator against the midpoint of the volume, metres, positive toward the viewer.
+    pub fn offset_m(&self) -> f64 {
+        self.offset_m
+    }
+
+    /// Bits of a modulator level, 1 to 10; over 8 only sessions make.
+    pub fn bits(&self) -> u32 {
+        self.bits
+    }
+
+    /// Radius of the aperture in the Fourier plane that lets the picture through and stops double phase's checkerboard
+    /// (Eq. 8): 1 reaches the Nyquist frequency ½/pitch, the paper's r of half the image's resolution.
+    pub fn aperture_radius(&self) -> f64 {
+        self.aperture_radius
+    }
+
+    /// The same display with its modulator at z = `offset_m`.
+    ///
+    /// # Errors
+    /// An offset that is not finite or beyond 10 m.
+    pub fn with_offset_m(self, offset_m: f64) -> Result<Self> {
+        let display = Display { offset_m, ..self };
+        display.check()?;
+        Ok(display)
+    }
+
+    /// The same display with (`height`, `width`) pixels.
+    ///
+    /// # Errors
+    /// A side outside 1..=65536.
+    pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
+        let display = Display { height, width, ..self };
+        display.check()?;
+        Ok(display)
+    }
+
+    /// z of a point of normalized depth d (0 nearest, 1 farthest): V/2 − V·d, metres.
+    pub fn z_of_depth(&self, d: f64) -> f64 {
+        self.volume_depth_m / 2.0 - self.volume_depth_m * d
+    }
+}
+
+/// Wavelengths as the file has them.
+fn nm(wavelengths_m: &[f64]) -> String {
+    let all: Vec<_> = (wavelengths_m.iter())
+        .map(|m| ((m * 1e15).round() / 1e6).to_string())
+        .collect();
+    format!("[{}]", all.join(", "))
+}
+
+/// Checks that `what`, which is of `colours` colours, is for a display of `right` lasers.
+///
+/// # Errors
+/// Another number.
+pub(crate) fn check_colours(what: &str, colours: usize, right: usize) -> Result<()> {
+    match colours == right {
+        true => Ok(()),
+        false => Err(Error::Plan(format!(
+            "{what} has {colours} {}, the display {right}; both must have as many",
+            if colours == 1 { "colour" } else { "colours" }
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn toml_form_round_trips_and_fills_in_defaults() {
+        let d = Display::from_toml("pitch_um = 3.74\nwavelengths_nm = [638, 520, 450]").unwrap();
+        assert_eq!(d.pitch_m(), 3.74e-6);
+        assert_eq!(d.width(), 1920);
+        assert_eq!(d.wavelengths_m(), Display::default().wavelengths_m());
+        let text = toml::Value::try_from(&d).unwrap();
+        assert_eq!(text["wavelengths_nm"][0].as_float(), Some(638.0));
+    }
+
+    #[test]
+    fn impossible_displays_are_named() {
+        for (text, word) in [
+            ("width = 0", "width"),
+            ("pitch_um = nan", "pitch_um"),
+            ("pitch_um = 0.2", "wavelength"),
+            ("wavelengths_nm = [638, 520, -450]", "wavelength"),
+            ("volume_depth_mm = 0", "volume_depth_mm"),
+            ("wavelengths_nm = [638, 520]", "2 lasers"),
+            ("wavelengths_nm = []", "0 lasers"),
+            ("offset_mm = inf", "offset_mm"),
+            ("bits = 11", "bits"),
+            ("aperture_radius = 0", "aperture_radius"),
+            ("aperture_radius = nan", "aperture_radius"),
+            ("pich_um = 8", "unknown key `pich_um`; did you mean `pitch_um`?"),
+            ("pitch_mm = 0.008", "unknown key `pitch_mm`; did you mean `pitch_um`?"),
+            ("wavelengths_nm = [450, 520, 638]", "the longest first: [638, 520, 450]"),
+            ("wavelengths_nm = [638, 450, 520]", "red, green, blue"),
+            ("width = ", "line 1"),
+        ] {
+            let message = Display::from_toml(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+        // One laser's light may stand for all three.
+        assert!(Display::from_toml("wavelengths_nm = [532, 532, 532]").is_ok());
+    }
+
+    #[test]
+    fn one_laser_is_a_display() {
+        let d = Display::from_toml("wavelengths_nm = [532]").unwrap();
+        assert_eq!((d.colours(), d.wavelengths_m()), (1, &[532e-9][..]));
+        let text = toml::to_string(&d).unwrap();
+        assert_eq!(Display::from_toml(&text).unwrap(), d);
+        assert_eq!(Display::default().colours(), 3);
+    }
+
+    #[test]
+    fn depth_runs_from_the_viewer_away() {
+        let d = Display::default();
+        assert_eq!(d.z_of_depth(0.0), 3e-3);
+        assert_eq!(d.z_of_depth(1.0), -3e-3);
+    }
+}

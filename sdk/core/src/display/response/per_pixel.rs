@@ -1,0 +1,570 @@
+//! A table of levels for each pixel that a phone can hold: monotone knots on a coarse grid.
+//!
+//! A table of 256 levels for each of 1920×1080 pixels and three colours takes 1.6 GB. What differs between
+//! pixels, the thickness and the field of the liquid crystal, changes slowly over the panel. So curves are kept for
+//! nodes every `spacing` pixels, each as the levels of `intervals` + 1 phases, and interpolated linearly
+//! in x, y and phase.
+//!
+//! # The file
+//! All numbers little-endian, nothing between them:
+//!
+//! | bytes | what |
+//! |---|---|
+//! | 8 | `PFPIXEL1` |
+//! | 4 × u32 | height H, width W of the modulator; spacing s; intervals K |
+//! | (C, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
+//! | (C, Gh, Gw) × u16 | `turn`/2π × 65535 |
+//!
+//! C, the colours, is 3 or 1, as the file's length says. Node (i, j) stands on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and
+//! Gw alike, so nodes reach to the last pixel or beyond it.
+//!
+//! # The rule
+//! A phase φ at pixel (x, y), with t = φ·K/2π, k = min(⌊t⌋, K−1): the four nodes around the pixel give their
+//! knots k and k+1; these are interpolated in y, then x, then by t−k; the level is that + ½, cut to
+//! 0..=255, its fraction dropped. Where the modulator cannot reach 2π, the knots go on rising over 255; from the
+//! phase `turn` on (interpolated likewise) the smallest phase is nearer than the largest, and the level is
+//! that of phase 0. All in f32.
+
+use crate::runtime::error::{Error, Result};
+use std::f32::consts::TAU;
+
+/// The first bytes of the file.
+const MAGIC: &[u8; 8] = b"PFPIXEL1";
+/// Steps of a level in the file.
+const FRACTIONS: f32 = 128.0;
+/// The most intervals of phase.
+pub const MAX_INTERVALS: usize = 64;
+
+/// The levels of every pixel. Immutable; shared between threads.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PerPixel {
+    /// Of the modulator.
+    height: usize,
+    width: usize,
+    /// The part of it that a stack (C, H, W) covers: its upper left pixel, and its size.
+    corner: (usize, usize),
+    window: (usize, usize),
+    spacing: usize,
+    intervals: usize,
+    /// (Gh, Gw).
+    nodes: (usize, usize),
+    /// (C, Gh, Gw, K+1).
+    levels: Vec<f32>,
+    /// (C, Gh, Gw), radians.
+    turn: Vec<f32>,
+}
+
+/// The grid of nodes, (Gh, Gw), every `spacing` pixels over (`height`, `width`).
+pub fn nodes(height: usize, width: usize, spacing: usize) -> (usize, usize) {
+    let along = |n: usize| n.saturating_sub(1).div_ceil(spacing) + 1;
+    (along(height), along(width))
+}
+
+impl PerPixel {
+    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them. `levels`, (C, Gh, Gw,
+    /// `intervals` + 1), are those of the phases 2πk/`intervals`, and may go on over 255 where the modulator does not
+    /// reach the phase; `turn`, (C, Gh, Gw), C being 3 or 1, are the phases from which that of phase 0 is nearer, 2π
+    /// where the modulator reaches all.
+    ///
+    /// Values are rounded to what the file holds, so that a table is the same before and after.
+    ///
+    /// # Errors
+    /// A size of 0, more than [`MAX_INTERVALS`] intervals, lengths that do not fit, levels that fall along a curve or
+    /// lie outside 0..=511, or a `turn` outside 0..=2π.
+    pub fn new(
+        height: usize,
+        width: usize,
+        spacing: usize,
+        intervals: usize,
+        levels: &[f32],
+        turn: &[f32],
+    ) -> Result<Self> {
+        let refuse = |what: String| Err(Error::Plan(format!("per-pixel table: {what}")));
+        let most = f32::from(u16::MAX) / FRACTIONS;
+        if let Some(level) = levels.iter().find(|l| !(0.0..=most).contains(*l)) {
+            return refuse(format!("a level of {level}; it must lie in 0..={most:.0}"));
+        }
+        if let Some(turn) = turn.iter().find(|t| !(0.0..=TAU).contains(*t)) {
+            return refuse(format!("a turn at {turn} rad; it must lie in 0..=2π"));
+        }
+        let levels: Vec<u16> = (levels.iter()).map(|l| (l * FRACTIONS).round() as u16).collect();
+        let turn: Vec<u16> = (turn.iter())
+            .map(|t| (t / TAU * f32::from(u16::MAX)).round() as u16)
+            .collect();
+        Self::of_fractions(height, width, spacing, intervals, &levels, &turn)
+    }
+
+    fn of_fractions(
+        height: usize,
+        width: usize,
+        spacing: usize,
+        intervals: usize,
+        levels: &[u16],
+        turn: &[u16],
+    ) -> Result<Self> {
+        let refuse = |what: String| Err(Error::Plan(format!("per-pixel table: {what}")));
+        if height == 0 || width == 0 || spacing == 0 || height > 65536 || width > 65536 {
+            return refuse(format!(
+                "{width}×{height} pixels, a node every {spacing}; sizes must lie in 1..=65536"
+            ));
+        }
+        if !(1..=MAX_INTERVALS).contains(&intervals) {
+            return refuse(format!(
+                "{intervals} intervals of phase; there must be 1 to {MAX_INTERVALS}"
+            ));
+        }
+        let nodes = nodes(height, width, spacing);
+        let one = nodes.0 * nodes.1;
+        let count = if turn.len() == one { one } else { 3 * one };
+        if turn.len() != count || levels.len() != count * (intervals + 1) {
+            return refuse(format!(
+                "{} levels and {} turns; {width}×{height} pixels, a node every {spacing}, need {} and {count}, or a third of both for one colour",
+                levels.len(),
+                turn.len(),
+                count * (intervals + 1)
+            ));
+        }
+        if !levels.chunks_exact(intervals + 1).all(<[u16]>::is_sorted) {
+            return refuse("a curve falls; levels must rise with the phase".into());
+        }
+        Ok(PerPixel {
+            height,
+            width,
+            corner: (0, 0),
+            window: (height, width),
+            spacing,
+            intervals,
+            nodes,
+            levels: levels.iter().map(|l| f32::from(*l) / FRACTIONS).collect(),
+            turn: turn.iter().map(|t| f32::from(*t) / f32::from(u16::MAX) * TAU).collect(),
+        })
+    }
+
+    /// Reads the file's bytes.
+    ///
+    /// # Errors
+    /// Bytes that are not such a table, or not all of it.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        let refuse = |what: String| Error::Plan(format!("per-pixel table: {what}"));
+        let rest = bytes
+            .strip_prefix(MAGIC.as_slice())
+            .ok_or_else(|| refuse("does not begin with PFPIXEL1".into()))?;
+        let Some((head, rest)) = rest.split_first_chunk::<16>() else {
+            return Err(refuse("is cut short".into()));
+        };
+        let number = |i: usize| u32::from_le_bytes([0, 1, 2, 3].map(|j| head[4 * i + j])) as usize;
+        let (height, width, spacing, intervals) = (number(0), number(1), number(2), number(3));
+        let sizes = [height, width, spacing, intervals];
+        if sizes.iter().any(|n| !(1..=65536).contains(n)) {
+            return Err(refuse(format!("holds impossible sizes {sizes:?}")));
+        }
+        let (rows, columns) = nodes(height, width, spacing);
+        // Of one colour.
+        let needed = 2 * rows * columns * (intervals + 2);
+        let count = rest.len() / needed * rows * columns;
+        if ![needed, 3 * needed].contains(&rest.len()) {
+            return Err(refuse(format!(
+                "has {} bytes of curves; {width}×{height} pixels, a node every {spacing}, need {needed} a colour, of which there are 3 or 1",
+                rest.len()
+            )));
+        }
+        let values: Vec<u16> = (rest.chunks_exact(2))
+            .map(|pair| u16::from_le_bytes([pair[0], pair[1]]))
+            .collect();
+        let (levels, turn) = values.split_at(count * (intervals + 1));
+        Self::of_fractions(height, width, spacing, intervals, levels, turn)
+    }
+
+    /// The file's bytes.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        for number in [self.height, self.width, self.spacing, self.intervals] {
+            bytes.extend((number as u32).to_le_bytes());
+        }
+        for level in &self.levels {
+            bytes.extend(((level * FRACTIONS).round() as u16).to_le_bytes());
+        }
+        for turn in &self.turn {
+            bytes.extend(((turn / TAU * f32::from(u16::MAX)).round() as u16).to_le_bytes());
+        }
+        bytes
+    }
+
+    /// The table of the (`height`, `width`) pixels in the middle of this one's: for a hologram smaller than the
+    /// modulator.
+    ///
+    /// # Errors
+    /// More pixels than there are.
+    pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
+        let (rows, columns) = self.window;
+        if height > rows || width > columns {
+            return Err(Error::Plan(format!(
+                "per-pixel table: for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
+            )));
+        }
+        Ok(PerPixel {
+            corner: (
+                self.corner.0 + (rows - height) / 2,
+                self.corner.1 + (columns - width) / 2,
+            ),
+            window: (height, width),
+            ..self.clone()
+        })
+    }
+
+    /// How many colours it is of.
+    pub fn colours(&self) -> usize {
+        self.turn.len() / (self.nodes.0 * self.nodes.1)
+    }
+
+    /// (H, W) of the stacks that it is for.
+    pub fn shape(&self) -> (usize, usize) {
+        self.window
+    }
+
+    /// The first row and column of the modulator that its stacks cover.
+    pub fn corner(&self) -> (usize, usize) {
+        self.corner
+    }
+
+    /// Pixels from node to node.
+    pub fn spacing(&self) -> usize {
+        self.spacing
+    }
+
+    /// Intervals of phase, K.
+    pub fn intervals(&self) -> usize {
+        self.intervals
+    }
+
+    /// The knots of all nodes, (C, Gh, Gw, K+1), in levels.
+    pub fn knots(&self) -> &[f32] {
+        &self.levels
+    }
+
+    /// The phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest one.
+    pub fn turns(&self) -> &[f32] {
+        &self.turn
+    }
+
+    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (C, H, W). The rule as it stands: the oracle
+    /// of [`Self::levels`].
+    ///
+    /// # Panics
+    /// If `at` is outside the stack.
+    pub fn level(&self, phase: f32, at: usize) -> u8 {
+        let turn = self.interpolate(at, |node| self.turn[node]);
+        let phase = if phase >= turn { 0.0 } else { phase };
+        let t = phase * (self.intervals as f32 / TAU);
+        let k = (t as usize).min(self.intervals - 1);
+        let knot = |k: usize| self.interpolate(at, |node| self.levels[node * (self.intervals + 1) + k]);
+        let (here, next) = (knot(k), knot(k + 1));
+        rounded(here + (next - here) * (t - k as f32))
+    }
+
+    /// A node's value between the four nodes around value `at` of the stack: in y first, then in x.
+    fn interpolate(&self, at: usize, value: impl Fn(usize) -> f32) -> f32 {
+        let (colour, y, x) = self.place(at);
+        let (i, fy) = self.split(y);
+        let (j, fx) = self.split(x);
+        let column = |j: usize| {
+            let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
+            let (top, bottom) = (value(top), value(bottom));
+            top + (bottom - top) * fy
+        };
+        let (left, right) = (column(j), column(j + 1));
+        left + (right - left) * fx
+    }
+
+    /// Colour and pixel (y, x) of the modulator of value `at` of a stack.
+    fn place(&self, at: usize) -> (usize, usize, usize) {
+        let (height, width) = self.window;
+        let plane = height * width;
+        assert!(at < self.colours() * plane, "a place outside the modulator");
+        let (y, x) = (at % plane / width, at % width);
+        (at / plane, y + self.corner.0, x + self.corner.1)
+    }
+
+    /// The node before pixel `n` of an axis, and how far it is to the next.
+    fn split(&self, n: usize) -> (usize, f32) {
+        (n / self.spacing, (n % self.spacing) as f32 / self.spacing as f32)
+    }
+
+    /// The index of node (i, j); beyond the grid, where the way to it is 0, that of its last one.
+    fn node(&self, colour: usize, i: usize, j: usize) -> usize {
+        let (rows, columns) = self.nodes;
+        (colour * rows + i.min(rows - 1)) * columns + j.min(columns - 1)
+    }
+
+    /// [`Self::level`] of each of `phases`, which begin at value `first` of a stack (C, H, W) and stay in one row. The
+    /// same bits; allocates nothing.
+    ///
+    /// # Panics
+    /// If the lengths differ or the row ends before them.
+    #[inline(always)]
+    pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
+        assert_eq!(phases.len(), levels.len());
+        let (colour, y, x) = self.place(first);
+        let end = self.corner.1 + self.window.1;
+        assert!(x + phases.len() <= end, "a run beyond its row");
+        let knots = self.intervals + 1;
+        let (i, fy) = self.split(y);
+        // A node's curve and its turn, interpolated in y.
+        let column = |j: usize, curve: &mut [f32; MAX_INTERVALS + 1]| {
+            let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
+            let lines = self.levels[top * knots..][..knots]
+                .iter()
+                .zip(&self.levels[bottom * knots..][..knots]);
+            for (value, (top, bottom)) in curve.iter_mut().zip(lines) {
+                *value = top + (bottom - top) * fy;
+            }
+            self.turn[top] + (self.turn[bottom] - self.turn[top]) * fy
+        };
+        let mut j = x / self.spacing;
+        let mut left = [0.0; MAX_INTERVALS + 1];
+        let mut right = left;
+        let mut left_turn = column(j, &mut left);
+        let mut ends = [[0.0; 4]; MAX_INTERVALS];
+        let (mut phases, mut levels, mut x) = (phases, levels, x);
+        while !phases.is_empty() {
+            let right_turn = column(j + 1, &mut right);
+            let curves = left.windows(2).zip(right.windows(2));
+            for (ends, (left, right)) in ends.iter_mut().zip(curves).take(self.intervals) {
+                *ends = [left[0], right[0] - left[0], left[1], right[1] - left[1]];
+            }
+            let count = phases.len().min((j + 1) * self.spacing - x);
+            let (run, rest) = phases.split_at(count);
+            let (shown, others) = std::mem::take(&mut levels).split_at_mut(count);
+            let start = x - j * self.spacing;
+            let node = Between {
+                ends: &ends,
+                turn: (left_turn, right_turn - left_turn),
+                intervals: self.intervals,
+                step: self.spacing as f32,
+            };
+            let blocks = run.chunks(LANES).zip(shown.chunks_mut(LANES));
+            for (n, (run, shown)) in blocks.enumerate() {
+                node.levels(run, (start + n * LANES) as f32, shown);
+            }
+            (phases, levels) = (rest, others);
+            x += count;
+            j += 1;
+            (left, left_turn) = (right, right_turn);
+        }
+    }
+
+    /// The phase that `level` shows at value `at` of a stack: the smallest whose curve reaches it, in \[0, 2π).
+    pub fn phase(&self, level: u8, at: usize) -> f32 {
+        let knots = self.intervals + 1;
+        let value = |k: usize| self.interpolate(at, |node| self.levels[node * knots + k]);
+        let wanted = f32::from(level);
+        let mut here = value(0);
+        if wanted <= here {
+            return 0.0;
+        }
+        for k in 0..self.intervals {
+            let next = value(k + 1);
+            if next >= wanted {
+                let t = k as f32 + (wanted - here) / (next - here);
+                return super::wrap(t * (TAU / self.intervals as f32));
+            }
+            here = next;
+        }
+        // Beyond 2π the curve is not kept; nothing that the table asks for lies there.
+        0.0
+    }
+}
+
+/// Values that are looked up at a time.
+const LANES: usize = 32;
+
+/// The curves between two nodes of a row.
+struct Between<'a> {
+    /// Of each interval the left node's first knot, the way to the right node's, and both of the second knot: in one
+    /// place, for looking up is what takes the time.
+    ends: &'a [[f32; 4]; MAX_INTERVALS],
+    /// The turn likewise.
+    turn: (f32, f32),
+    intervals: usize,
+    /// Pixels from node to node.
+    step: f32,
+}
+
+impl Between<'_> {
+    /// The levels of at most [`LANES`] phases, the first of which is `first` pixels from the left node.
+    // Index loops over arrays of one fixed length: only the middle one, which looks knots up, does not run on vectors.
+    #[allow(clippy::needless_range_loop)]
+    fn levels(&self, phases: &[f32], first: f32, levels: &mut [u8]) {
+        let mut wanted = [0.0; LANES];
+        wanted[..phases.len()].copy_from_slice(phases);
+        let per_radian = self.intervals as f32 / TAU;
+        let last = (self.intervals - 1) as f32;
+        let (mut along, mut part, mut interval) = ([0.0; LANES], [0.0; LANES], [0; LANES]);
+        for i in 0..LANES {
+            let fx = (first + i as f32) / self.step;
+            let turn = self.turn.0 + self.turn.1 * fx;
+            let phase = if wanted[i] >= turn { 0.0 } else { wanted[i] };
+            let t = phase * per_radian;
+            let k = whole(t).min(last);
+            (along[i], part[i], interval[i]) = (fx, t - k, bits(k) & 63);
+        }
+        let ends: [[f32; 4]; LANES] = interval.map(|k| self.ends[k as usize]);
+        let mut shown = [0; LANES];
+        for i in 0..LANES {
+            let [here, way, next, next_way] = ends[i];
+            let here = here + way * along[i];
+            let next = next + next_way * along[i];
+            let level = here + (next - here) * part[i] + 0.5;
+            shown[i] = bits(whole(level.clamp(0.0, 255.0))) as u8;
+        }
+        levels.copy_from_slice(&shown[..levels.len()]);
+    }
+}
+
+/// To a level: the fraction is dropped after adding ½.
+fn rounded(level: f32) -> u8 {
+    (level + 0.5) as u8
+}
+
+/// 2²³: from here on floats have no fraction.
+const WHOLE: f32 = 8_388_608.0;
+
+/// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly
+/// where it has to handle values out of range.
+fn whole(value: f32) -> f32 {
+    let nearest = value + WHOLE - WHOLE;
+    if nearest > value { nearest - 1.0 } else { nearest }
+}
+
+/// A whole value below 2²³ in the low bits of an integer.
+fn bits(whole: f32) -> u32 {
+    (whole + WHOLE).to_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// Curves that bend, differ from node to node, and fall short of 2π where `short`.
+    fn table(shape: (usize, usize), spacing: usize, intervals: usize, short: bool) -> PerPixel {
+        let (rows, columns) = nodes(shape.0, shape.1, spacing);
+        let mut levels = Vec::new();
+        let mut turn = Vec::new();
+        for node in 0..3 * rows * columns {
+            let reach = if short {
+                0.7 + 0.02 * (node % 9) as f32
+            } else {
+                1.0 + 0.03 * (node % 7) as f32
+            };
+            for k in 0..=intervals {
+                let t = k as f32 / intervals as f32 / reach;
+                levels.push(255.0 * (t + 0.1 * (TAU * t).sin().min(0.0) * f32::from(t < 1.0)).max(0.0));
+            }
+            for k in 1..=intervals {
+                let n = levels.len();
+                levels[n - 1 - intervals + k] = levels[n - 1 - intervals + k].max(levels[n - 2 - intervals + k]);
+            }
+            turn.push(if reach < 1.0 { (reach + 1.0) / 2.0 * TAU } else { TAU });
+        }
+        PerPixel::new(shape.0, shape.1, spacing, intervals, &levels, &turn).unwrap()
+    }
+
+    fn phases(n: usize, seed: usize) -> Vec<f32> {
+        let mut all: Vec<f32> = (0..n)
+            .map(|i| ((i * 7919 + seed * 31) % 10_007) as f32 / 10_007.0 * TAU)
+            .collect();
+        let end = all.len() - 1;
+        all[0] = 0.0;
+        all[end] = TAU.next_down();
+        all
+    }
+
+    #[test]
+    fn rows_agree_with_the_rule_to_the_bit() {
+        for (shape, spacing, intervals) in [
+            ((7, 301), 32, 32),
+            ((33, 65), 32, 64),
+            ((1, 1), 5, 1),
+            ((9, 10), 1, 17),
+            ((5, 40), 64, 8),
+        ] {
+            for short in [false, true] {
+                let table = table(shape, spacing, intervals, short);
+                let (h, w) = shape;
+                for row in 0..3 * h {
+                    let phases = phases(w, row);
+                    for begin in [0, w / 3] {
+                        let mut out = vec![0; w - begin];
+                        table.levels(&phases[begin..], row * w + begin, &mut out);
+                        for (x, level) in out.iter().enumerate() {
+                            let at = row * w + begin + x;
+                            assert_eq!(*level, table.level(phases[begin + x], at), "{shape:?} {at}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_level_shows_the_phase_that_asks_for_it() {
+        let table = table((20, 50), 16, 32, false);
+        for at in [0, 77, 999, 1500, 2999] {
+            for i in 0..200 {
+                let phase = i as f32 / 200.0 * TAU;
+                let shown = table.phase(table.level(phase, at), at);
+                let error = (shown - phase).abs();
+                // Half a level, where the curve is at its steepest.
+                assert!(error.min(TAU - error) < 0.04, "{phase} {shown}");
+            }
+        }
+    }
+
+    #[test]
+    fn phases_out_of_reach_get_the_nearer_end() {
+        let levels: Vec<f32> = (0..=8).map(|k| k as f32 / 8.0 * 340.0).collect();
+        let levels: Vec<f32> = levels.iter().cycle().take(9 * 12).copied().collect();
+        let table = PerPixel::new(3, 4, 4, 8, &levels, &[TAU * 0.875; 12]).unwrap();
+        assert_eq!(table.level(TAU * 0.5, 5), 170);
+        assert_eq!(table.level(TAU * 0.8, 5), 255);
+        assert_eq!(table.level(TAU * 0.87, 5), 255);
+        assert_eq!(table.level(TAU * 0.88, 5), 0);
+    }
+
+    #[test]
+    fn a_centred_table_is_the_middle_of_the_whole() {
+        let whole = table((33, 65), 16, 32, true);
+        let part = whole.centred(20, 41).unwrap();
+        assert_eq!((part.shape(), part.corner()), ((20, 41), (6, 12)));
+        let phases = phases(41, 1);
+        let mut levels = vec![0; 41];
+        for row in [0, 19, 20, 45, 59] {
+            part.levels(&phases, row * 41, &mut levels);
+            for (x, level) in levels.iter().enumerate() {
+                let at = (row / 20 * 33 + row % 20 + 6) * 65 + x + 12;
+                assert_eq!(*level, whole.level(phases[x], at));
+                assert_eq!(*level, part.level(phases[x], row * 41 + x));
+            }
+        }
+        assert_eq!(part.centred(2, 41).unwrap().corner(), (15, 12));
+        assert!(part.centred(21, 3).is_err());
+    }
+
+    #[test]
+    fn bytes_hold_the_table_and_broken_ones_are_named() {
+        let table = table((33, 65), 16, 32, true);
+        let bytes = table.to_bytes();
+        assert_eq!(PerPixel::from_bytes(&bytes).unwrap(), table);
+        let message = |bytes: &[u8]| PerPixel::from_bytes(bytes).unwrap_err().to_string();
+        assert!(message(b"what").contains("PFPIXEL1"));
+        assert!(message(&bytes[..12]).contains("cut short"));
+        assert!(message(&bytes[..bytes.len() - 1]).contains("bytes of curves"));
+        let mut zero = bytes.clone();
+        zero[8..12].fill(0);
+        assert!(message(&zero).contains("sizes"));
+        let mut falling = bytes;
+        falling[24..26].copy_from_slice(&60000u16.to_le_bytes());
+        assert!(message(&falling).contains("falls"));
+    }
+}

@@ -1,0 +1,298 @@
+//! The plan from fields to phases or levels: what needs the whole field first, then row by row in one sweep over
+//! memory.
+
+use super::dark::Dark;
+use super::encoding::{Prefilter, PrefilterScratch};
+use super::local::{LocalFilter, LocalScratch, Wanted};
+use super::start::{Start, StartScratch};
+use super::{EncoderOptions, double_phase};
+use crate::display::illumination::Illumination;
+use crate::display::response::Response;
+use crate::display::target::Target;
+use crate::runtime::cancel::Cancel;
+use crate::runtime::error::{Error, Result};
+use num_complex::Complex32;
+use rayon::prelude::*;
+
+/// A plan for one shape, target and encoding. Immutable; shared between threads.
+pub struct Encoder {
+    colours: usize,
+    height: usize,
+    width: usize,
+    prefilter: Prefilter,
+    dark: f32,
+    local: Option<Local>,
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
+    response: Response,
+}
+
+struct Local {
+    filter: LocalFilter,
+    steps: usize,
+}
+
+/// Working memory of an [`Encoder`] for one call at a time.
+pub struct EncoderScratch {
+    prefilter: Option<PrefilterScratch>,
+    /// The field before a filter that needs all of it, for the correction.
+    wanted: Vec<Complex32>,
+    /// For each part of a plane that a thread takes.
+    parts: Vec<PartScratch>,
+    /// The largest |u|² of each row.
+    most: Vec<f32>,
+    cancel: Cancel,
+}
+
+impl EncoderScratch {
+    /// Has fields end where `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        if let Some(prefilter) = &mut self.prefilter {
+            prefilter.set_cancel(cancel);
+        }
+        self.cancel = cancel.clone();
+    }
+}
+
+struct PartScratch {
+    start: StartScratch,
+    local: Option<LocalScratch>,
+    row: Vec<Complex32>,
+}
+
+/// What is done to a field row by row.
+#[derive(Clone, Copy)]
+struct Work<'a> {
+    dark: Option<Dark>,
+    /// With 1 over the scale.
+    local: Option<(&'a Local, f32)>,
+}
+
+/// A row on its way to phases.
+enum Row<'a> {
+    /// Values that double phase shows.
+    Field(&'a [Complex32]),
+    /// Values whose own phase is shown.
+    Corrected(&'a [Complex32]),
+}
+
+impl Encoder {
+    /// Plans the encoding of (C, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
+    /// divided by the light that falls there.
+    ///
+    /// # Errors
+    /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
+    pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
+        let (height, width) = shape;
+        if height == 0 || width == 0 {
+            return Err(Error::Plan(format!(
+                "a plane of {width}×{height} is empty; each side must be at least 1"
+            )));
+        }
+        target.check()?;
+        options.check()?;
+        let prefilter = Prefilter::new(shape, &options.encoding, &target.display)?;
+        let illumination = target.illumination.clone();
+        Ok(Encoder {
+            colours: target.display.colours(),
+            height,
+            width,
+            prefilter,
+            dark: options.dark,
+            local: (options.local_steps > 0).then(|| Local {
+                filter: LocalFilter::of_aperture(target.display.aperture_radius()),
+                steps: options.local_steps,
+            }),
+            illumination: illumination.map(|light| (light, target.modulator())),
+            response: target.response.clone().centred(height, width)?,
+        })
+    }
+
+    /// Working memory for one call at a time, for the threads of the current pool.
+    pub fn scratch(&self) -> EncoderScratch {
+        let prefilter = self.prefilter.scratch();
+        let wanted = match (&prefilter, &self.local) {
+            (Some(_), Some(_)) => vec![Complex32::ZERO; self.colours * self.height * self.width],
+            _ => Vec::new(),
+        };
+        let part = || PartScratch {
+            start: StartScratch::new(self.prefilter.blur(), self.width),
+            local: self
+                .local
+                .as_ref()
+                .map(|local| LocalScratch::new(local.steps, self.width)),
+            row: vec![Complex32::ZERO; self.width],
+        };
+        EncoderScratch {
+            prefilter,
+            wanted,
+            parts: (0..2 * rayon::current_num_threads()).map(|_| part()).collect(),
+            most: vec![0.0; self.colours * self.height],
+            cancel: Cancel::default(),
+        }
+    }
+
+    /// Encodes `field`, a stack (C, H, W), into `phase`, (C, H, W) in \[0, 2π); gives the scale it used, the amplitude
+    /// that full light stands for: `scale`, or the largest amplitude of the filtered field. `field` is worked on: what
+    /// it holds afterwards means nothing. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` or `phase` has not C·H·W values.
+    pub fn encode(
+        &self,
+        field: &mut [Complex32],
+        scale: Option<f32>,
+        phase: &mut [f32],
+        scratch: &mut EncoderScratch,
+    ) -> f32 {
+        let scale = self.prepare(field, scale, scratch);
+        self.rows(
+            field,
+            self.work(scale),
+            phase,
+            scratch,
+            |row, shown, phases| match shown {
+                Row::Field(values) => double_phase::encode_row(values, row % self.height, scale, phases),
+                Row::Corrected(values) => double_phase::phase_row(values, phases),
+            },
+        );
+        scale
+    }
+
+    /// [`Self::encode`] straight to the target's levels.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not C·H·W values.
+    pub fn encode_levels(
+        &self,
+        field: &mut [Complex32],
+        scale: Option<f32>,
+        levels: &mut [u8],
+        scratch: &mut EncoderScratch,
+    ) -> f32 {
+        let scale = self.prepare(field, scale, scratch);
+        self.rows(field, self.work(scale), levels, scratch, |row, shown, levels| {
+            let (y, first) = (row % self.height, row * self.width);
+            match shown {
+                Row::Field(values) => {
+                    double_phase::encode_row_levels(values, y, scale, &self.response, first, levels);
+                }
+                Row::Corrected(values) => double_phase::phase_row_levels(values, &self.response, first, levels),
+            }
+        });
+        scale
+    }
+
+    /// The target's levels of `phases`, (C, H, W) in \[0, 2π).
+    ///
+    /// # Panics
+    /// If `phases` or `levels` has not C·H·W values.
+    pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
+        assert!(phases.len() == self.colours * self.height * self.width && levels.len() == phases.len());
+        let rows = phases
+            .par_chunks_exact(self.width)
+            .zip(levels.par_chunks_exact_mut(self.width));
+        rows.enumerate()
+            .for_each(|(row, (phases, levels))| self.response.levels(phases, row * self.width, levels));
+    }
+
+    fn work(&self, scale: f32) -> Work<'_> {
+        // In darkness there is nothing to correct.
+        let local = self.local.as_ref().filter(|_| scale > 0.0);
+        Work {
+            dark: Dark::new(self.dark, scale),
+            local: local.map(|local| (local, 1.0 / scale)),
+        }
+    }
+
+    /// The filters that need the whole field at once, and the scale.
+    fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
+        let plane = self.height * self.width;
+        assert_eq!(field.len(), self.colours * plane);
+        if !scratch.wanted.is_empty() {
+            scratch.wanted.copy_from_slice(field);
+        }
+        if let Some(scratch) = &mut scratch.prefilter {
+            self.prefilter.filter(field, scratch);
+        }
+        scale.unwrap_or_else(|| {
+            let mut most = std::mem::take(&mut scratch.most);
+            let nothing = Work {
+                dark: None,
+                local: None,
+            };
+            self.rows(field, nothing, &mut most, scratch, |_, row, most| {
+                if let Row::Field(values) = row {
+                    most[0] = double_phase::max_norm_sqr(values);
+                }
+            });
+            let scale = most.iter().copied().fold(0.0, f32::max).sqrt();
+            scratch.most = most;
+            scale
+        })
+    }
+
+    /// Hands each row of `field`, worked on, to `then`: its index in the stack, what it is, and its part of `out`,
+    /// which is cut into C·H parts of one size.
+    fn rows<T: Send>(
+        &self,
+        field: &[Complex32],
+        work: Work<'_>,
+        out: &mut [T],
+        scratch: &mut EncoderScratch,
+        then: impl Fn(usize, Row<'_>, &mut [T]) + Sync,
+    ) {
+        let (height, width) = (self.height, self.width);
+        let per_row = out.len() / (self.colours * height);
+        assert!(out.len() == self.colours * height * per_row && (per_row == 1 || per_row == width));
+        let EncoderScratch {
+            wanted, parts, cancel, ..
+        } = scratch;
+        let wanted: &[Complex32] = if wanted.is_empty() { field } else { wanted };
+        let band = height.div_ceil(parts.len());
+        for (colour, out) in out.chunks_exact_mut(height * per_row).enumerate() {
+            if cancel.requested() {
+                return;
+            }
+            let plane = |stack| &<[Complex32]>::as_ref(stack)[colour * height * width..][..height * width];
+            let start = Start {
+                plane: plane(field),
+                height,
+                colour,
+                dark: work.dark,
+                blur: self.prefilter.blur(),
+                light: (self.illumination.as_ref()).map(|(light, modulator)| (light, *modulator)),
+            };
+            let wanted = plane(wanted);
+            out.par_chunks_mut(band * per_row)
+                .zip(&mut *parts)
+                .enumerate()
+                .for_each(|(part, (out, scratch))| {
+                    let rows = part * band..part * band + out.len() / per_row;
+                    let first = rows.start;
+                    let mut then = |y: usize, row: Row<'_>| {
+                        then(colour * height + y, row, &mut out[(y - first) * per_row..][..per_row]);
+                    };
+                    match (work.local, &mut scratch.local) {
+                        (Some((local, per_scale)), Some(of_local)) => {
+                            let wanted = Wanted {
+                                plane: wanted,
+                                per_scale,
+                            };
+                            let then = |y: usize, row: &[Complex32]| then(y, Row::Corrected(row));
+                            local
+                                .filter
+                                .correct(rows, &start, wanted, &mut scratch.start, of_local, then);
+                        }
+                        _ => {
+                            scratch.start.begin(&start, rows.start);
+                            for y in rows {
+                                start.row(y, &mut scratch.row, &mut scratch.start);
+                                then(y, Row::Field(&scratch.row));
+                            }
+                        }
+                    }
+                });
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! AA-DPM's filter: a small Gaussian blur of the complex field, so that neighbours which the
+//! checkerboard pairs are alike (Shi et al., Nature 591, 234, 2021).
+
+use crate::runtime::error::{Error, Result};
+use num_complex::Complex32;
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+
+/// A separable Gaussian of an odd number of taps, its sum 1; edges are repeated.
+pub struct AntiAlias {
+    /// The centre tap and those to one side.
+    taps: Vec<f32>,
+}
+
+impl AntiAlias {
+    /// # Errors
+    /// A `sigma` that is not positive, or a `width` that is even or over 63.
+    pub fn new(sigma: f32, width: usize) -> Result<Self> {
+        if !(sigma > 0.0 && sigma.is_finite()) {
+            return Err(Error::Plan(format!(
+                "an anti-alias sigma of {sigma} px cannot blur; it must be above 0"
+            )));
+        }
+        if width.is_multiple_of(2) || width > 63 {
+            return Err(Error::Plan(format!(
+                "an anti-alias width of {width} px has no centre or is too wide; it must be odd, up to 63"
+            )));
+        }
+        let weight = |i: usize| (-0.5 * (i as f32 / sigma).powi(2)).exp();
+        let half = width / 2;
+        let sum: f32 = weight(0) + 2.0 * (1..=half).map(weight).sum::<f32>();
+        Ok(AntiAlias {
+            taps: (0..=half).map(|i| weight(i) / sum).collect(),
+        })
+    }
+
+    /// The centre tap and those to one side.
+    pub fn taps(&self) -> &[f32] {
+        &self.taps
+    }
+
+    /// Working memory for rows of `width` values, one call at a time: some rows for each part of a plane.
+    pub fn scratch(&self, width: usize) -> AntiAliasScratch {
+        // Rows blurred along themselves, in a ring and behind a part's end, and one blurred both ways.
+        let rows = 3 * (self.taps.len() - 1) + 2;
+        AntiAliasScratch {
+            rows: vec![Complex32::ZERO; 2 * rayon::current_num_threads() * rows * width],
+            part: rows * width,
+        }
+    }
+
+    /// Taps to one side of the centre.
+    pub(in crate::encode) fn half(&self) -> usize {
+        self.taps.len() - 1
+    }
+
+    /// Replaces `plane`, (H, W), by itself blurred. Allocates nothing.
+    pub fn in_place(&self, plane: &mut [Complex32], width: usize, scratch: &mut AntiAliasScratch) {
+        let height = plane.len() / width;
+        let half = self.taps.len() - 1;
+        let count = 2 * half + 1;
+        let AntiAliasScratch { rows, part } = scratch;
+        let band = height.div_ceil(rows.len() / *part);
+        // What parts read of their neighbours, before anyone writes.
+        let before = &*plane;
+        rows.par_chunks_exact_mut(*part)
+            .zip(before.par_chunks(band * width))
+            .enumerate()
+            .for_each(|(part, (own, plane))| {
+                let first = part * band;
+                let end = first + plane.len() / width;
+                let (ring, after) = own.split_at_mut(count * width);
+                let row = |y: usize| &before[y * width..][..width];
+                wide!({
+                    for y in first.saturating_sub(half)..first {
+                        self.blur_row(row(y), &mut ring[y % count * width..][..width]);
+                    }
+                    let behind = end..(end + half).min(height);
+                    for (y, after) in behind.zip(after.chunks_exact_mut(width)) {
+                        self.blur_row(row(y), after);
+                    }
+                });
+            });
+        plane
+            .par_chunks_mut(band * width)
+            .zip(rows.par_chunks_exact_mut(*part))
+            .enumerate()
+            .for_each(|(part, (plane, own))| {
+                let first = part * band;
+                let end = first + plane.len() / width;
+                let (ring, rest) = own.split_at_mut(count * width);
+                let (after, blurred) = rest.split_at_mut(half * width);
+                let mut next = first;
+                for y in first..end {
+                    wide!({
+                        while next <= (y + half).min(height - 1) {
+                            let ring = &mut ring[next % count * width..][..width];
+                            match next.checked_sub(end) {
+                                None => self.blur_row(&plane[(next - first) * width..][..width], ring),
+                                Some(i) => ring.copy_from_slice(&after[i * width..][..width]),
+                            }
+                            next += 1;
+                        }
+                        self.blur_down(ring, y, height, blurred);
+                    });
+                    plane[(y - first) * width..][..width].copy_from_slice(blurred);
+                }
+            });
+    }
+
+    /// Row `y` of `height` blurred, of a ring of rows that are blurred along themselves.
+    #[inline(always)]
+    pub(in crate::encode) fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
+        let width = blurred.len();
+        let count = ring.len() / width;
+        let row = |y: usize| values(&ring[y % count * width..][..width]);
+        // Here, for a store to the row could change what is read anew in each turn.
+        let tap = self.taps[0];
+        for (to, from) in values_mut(blurred).iter_mut().zip(row(y)) {
+            *to = from * tap;
+        }
+        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
+            let (up, down) = (row(y.saturating_sub(i)), row((y + i).min(height - 1)));
+            let sums = values_mut(blurred).iter_mut();
+            for ((to, up), down) in sums.zip(up).zip(down) {
+                *to += (up + down) * tap;
+            }
+        }
+    }
+
+    /// The blur of `plane`, (H, W), value by value: the oracle of the faster forms, to the bit.
+    pub fn filter(&self, plane: &mut [Complex32], width: usize) {
+        let height = plane.len() / width;
+        // What stands `i` places before and after the value at `at`, of `count` that are `step` apart.
+        let pair = |from: &[Complex32], at: usize, i: usize, count: usize, step: usize| {
+            let place = at / step % count;
+            let (before, after) = (place.saturating_sub(i), (place + i).min(count - 1));
+            from[at - (place - before) * step] + from[at + (after - place) * step]
+        };
+        for (count, step) in [(width, 1), (height, width)] {
+            let from = plane.to_vec();
+            for (at, to) in plane.iter_mut().enumerate() {
+                *to = from[at] * self.taps[0];
+                for (i, tap) in self.taps.iter().enumerate().skip(1) {
+                    *to += pair(&from, at, i, count, step) * *tap;
+                }
+            }
+        }
+    }
+
+    /// The blur of `row` along itself into `out`.
+    #[inline(always)]
+    pub(in crate::encode) fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
+        let (last, half) = (row.len() - 1, self.taps.len() - 1);
+        let inner = half..row.len().saturating_sub(half).max(half);
+        for x in (0..half.min(row.len())).chain(inner.end..row.len()) {
+            out[x] = row[x] * self.taps[0];
+            for (i, tap) in self.taps.iter().enumerate().skip(1) {
+                out[x] += (row[x.saturating_sub(i)] + row[(x + i).min(last)]) * *tap;
+            }
+        }
+        if inner.is_empty() {
+            return;
+        }
+        let part = |from: usize| values(&row[from..][..inner.len()]);
+        let out = values_mut(&mut out[inner.clone()]);
+        let tap = self.taps[0];
+        for (to, from) in out.iter_mut().zip(part(half)) {
+            *to = from * tap;
+        }
+        for (i, &tap) in self.taps.iter().enumerate().skip(1) {
+            let sums = out.iter_mut().zip(part(half - i)).zip(part(half + i));
+            for ((to, left), right) in sums {
+                *to += (left + right) * tap;
+            }
+        }
+    }
+}
+
+/// Real and imaginary parts in turn.
+#[inline(always)]
+fn values(row: &[Complex32]) -> &[f32] {
+    bytemuck::cast_slice(row)
+}
+
+#[inline(always)]
+fn values_mut(row: &mut [Complex32]) -> &mut [f32] {
+    bytemuck::cast_slice_mut(row)
+}
+
+/// Working memory of [`AntiAlias::in_place`].
+pub struct AntiAliasScratch {
+    rows: Vec<Complex32>,
+    /// Values of a part.
+    part: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn agrees_with_the_direct_double_sum_edges_included() {
+        for (h, w, sigma, taps) in [
+            (5, 7, 0.7, 3),
+            (1, 4, 0.7, 3),
+            (23, 6, 1.5, 7),
+            (3, 2, 2.0, 9),
+            (4, 4, 1.0, 1),
+        ] {
+            for threads in [1, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| check(h, w, sigma, taps));
+            }
+        }
+    }
+
+    fn check(h: usize, w: usize, sigma: f32, taps: usize) {
+        let plan = AntiAlias::new(sigma, taps).unwrap();
+        let plane: Vec<_> = (0..h * w)
+            .map(|i| Complex32::new((i as f32).sin(), (i as f32 * 2.0).cos()))
+            .collect();
+        let mut naive = plane.clone();
+        plan.filter(&mut naive, w);
+        let mut in_place = plane.clone();
+        plan.in_place(&mut in_place, w, &mut plan.scratch(w));
+        assert_eq!(in_place, naive);
+        let half = taps as i32 / 2;
+        let weight = |i: i32| (-0.5 * (f64::from(i) / f64::from(sigma)).powi(2)).exp();
+        let sum: f64 = (-half..=half).map(weight).sum();
+        for y in 0..h as i32 {
+            for x in 0..w as i32 {
+                let mut expected = Complex32::default();
+                for dy in -half..=half {
+                    for dx in -half..=half {
+                        let yy = (y + dy).clamp(0, h as i32 - 1) as usize;
+                        let xx = (x + dx).clamp(0, w as i32 - 1) as usize;
+                        let k = weight(dx) * weight(dy) / (sum * sum);
+                        expected += plane[yy * w + xx] * k as f32;
+                    }
+                }
+                let got = naive[y as usize * w + x as usize];
+                assert!((got - expected).norm() < 1e-5, "{h}×{w}, {taps} taps: {x},{y}");
+            }
+        }
+    }
+
+    #[test]
+    fn unusable_parameters_are_refused() {
+        assert!(AntiAlias::new(0.0, 3).is_err());
+        assert!(AntiAlias::new(f32::NAN, 3).is_err());
+        assert!(AntiAlias::new(0.7, 4).is_err());
+    }
+}

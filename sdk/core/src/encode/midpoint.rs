@@ -1,0 +1,266 @@
+//! Correction of a phase map at the midpoint: what is shown is taken there, drawn toward the wanted field, and taken
+//! back. Four transforms a colour and step. In video a pixel whose field stands still goes on from the frame before, so
+//! that one step a frame comes to where many lead.
+//!
+//! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture,
+//! and propagation back over the offset) and T the wanted field there over the scale, a step is
+//!
+//!   u = K·L·e,  r = λ·T + (1 − λ)·|T|·u/|u| − u,  z = L·e + γ·Kᴴ·r,  e' = z/|z|.
+//!
+//! λ = 0 asks for the amplitude alone, as Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
+//! focus; λ = 1 asks for the wave, whose phase the eye does not see.
+
+use crate::display::illumination::Illumination;
+use crate::display::target::Target;
+use crate::optics::asm::{Padding, Propagator};
+use crate::optics::fft::ConvolveScratch;
+use crate::optics::zernike::Aberration;
+use crate::runtime::cancel::Cancel;
+use crate::runtime::error::Result;
+use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+
+/// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal
+/// stack.
+pub const WAVE: f32 = 0.5;
+/// How far a step goes.
+pub const GAIN: f32 = 1.5;
+/// A pixel stands still whose field changes by up to so much, of full light.
+pub const STILL: f32 = 0.1;
+/// Most steps. After the third they bring little.
+pub(super) const MAX_STEPS: usize = 100;
+
+/// A plan for one shape and target. Immutable; shared between threads.
+pub struct MidpointSteps {
+    height: usize,
+    width: usize,
+    steps: usize,
+    aperture_radius: f64,
+    /// From the modulator to the midpoint, and to the modulator.
+    back: Vec<Propagator>,
+    forth: Vec<Propagator>,
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
+}
+
+/// Working memory of [`MidpointSteps`] for one call at a time.
+pub struct MidpointScratch {
+    wave: ConvolveScratch,
+    /// The field at the modulator, all colours: of this frame or, between frames, of the one before.
+    field: Vec<Complex32>,
+    /// The phases of the frame before, all colours: NaN where there is none that this one can begin with.
+    before: Vec<f32>,
+    /// T of one colour.
+    wanted: Vec<Complex32>,
+    /// u, then r.
+    missing: Vec<Complex32>,
+    /// L·e.
+    shown: Vec<Complex32>,
+    /// L.
+    light: Vec<f32>,
+    cancel: Cancel,
+}
+
+impl MidpointScratch {
+    /// Has steps end where `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        self.cancel = cancel.clone();
+    }
+}
+
+impl MidpointSteps {
+    /// Plans `steps` for (C, H, W) = `shape` fields at the modulator of `target`.
+    ///
+    /// # Errors
+    /// An offset or correction that cannot be planned.
+    pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Self> {
+        let offset_m = target.display.offset_m();
+        let reversed = target.correction.as_ref().map(Aberration::reversed);
+        // Where there is nothing to do the aperture still is.
+        let ways = |distance_m: f64, correction: Option<&Aberration>| match target
+            .propagators(shape, 1, distance_m, correction)?
+        {
+            Some(ways) => Ok(ways),
+            None => {
+                let (pitch_m, colours) = (target.display.pitch_m(), target.display.wavelengths_m());
+                Propagator::for_colours(shape.0, shape.1, pitch_m, colours, distance_m, Padding::Reach)
+            }
+        };
+        Ok(MidpointSteps {
+            height: shape.0,
+            width: shape.1,
+            steps,
+            aperture_radius: target.display.aperture_radius(),
+            back: ways(-offset_m, reversed.as_ref())?,
+            forth: ways(offset_m, target.correction.as_ref())?,
+            illumination: (target.illumination.clone()).map(|light| (light, target.modulator())),
+        })
+    }
+
+    /// From the modulator to the midpoint, each colour.
+    pub fn back(&self) -> &[Propagator] {
+        &self.back
+    }
+
+    /// From the midpoint to the modulator, each colour.
+    pub fn forth(&self) -> &[Propagator] {
+        &self.forth
+    }
+
+    /// Working memory for one call at a time, for the threads of the current pool.
+    pub fn scratch(&self) -> MidpointScratch {
+        let plane = || vec![Complex32::ZERO; self.height * self.width];
+        let values = self.back.len() * self.height * self.width;
+        MidpointScratch {
+            wave: self.back[0].scratch(),
+            field: vec![Complex32::ZERO; values],
+            before: vec![f32::NAN; values],
+            wanted: plane(),
+            missing: plane(),
+            shown: plane(),
+            light: vec![1.0; self.height * self.width],
+            cancel: Cancel::default(),
+        }
+    }
+
+    /// Keeps `field`, (C, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward.
+    /// Of a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
+    ///
+    /// # Panics
+    /// If `field` has not C·H·W values.
+    pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut MidpointScratch) {
+        assert_eq!(field.len(), scratch.field.len());
+        let bound = past.map_or(-1.0, |scale| (STILL * scale).powi(2));
+        let rows = (scratch.field.par_chunks_exact_mut(self.width))
+            .zip(scratch.before.par_chunks_exact_mut(self.width))
+            .zip(field.par_chunks_exact(self.width));
+        rows.for_each(|((kept, before), field)| {
+            for ((kept, before), field) in kept.iter_mut().zip(before).zip(field) {
+                let still = (field - *kept).norm_sqr() <= bound;
+                *before = if still { *before } else { f32::NAN };
+                *kept = *field;
+            }
+        });
+    }
+
+    /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the field that was kept, of which amplitude `scale` stands for
+    /// full light. A colour whose field has values that are no numbers is left as it is. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `phases` has not C·H·W values.
+    pub fn correct(&self, scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
+        assert_eq!(phases.len(), scratch.field.len());
+        if scale <= 0.0 {
+            scratch.before.fill(f32::NAN);
+            return; // In darkness there is nothing to correct.
+        }
+        let rows = phases
+            .par_chunks_exact_mut(self.width)
+            .zip(scratch.before.par_chunks_exact(self.width));
+        rows.for_each(|(phases, before)| {
+            for (phase, before) in phases.iter_mut().zip(before) {
+                *phase = if before.is_nan() { *phase } else { *before };
+            }
+        });
+        for (colour, phases) in phases.chunks_exact_mut(self.height * self.width).enumerate() {
+            self.correct_colour(colour, 1.0 / scale, phases, scratch);
+        }
+        scratch.before.copy_from_slice(phases);
+    }
+
+    fn correct_colour(&self, colour: usize, per_scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
+        let MidpointScratch {
+            wave,
+            field,
+            before: _,
+            wanted,
+            missing,
+            shown,
+            light,
+            cancel,
+        } = scratch;
+        let (width, radius) = (self.width, self.aperture_radius);
+        if let Some((illumination, modulator)) = &self.illumination {
+            let rows = light.par_chunks_exact_mut(width).enumerate();
+            rows.for_each(|(y, row)| illumination.light_row(row, colour * self.height + y, self.height, *modulator));
+        }
+        wanted.copy_from_slice(&field[colour * phases.len()..][..phases.len()]);
+        self.back[colour].propagate(wanted, wave);
+        if !wanted.par_iter().all(|value| value.is_finite()) {
+            return; // Transforms would spread it over the frame.
+        }
+        let rows =
+            (shown.par_chunks_exact_mut(width).zip(phases.par_chunks_exact(width))).zip(light.par_chunks_exact(width));
+        rows.for_each(|((shown, phases), light)| {
+            for ((shown, phase), light) in shown.iter_mut().zip(phases).zip(light) {
+                *shown = Complex32::from_polar(*light, *phase);
+            }
+        });
+        for _ in 0..self.steps {
+            if cancel.requested() {
+                return;
+            }
+            missing.copy_from_slice(shown);
+            self.back[colour].propagate_through(missing, radius, wave);
+            let rows = missing.par_chunks_exact_mut(width).zip(wanted.par_chunks_exact(width));
+            rows.for_each(|(u, wanted)| wide!(missing_of(u, wanted, per_scale)));
+            self.forth[colour].propagate_through(missing, radius, wave);
+            let rows = (shown.par_chunks_exact_mut(width).zip(missing.par_chunks_exact(width)))
+                .zip(light.par_chunks_exact(width));
+            rows.for_each(|((shown, missing), light)| wide!(step_on(shown, missing, light)));
+        }
+        let rows = phases.par_chunks_exact_mut(width).zip(shown.par_chunks_exact(width));
+        rows.for_each(|(phases, shown)| super::double_phase::phase_row(shown, phases));
+    }
+}
+
+/// r in the place of u.
+#[inline(always)]
+fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
+    for (u, wanted) in u.iter_mut().zip(wanted) {
+        let (re, im) = (wanted.re * per_scale, wanted.im * per_scale);
+        let amplitude = (re * re + im * im).sqrt();
+        let length = (u.re * u.re + u.im * u.im).max(f32::MIN_POSITIVE).sqrt();
+        let keep = (1.0 - WAVE) * amplitude / length - 1.0;
+        u.re = WAVE * re + keep * u.re;
+        u.im = WAVE * im + keep * u.im;
+    }
+}
+
+/// L·e' in the place of L·e.
+#[inline(always)]
+fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
+    for ((shown, missing), light) in shown.iter_mut().zip(missing).zip(light) {
+        let (re, im) = (shown.re + GAIN * missing.re, shown.im + GAIN * missing.im);
+        let length = light / (re * re + im * im).max(f32::MIN_POSITIVE).sqrt();
+        shown.re = re * length;
+        shown.im = im * length;
+    }
+}
+
+/// The same in f64, value by value: the oracle. `to_midpoint` is K and `to_modulator` Kᴴ; `wanted` is T; `shown` is L·e
+/// of the start, `light` L. Gives L·e of the last step.
+pub fn reference(
+    to_midpoint: impl Fn(&[Complex64]) -> Vec<Complex64>,
+    to_modulator: impl Fn(&[Complex64]) -> Vec<Complex64>,
+    wanted: &[Complex64],
+    mut shown: Vec<Complex64>,
+    light: &[f64],
+    steps: usize,
+) -> Vec<Complex64> {
+    let share = f64::from(WAVE);
+    for _ in 0..steps {
+        let u = to_midpoint(&shown);
+        let missing = u.iter().zip(wanted);
+        let missing: Vec<Complex64> = missing
+            .map(|(u, t)| t * share + u / u.norm() * t.norm() * (1.0 - share) - u)
+            .collect();
+        let back = to_modulator(&missing);
+        for ((shown, back), light) in shown.iter_mut().zip(back).zip(light) {
+            let z = *shown + back * f64::from(GAIN);
+            *shown = z / z.norm() * light;
+        }
+    }
+    shown
+}

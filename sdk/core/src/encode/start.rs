@@ -1,0 +1,85 @@
+//! What double phase begins with, row by row: the field with its dark drawn to the real axis, blurred, divided by the
+//! light.
+
+use super::anti_alias::AntiAlias;
+use super::dark::Dark;
+use crate::display::illumination::Illumination;
+use num_complex::Complex32;
+use phasefront_kernels::wide;
+
+/// One plane of a field and what is done to it.
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    /// (H, W).
+    pub(super) plane: &'a [Complex32],
+    pub(super) height: usize,
+    /// 0 red, 1 green, 2 blue; of one laser 0.
+    pub(super) colour: usize,
+    pub(super) dark: Option<Dark>,
+    pub(super) blur: Option<&'a AntiAlias>,
+    /// The light, with (H, W) of the modulator.
+    pub(super) light: Option<(&'a Illumination, (usize, usize))>,
+}
+
+/// Working memory of the rows of a part of a plane.
+pub(super) struct StartScratch {
+    /// Rows blurred along themselves, in a ring.
+    ring: Vec<Complex32>,
+    damped: Vec<Complex32>,
+    /// The next row to be blurred along itself.
+    next: usize,
+}
+
+impl StartScratch {
+    pub(super) fn new(blur: Option<&AntiAlias>, width: usize) -> Self {
+        let kept = blur.map_or(0, |blur| 2 * blur.half() + 1);
+        StartScratch {
+            ring: vec![Complex32::ZERO; kept * width],
+            damped: vec![Complex32::ZERO; width],
+            next: 0,
+        }
+    }
+
+    /// Before rows from `first` on.
+    pub(super) fn begin(&mut self, start: &Start<'_>, first: usize) {
+        self.next = first.saturating_sub(start.blur.map_or(0, AntiAlias::half));
+    }
+}
+
+impl Start<'_> {
+    /// Row `y` into `out`. Rows are asked for in order.
+    pub(super) fn row(&self, y: usize, out: &mut [Complex32], scratch: &mut StartScratch) {
+        let width = out.len();
+        let source = |y: usize| &self.plane[y * width..][..width];
+        let StartScratch { ring, damped, next } = scratch;
+        match (self.blur, self.dark) {
+            (None, None) => out.copy_from_slice(source(y)),
+            (None, Some(dark)) => wide!(dark.draw(source(y), out)),
+            (Some(blur), dark) => wide!({
+                let (half, kept) = (blur.half(), ring.len() / width);
+                while *next <= (y + half).min(self.height - 1) {
+                    let to = &mut ring[*next % kept * width..][..width];
+                    match dark {
+                        None => blur.blur_row(source(*next), to),
+                        Some(dark) => {
+                            dark.draw(source(*next), damped);
+                            blur.blur_row(damped, to);
+                        }
+                    }
+                    *next += 1;
+                }
+                blur.blur_down(ring, y, self.height, out);
+            }),
+        }
+        if let Some((light, modulator)) = self.light {
+            light.divide_row(out, self.colour * self.height + y, self.height, modulator);
+        }
+    }
+
+    /// The light that falls on row `y`.
+    pub(super) fn light_row(&self, y: usize, row: &mut [f32]) {
+        if let Some((light, modulator)) = self.light {
+            light.light_row(row, self.colour * self.height + y, self.height, modulator);
+        }
+    }
+}

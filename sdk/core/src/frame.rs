@@ -1,0 +1,205 @@
+//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth; and the colour
+//! images of cameras that become it.
+//!
+//! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
+
+mod colour;
+mod convert;
+mod plane;
+pub mod reference;
+mod resample;
+
+pub use colour::{ColourFormat, ColourImage, MAX_SOURCE_PIXELS, YuvEncoding, YuvMatrix, check_size};
+
+pub use convert::{ColourPlan, ColourScratch, luminance, yuv_constants};
+pub use plane::{Orientation, Plane, Rotation, View};
+
+pub use resample::{Axis, Crop};
+
+use crate::display::Display;
+use crate::runtime::error::{Error, Result};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+
+/// Colour as amplitude in \[0, 1], (C, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest. C is 3, red, green
+/// and blue, or 1 for a display of one laser.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RgbdFrame {
+    rgb: Array3<f32>,
+    depth: Array2<f32>,
+}
+
+impl RgbdFrame {
+    /// Joins `rgb`, (C, H, W), and `depth`, (H, W).
+    ///
+    /// # Errors
+    /// Shapes that do not fit, an empty frame, or a value that is not finite or outside \[0, 1].
+    pub fn new(rgb: Array3<f32>, depth: Array2<f32>) -> Result<Self> {
+        let (channels, height, width) = rgb.dim();
+        if ![1, 3].contains(&channels) {
+            return Err(Error::Frame(format!(
+                "colour has {channels} planes; it must have 3, for red, green and blue, or 1"
+            )));
+        }
+        if height == 0 || width == 0 {
+            return Err(Error::Frame(format!(
+                "the image is empty ({width}×{height}); each side must be at least 1"
+            )));
+        }
+        if depth.dim() != (height, width) {
+            return Err(Error::Frame(format!(
+                "colour is {width}×{height} and depth {}×{}; they must be alike",
+                depth.dim().1,
+                depth.dim().0
+            )));
+        }
+        for (what, bad) in [
+            ("colour", rgb.iter().find(|v| !(0.0..=1.0).contains(*v))),
+            ("depth", depth.iter().find(|v| !(0.0..=1.0).contains(*v))),
+        ] {
+            if let Some(value) = bad {
+                return Err(Error::Frame(format!(
+                    "{what} holds {value}; every value must lie in 0..=1"
+                )));
+            }
+        }
+        // Copied only where values do not lie row by row already.
+        Ok(RgbdFrame {
+            rgb: match rgb.is_standard_layout() {
+                true => rgb,
+                false => rgb.as_standard_layout().into_owned(),
+            },
+            depth: match depth.is_standard_layout() {
+                true => depth,
+                false => depth.as_standard_layout().into_owned(),
+            },
+        })
+    }
+
+    /// The frame as the lasers of `display` show it. One laser shows the luminance Y of the picture, at amplitude √Y;
+    /// light is the square of amplitude, and Y = 0.2126·R + 0.7152·G + 0.0722·B (Rec. 709). Three lasers show a frame
+    /// of one colour as grey.
+    pub fn for_display(self, display: &Display) -> Self {
+        let (height, width) = self.shape();
+        let rgb = match (self.colours(), display.colours()) {
+            (3, 1) => {
+                let mut amplitude = Array3::zeros((1, height, width));
+                let planes = amplitude.as_slice_mut().zip(self.rgb.as_slice());
+                let (amplitude_values, rgb) = planes.expect("both are made in standard layout");
+                luminance(rgb, amplitude_values);
+                amplitude
+            }
+            (1, 3) => Array3::from_shape_fn((3, height, width), |(_, y, x)| self.rgb[(0, y, x)]),
+            _ => self.rgb,
+        };
+        RgbdFrame { rgb, depth: self.depth }
+    }
+
+    /// A black frame of `colours` at the far end of the volume.
+    pub fn black(colours: usize, (height, width): (usize, usize)) -> Self {
+        RgbdFrame {
+            rgb: Array3::zeros((colours, height, width)),
+            depth: Array2::ones((height, width)),
+        }
+    }
+
+    /// Colour and depth to write into; what is written must be in \[0, 1].
+    pub fn planes_mut(&mut self) -> (&mut [f32], &mut [f32]) {
+        let planes = self.rgb.as_slice_mut().zip(self.depth.as_slice_mut());
+        planes.expect("both are made in standard layout")
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.depth.dim()
+    }
+
+    /// How many colours it has, C: 3 or 1.
+    pub fn colours(&self) -> usize {
+        self.rgb.dim().0
+    }
+
+    /// The amplitudes, (C, H, W), contiguous.
+    pub fn rgb(&self) -> ArrayView3<'_, f32> {
+        self.rgb.view()
+    }
+
+    /// The normalized depth, (H, W), contiguous.
+    pub fn depth(&self) -> ArrayView2<'_, f32> {
+        self.depth.view()
+    }
+
+    /// The amplitudes and the normalized depth as they lie in memory.
+    pub fn values(&self) -> (&[f32], &[f32]) {
+        let contiguous = "standard layout";
+        (
+            self.rgb.as_slice().expect(contiguous),
+            self.depth.as_slice().expect(contiguous),
+        )
+    }
+
+    /// # Errors
+    /// Another shape than a plan's, or other colours.
+    pub fn check(&self, plan: (usize, usize), colours: usize) -> Result<()> {
+        let (height, width) = self.shape();
+        if (height, width) != plan {
+            return Err(Error::Frame(format!(
+                "the frame is {width}×{height}; this plan takes {}×{}",
+                plan.1, plan.0
+            )));
+        }
+        if self.colours() != colours {
+            return Err(Error::Frame(format!(
+                "the frame's colours are {}; this plan takes {colours}, as RgbdFrame::for_display gives them",
+                self.colours()
+            )));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn message(rgb: Array3<f32>, depth: Array2<f32>) -> String {
+        RgbdFrame::new(rgb, depth).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn one_laser_shows_the_luminance() {
+        let one = Display::from_toml("wavelengths_nm = [532]").unwrap();
+        let rgb = Array3::from_shape_fn((3, 2, 4), |(c, y, x)| (c * 8 + y * 4 + x) as f32 / 24.0);
+        let depth = Array2::from_shape_fn((2, 4), |(y, x)| (y * 4 + x) as f32 / 8.0);
+        let frame = RgbdFrame::new(rgb.clone(), depth).unwrap();
+        let shown = frame.clone().for_display(&one);
+        assert_eq!((shown.colours(), shown.depth()), (1, frame.depth()));
+        for ((_, y, x), amplitude) in shown.rgb().indexed_iter() {
+            let light = |c| f64::from(rgb[(c, y, x)]).powi(2);
+            let luminance = 0.2126 * light(0) + 0.7152 * light(1) + 0.0722 * light(2);
+            assert!((f64::from(*amplitude) - luminance.sqrt()).abs() < 1e-6);
+        }
+        assert_eq!(shown.clone().for_display(&one), shown);
+        assert_eq!(frame.clone().for_display(&Display::default()), frame);
+        let grey = shown.clone().for_display(&Display::default());
+        assert!(
+            grey.rgb()
+                .outer_iter()
+                .all(|plane| plane == shown.rgb().index_axis(ndarray::Axis(0), 0))
+        );
+        assert!(frame.check((2, 4), 1).unwrap_err().to_string().contains("for_display"));
+    }
+
+    #[test]
+    fn unusable_frames_are_named() {
+        let rgb = || Array3::zeros((3, 2, 4));
+        let depth = || Array2::zeros((2, 4));
+        assert!(message(Array3::zeros((4, 2, 4)), depth()).contains("4 planes"));
+        assert!(message(Array3::zeros((3, 0, 4)), Array2::zeros((0, 4))).contains("empty"));
+        assert!(message(rgb(), Array2::zeros((4, 2))).contains("4×2 and depth 2×4"));
+        for bad in [f32::NAN, f32::INFINITY, -0.1, 1.1] {
+            assert!(message(rgb(), depth() + bad).starts_with("frame: depth"));
+            assert!(message(rgb() + bad, depth()).starts_with("frame: colour"));
+        }
+    }
+}

@@ -1,0 +1,346 @@
+//! Camera images to amplitudes at the display's resolution: turned upright, cropped, resized and converted in one
+//! pass over the image. [`super::reference`] is its oracle.
+
+use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix, check_size};
+use super::plane::View;
+use super::plane::{Orientation, Plane};
+use super::resample::{Axis, Crop};
+use crate::runtime::error::{Error, Result};
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+
+/// Bands of rows for each thread, so that a delayed thread leaves the others work to take.
+const BANDS_PER_THREAD: usize = 4;
+
+/// A plan for one image format and size, orientation and output shape. Immutable; shared between threads.
+pub struct ColourPlan {
+    format: ColourFormat,
+    sensor: (usize, usize),
+    orientation: Orientation,
+    out: (usize, usize),
+    luma: Axes,
+    /// None where every channel has every pixel.
+    chroma: Option<Axes>,
+}
+
+struct Axes {
+    x: Axis,
+    y: Axis,
+}
+
+/// Working memory of a [`ColourPlan`] for one call at a time.
+pub struct ColourScratch {
+    rows: Vec<f32>,
+    bands: usize,
+}
+
+/// Where one channel lies: its plane, the byte of a pixel in it, and how it is resampled.
+struct Channel<'a> {
+    plane: Plane<'a>,
+    byte: usize,
+    axes: &'a Axes,
+    sensor: (usize, usize),
+}
+
+impl ColourPlan {
+    /// Plans the way of images as `image`, turned by `orientation`, to (`height`, `width`) amplitudes, which show
+    /// [`Crop::cover`] of it.
+    ///
+    /// # Errors
+    /// An empty output.
+    pub fn new(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Result<Self> {
+        Self::for_format(image.format(), image.shape(), orientation, height, width)
+    }
+
+    /// [`ColourPlan::new`] for images of that `format` and (H, W).
+    ///
+    /// # Errors
+    /// An empty or too large image, or an empty output.
+    pub fn for_format(
+        format: ColourFormat,
+        sensor: (usize, usize),
+        orientation: Orientation,
+        height: usize,
+        width: usize,
+    ) -> Result<Self> {
+        check_size("colour", sensor.1, sensor.0)?;
+        if height == 0 || width == 0 {
+            return Err(Error::Plan(format!(
+                "a frame of {width}×{height} is empty; each side must be at least 1"
+            )));
+        }
+        let upright = orientation.upright_shape(sensor.0, sensor.1);
+        let crop = Crop::cover(upright, (height, width));
+        let chroma = format.layout().get(1).map(|(_, _, share)| {
+            let half = |n: usize| n.div_ceil(*share);
+            // Of an odd side the last chroma sample reaches beyond the picture, at its far end or, flipped, at its
+            // near.
+            let from = |from: f64, side: usize, flipped: bool| {
+                from / 2.0
+                    + match flipped {
+                        true => half(side) as f64 - side as f64 / 2.0,
+                        false => 0.0,
+                    }
+            };
+            let flips = orientation.flips();
+            let x = from(crop.x, upright.1, flips.0);
+            let y = from(crop.y, upright.0, flips.1);
+            Axes {
+                x: Axis::new(half(upright.1), x, crop.width / 2.0, width),
+                y: Axis::new(half(upright.0), y, crop.height / 2.0, height),
+            }
+        });
+        Ok(ColourPlan {
+            format,
+            sensor,
+            orientation,
+            out: (height, width),
+            luma: Axes {
+                x: Axis::new(upright.1, crop.x, crop.width, width),
+                y: Axis::new(upright.0, crop.y, crop.height, height),
+            },
+            chroma,
+        })
+    }
+
+    /// Whether the plan is for images as `image` turned by `orientation`. Strides do not matter.
+    pub fn fits(&self, image: &ColourImage<'_>, orientation: Orientation) -> bool {
+        (self.format, self.sensor, self.orientation) == (image.format(), image.shape(), orientation)
+    }
+
+    /// (H, W) of the amplitudes.
+    pub fn shape(&self) -> (usize, usize) {
+        self.out
+    }
+
+    /// How the first channel is resampled along x and along y, and how the other two are.
+    pub fn axes(&self) -> [&Axis; 4] {
+        let chroma = self.chroma.as_ref().unwrap_or(&self.luma);
+        [&self.luma.x, &self.luma.y, &chroma.x, &chroma.y]
+    }
+
+    /// Of each channel of `image`: its plane, and where the upright picture's bytes of it lie there.
+    pub fn views(&self, image: &ColourImage<'_>) -> [(usize, View); 3] {
+        let planes = match self.format {
+            ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => [0; 3],
+            ColourFormat::Nv12(_) => [0, 1, 1],
+            ColourFormat::Yuv420(_) => [0, 1, 2],
+        };
+        let channels = self.channels(image);
+        std::array::from_fn(|c| {
+            let channel = &channels[c];
+            let view = self.orientation.view(&channel.plane, channel.sensor);
+            let origin = view.origin + channel.byte;
+            (planes[c], View { origin, ..view })
+        })
+    }
+
+    /// Working memory for one call at a time, sized for the current thread pool.
+    pub fn scratch(&self) -> ColourScratch {
+        let bands = match rayon::current_num_threads() {
+            1 => 1,
+            threads => (threads * BANDS_PER_THREAD).min(self.out.0),
+        };
+        ColourScratch {
+            rows: vec![0.0; bands * self.luma.x.needed().len().max(self.chroma_row())],
+            bands,
+        }
+    }
+
+    fn chroma_row(&self) -> usize {
+        self.chroma.as_ref().map_or(0, |axes| axes.x.needed().len())
+    }
+
+    /// The amplitudes of `image` into `rgb`, (3, H, W) in \[0, 1], on the current thread pool. Allocates nothing.
+    ///
+    /// # Errors
+    /// An image that the plan does not fit.
+    ///
+    /// # Panics
+    /// If `rgb` has not 3·H·W values.
+    pub fn convert(&self, image: &ColourImage<'_>, rgb: &mut [f32], scratch: &mut ColourScratch) -> Result<()> {
+        if !self.fits(image, self.orientation) {
+            return Err(Error::Frame(format!(
+                "the image is {:?} of {}×{}; this plan takes {:?} of {}×{}",
+                image.format(),
+                image.shape().1,
+                image.shape().0,
+                self.format,
+                self.sensor.1,
+                self.sensor.0
+            )));
+        }
+        let (height, width) = self.out;
+        assert_eq!(rgb.len(), 3 * height * width);
+        let channels = self.channels(image);
+        let band = height.div_ceil(scratch.bands);
+        let piece = scratch.rows.len() / scratch.bands;
+        let (red, others) = rgb.split_at_mut(height * width);
+        let (green, blue) = others.split_at_mut(height * width);
+        (red.par_chunks_mut(band * width))
+            .zip(green.par_chunks_mut(band * width))
+            .zip(blue.par_chunks_mut(band * width))
+            .zip(scratch.rows.par_chunks_mut(piece))
+            .enumerate()
+            .for_each(|(part, (((red, green), blue), row))| {
+                let rows = (red.chunks_exact_mut(width))
+                    .zip(green.chunks_exact_mut(width))
+                    .zip(blue.chunks_exact_mut(width));
+                for (y, ((red, green), blue)) in rows.enumerate() {
+                    let y = part * band + y;
+                    let mut out = [&mut *red, &mut *green, &mut *blue];
+                    for (channel, out) in channels.iter().zip(&mut out) {
+                        channel.row(y, self.orientation, row, out);
+                    }
+                    to_amplitude(self.format, out);
+                }
+            });
+        Ok(())
+    }
+
+    /// Red, green, blue or Y, U, V of `image`.
+    fn channels<'a>(&'a self, image: &ColourImage<'a>) -> [Channel<'a>; 3] {
+        let bytes = match self.format {
+            ColourFormat::Rgba | ColourFormat::Rgb => [(0, 0), (0, 1), (0, 2)],
+            ColourFormat::Bgra => [(0, 2), (0, 1), (0, 0)],
+            ColourFormat::Nv12(_) => [(0, 0), (1, 0), (1, 1)],
+            ColourFormat::Yuv420(_) => [(0, 0), (1, 0), (2, 0)],
+        };
+        bytes.map(|(plane, byte)| match (&self.chroma, plane) {
+            (Some(axes), 1..) => Channel {
+                plane: image.planes()[plane],
+                byte,
+                axes,
+                sensor: (self.sensor.0.div_ceil(2), self.sensor.1.div_ceil(2)),
+            },
+            _ => Channel {
+                plane: image.planes()[plane],
+                byte,
+                axes: &self.luma,
+                sensor: self.sensor,
+            },
+        })
+    }
+}
+
+impl Channel<'_> {
+    /// Output row `y` of the channel into `out`, 0..=255, by way of `row`.
+    fn row(&self, y: usize, orientation: Orientation, row: &mut [f32], out: &mut [f32]) {
+        let view = orientation.view(&self.plane, self.sensor);
+        let needed = self.axes.x.needed();
+        let row = &mut row[..needed.len()];
+        row.fill(0.0);
+        for (source, weight) in self.axes.y.taps(y) {
+            if weight > 0.0 {
+                let first = view.at(needed.start, source) + self.byte;
+                add_samples(self.plane.bytes, first, view.step_x, weight, row);
+            }
+        }
+        self.axes.x.apply(row, needed.start, out);
+    }
+}
+
+/// Adds `weight` times the bytes from `first` on, `step` apart, to `sum`.
+fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [f32]) {
+    fn apart<const N: usize>(bytes: &[u8], weight: f32, sum: &mut [f32]) {
+        let (last, sum) = match sum.split_last_mut() {
+            Some(split) => split,
+            None => return,
+        };
+        let (pixels, rest) = bytes.as_chunks::<N>();
+        for (sum, pixel) in sum.iter_mut().zip(pixels) {
+            *sum += weight * f32::from(pixel[0]);
+        }
+        // Behind the last sample the memory may end.
+        let end = match sum.len() < pixels.len() {
+            true => pixels[sum.len()][0],
+            false => rest[0],
+        };
+        *last += weight * f32::from(end);
+    }
+    match step {
+        1 => apart::<1>(&bytes[first..], weight, sum),
+        2 => apart::<2>(&bytes[first..], weight, sum),
+        3 => apart::<3>(&bytes[first..], weight, sum),
+        4 => apart::<4>(&bytes[first..], weight, sum),
+        _ => {
+            let mut at = first;
+            for sum in sum {
+                *sum += weight * f32::from(bytes[at]);
+                at = at.wrapping_add_signed(step);
+            }
+        }
+    }
+}
+
+/// The amplitudes of one laser, (H, W), that shows the luminance of `rgb`, (3, H, W): √(Σ w·a²) with the weights of
+/// Rec. 709, for light is the square of amplitude. Allocates nothing.
+///
+/// # Panics
+/// If `rgb` has not three times as many values.
+pub fn luminance(rgb: &[f32], amplitude: &mut [f32]) {
+    const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
+    const PART: usize = 1 << 14;
+    let size = amplitude.len();
+    assert_eq!(rgb.len(), 3 * size);
+    amplitude
+        .par_chunks_mut(PART)
+        .enumerate()
+        .for_each(|(part, amplitude)| {
+            let plane = |c: usize| &rgb[c * size + part * PART..][..amplitude.len()];
+            let (red, green, blue) = (plane(0), plane(1), plane(2));
+            wide!({
+                for (((to, r), g), b) in amplitude.iter_mut().zip(red).zip(green).zip(blue) {
+                    let light = WEIGHTS[0] * r * r + WEIGHTS[1] * g * g + WEIGHTS[2] * b * b;
+                    *to = light.sqrt().min(1.0);
+                }
+            });
+        });
+}
+
+/// Luma's and chroma's offset and factor to 0..=1 and −½..=½, and the matrix's red-V, green-U, green-V and blue-U.
+pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
+    let (kr, kb) = match encoding.matrix {
+        YuvMatrix::Bt601 => (0.299f32, 0.114f32),
+        YuvMatrix::Bt709 => (0.2126, 0.0722),
+    };
+    let kg = 1.0 - kr - kb;
+    let levels = match encoding.video_range {
+        true => [16.0, 1.0 / 219.0, 128.0, 1.0 / 224.0],
+        false => [0.0, 1.0 / 255.0, 128.0, 1.0 / 255.0],
+    };
+    (
+        levels,
+        [
+            2.0 * (1.0 - kr),
+            -2.0 * kb * (1.0 - kb) / kg,
+            -2.0 * kr * (1.0 - kr) / kg,
+            2.0 * (1.0 - kb),
+        ],
+    )
+}
+
+/// Rows of red, green, blue or Y, U, V, 0..=255, to amplitudes in \[0, 1].
+fn to_amplitude(format: ColourFormat, [first, second, third]: [&mut [f32]; 3]) {
+    match format {
+        ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => {
+            for row in [first, second, third] {
+                for value in row {
+                    *value = (*value * (1.0 / 255.0)).clamp(0.0, 1.0);
+                }
+            }
+        }
+        ColourFormat::Nv12(encoding) | ColourFormat::Yuv420(encoding) => {
+            let (levels, [red_v, green_u, green_v, blue_u]) = yuv_constants(encoding);
+            let [black, luma, grey, chroma] = levels;
+            for ((a, b), c) in first.iter_mut().zip(second).zip(third) {
+                let y = (*a - black) * luma;
+                let u = (*b - grey) * chroma;
+                let v = (*c - grey) * chroma;
+                *a = (y + red_v * v).clamp(0.0, 1.0);
+                *b = (y + green_u * u + green_v * v).clamp(0.0, 1.0);
+                *c = (y + blue_u * u).clamp(0.0, 1.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,236 @@
+//! How the hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
+
+pub mod network;
+pub mod seeded;
+pub mod sweep;
+
+use crate::depth::sharpness;
+use crate::display::Display;
+use crate::frame::RgbdFrame;
+use crate::method::network::{Engine, InputKind, Network, NetworkPlan, NetworkScratch};
+use crate::method::seeded::{SeededPlan, SeededScratch};
+use crate::method::sweep::{Sweep, SweepPlan, SweepScratch};
+use crate::runtime::cancel::Cancel;
+use crate::runtime::error::{Error, Result};
+use num_complex::Complex32;
+use std::sync::Arc;
+
+/// What makes the hologram.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Method {
+    /// A trained network for RGB-D frames.
+    Network(Arc<Network>),
+    /// The plane sweep, for any display.
+    Sweep(Sweep),
+    /// The plane sweep, corrected by a network trained on it.
+    Seeded(Arc<Network>),
+    /// For each frame what suits its depth ([`sharpness::measure`]): the plane sweep where it is clean, the trained
+    /// network where it is noisy or incomplete.
+    Auto(Sweep, Arc<Network>),
+}
+
+impl Method {
+    /// A trained network as its input asks for.
+    pub fn trained(network: Arc<Network>) -> Self {
+        match network.input() {
+            InputKind::Seeded => Method::Seeded(network),
+            _ => Method::Network(network),
+        }
+    }
+
+    /// Whether it suits `display`.
+    pub fn check(&self, display: &Display) -> Result<()> {
+        let (network, input) = match self {
+            Method::Sweep(_) => return Ok(()),
+            Method::Network(network) if network.input() == InputKind::RgbdXy => (network, InputKind::RgbdXy),
+            Method::Network(network) => (network, InputKind::Rgbd),
+            Method::Seeded(network) => (network, InputKind::Seeded),
+            Method::Auto(_, network) => {
+                return Method::trained(network.clone()).check(display);
+            }
+        };
+        check_input(network, input)?;
+        network.check_display(display)
+    }
+}
+
+/// Plans `sweep` for (`height`, `width`) frames, on to a display that is not far away, else to the midpoint.
+pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
+    let offset_m = display.offset_m();
+    let z_m = match sweep::reaches(display, offset_m) {
+        true => offset_m,
+        false => 0.0,
+    };
+    SweepPlan::new(height, width, display, sweep, z_m)
+}
+
+/// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
+pub struct MethodPlan {
+    shape: (usize, usize),
+    colours: usize,
+    way: Way,
+}
+
+enum Way {
+    Network(Box<NetworkPlan>),
+    Sweep(Box<SweepPlan>),
+    Seeded(Box<SeededPlan>),
+    Auto(Box<SweepPlan>, Box<MethodPlan>),
+}
+
+/// Working memory of a [`MethodPlan`] for one frame at a time.
+pub struct MethodScratch(Scratch);
+
+enum Scratch {
+    Network(NetworkScratch),
+    Sweep(SweepScratch),
+    Seeded(SeededScratch),
+    Auto {
+        sweep: SweepScratch,
+        trained: Box<MethodScratch>,
+        /// Whether the frame before was sharp.
+        was_sharp: Option<bool>,
+    },
+}
+
+impl MethodScratch {
+    /// Has frames end where `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        match &mut self.0 {
+            Scratch::Network(scratch) => scratch.set_cancel(cancel),
+            Scratch::Sweep(scratch) => scratch.set_cancel(cancel),
+            Scratch::Seeded(scratch) => scratch.set_cancel(cancel),
+            Scratch::Auto { sweep, trained, .. } => {
+                sweep.set_cancel(cancel);
+                trained.set_cancel(cancel);
+            }
+        }
+    }
+}
+
+impl MethodPlan {
+    /// Plans `method` for (`height`, `width`) frames and the volume of `display`.
+    ///
+    /// # Errors
+    /// A network for layered input or for another display, or a method that cannot be planned for this shape.
+    pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
+        method.check(display)?;
+        let way = match method {
+            Method::Network(network) => Way::Network(Box::new(network.plan_for(height, width, display)?)),
+            Method::Seeded(network) => {
+                let plan = SeededPlan::new(height, width, &network, display)?;
+                Way::Seeded(Box::new(plan))
+            }
+            Method::Sweep(sweep) => Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
+            Method::Auto(sweep, network) => {
+                // Both end where the network does.
+                let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
+                let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
+                Way::Auto(Box::new(sweep), Box::new(trained))
+            }
+        };
+        Ok(MethodPlan {
+            shape: (height, width),
+            colours: display.colours(),
+            way,
+        })
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.shape
+    }
+
+    /// Where the hologram stands, metres from the midpoint toward the viewer: a sweep goes on to a display that is not
+    /// far away, all else ends at the midpoint.
+    pub fn z_m(&self) -> f64 {
+        match &self.way {
+            Way::Network(_) | Way::Seeded(_) | Way::Auto(..) => 0.0,
+            Way::Sweep(plan) => plan.z_m(),
+        }
+    }
+
+    /// What runs the network, and why; None for a method without one.
+    pub fn engine(&self) -> Option<&Engine> {
+        match &self.way {
+            Way::Network(plan) => Some(plan.engine()),
+            Way::Seeded(plan) => Some(plan.engine()),
+            Way::Auto(_, trained) => trained.engine(),
+            Way::Sweep(_) => None,
+        }
+    }
+
+    /// Working memory for one frame at a time.
+    pub fn scratch(&self) -> MethodScratch {
+        MethodScratch(match &self.way {
+            Way::Network(plan) => Scratch::Network(plan.scratch()),
+            Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
+            Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
+            Way::Auto(sweep, trained) => Scratch::Auto {
+                sweep: sweep.scratch(),
+                trained: Box::new(trained.scratch()),
+                was_sharp: None,
+            },
+        })
+    }
+
+    /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (C, H, W).
+    ///
+    /// # Errors
+    /// A frame of another shape or of other colours, or a `field` that has not C·H·W values.
+    ///
+    /// # Panics
+    /// If `scratch` is another plan's.
+    pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
+        self.field_after(false, frame, field, scratch)
+    }
+
+    /// [`Self::field`] of a frame that `follows` the one before, as video does: a method that is chosen frame by frame
+    /// does not go to and fro.
+    pub(crate) fn field_after(
+        &self,
+        follows: bool,
+        frame: &RgbdFrame,
+        field: &mut [Complex32],
+        scratch: &mut MethodScratch,
+    ) -> Result<()> {
+        frame.check(self.shape, self.colours)?;
+        match (&self.way, &mut scratch.0) {
+            (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
+            (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
+            (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
+            (
+                Way::Auto(sweep, trained),
+                Scratch::Auto {
+                    sweep: of_sweep,
+                    trained: of_trained,
+                    was_sharp,
+                },
+            ) => {
+                let measured = sharpness::measure(frame);
+                let is_sharp = match was_sharp.filter(|_| follows) {
+                    Some(was) => measured.stays_sharp(was),
+                    None => measured.is_sharp(),
+                };
+                *was_sharp = Some(is_sharp);
+                match is_sharp {
+                    true => sweep.field(frame, field, of_sweep),
+                    false => trained.field(frame, field, of_trained),
+                }
+            }
+            _ => panic!("the scratch is another plan's"),
+        }
+    }
+}
+
+/// Checks that `network` takes `input`.
+fn check_input(network: &Network, input: InputKind) -> Result<()> {
+    if network.input() != input {
+        return Err(Error::Network(format!(
+            "its input is '{}'; this method needs a network for '{input}'",
+            network.input()
+        )));
+    }
+    Ok(())
+}

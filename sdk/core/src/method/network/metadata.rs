@@ -1,0 +1,313 @@
+//! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
+
+use super::Head;
+use super::proto::Entry;
+use crate::display::Display;
+use crate::method::sweep::MAX_PLANES;
+use crate::runtime::error::Error;
+use crate::runtime::error::Result;
+
+/// What a network's input planes are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InputKind {
+    /// "rgbd": red, green, blue and normalized depth, each minus 0.5.
+    Rgbd,
+    /// "rgbdxy": as [`InputKind::Rgbd`], then the place in the frame, x and y, from −½ at the first pixel's outer edge
+    /// to ½ at the last one's: for aberrations that differ over it.
+    RgbdXy,
+    /// "ldi2" to "ldi9": that many layers front first, each as [`InputKind::Rgbd`].
+    Ldi {
+        /// How many layers.
+        layers: usize,
+    },
+    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see `seeded.rs`.
+    Seeded,
+    /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
+    Field,
+    /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network
+    /// is small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
+    BlurredField,
+    /// "split-blurred-field": the same in two parts, for networks whose input is rounded to 8 bits: its six planes in
+    /// steps of [`InputKind::SPLIT_STEP`], then of each what is left, [`InputKind::REMAINDER_GAIN`] times.
+    SplitBlurredField,
+}
+
+impl InputKind {
+    /// The steps that a split field is rounded to in its first part.
+    pub const SPLIT_STEP: f32 = 1.0 / 64.0;
+    /// What the remainders of a split field are multiplied by.
+    pub const REMAINDER_GAIN: f32 = 16.0;
+
+    /// A value of a field in the two parts of a split one: `value = first + second / REMAINDER_GAIN`.
+    #[inline(always)]
+    pub fn split(value: f32) -> (f32, f32) {
+        let first = (value / Self::SPLIT_STEP).round_ties_even() * Self::SPLIT_STEP;
+        (first, Self::REMAINDER_GAIN * (value - first))
+    }
+
+    /// Planes of the input.
+    pub fn channels(self) -> usize {
+        match self {
+            InputKind::Rgbd => 4,
+            InputKind::RgbdXy => 6,
+            InputKind::Ldi { layers } => 4 * layers,
+            InputKind::Seeded => 10,
+            InputKind::Field | InputKind::BlurredField => 6,
+            InputKind::SplitBlurredField => 12,
+        }
+    }
+
+    /// Whether a plane of it holds depth.
+    pub(super) fn is_depth(self, plane: usize) -> bool {
+        match self {
+            InputKind::Rgbd | InputKind::RgbdXy | InputKind::Seeded => plane == 3,
+            InputKind::Ldi { .. } => plane % 4 == 3,
+            InputKind::Field | InputKind::BlurredField | InputKind::SplitBlurredField => false,
+        }
+    }
+
+    /// Whether a network for it is a pre-filter.
+    pub fn is_field(self) -> bool {
+        self == InputKind::Field || self.is_blurred()
+    }
+
+    /// Whether what it reads is a field that the blur of AA-DPM has gone over.
+    pub fn is_blurred(self) -> bool {
+        matches!(self, InputKind::BlurredField | InputKind::SplitBlurredField)
+    }
+
+    fn from_name(name: &str) -> Option<InputKind> {
+        match name.as_bytes() {
+            b"rgbd" => Some(InputKind::Rgbd),
+            b"rgbdxy" => Some(InputKind::RgbdXy),
+            b"seeded" => Some(InputKind::Seeded),
+            b"field" => Some(InputKind::Field),
+            b"blurred-field" => Some(InputKind::BlurredField),
+            b"split-blurred-field" => Some(InputKind::SplitBlurredField),
+            [b'l', b'd', b'i', n @ b'2'..=b'9'] => Some(InputKind::Ldi {
+                layers: usize::from(n - b'0'),
+            }),
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for InputKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            InputKind::Rgbd => f.write_str("rgbd"),
+            InputKind::RgbdXy => f.write_str("rgbdxy"),
+            InputKind::Ldi { layers } => write!(f, "ldi{layers}"),
+            InputKind::Seeded => f.write_str("seeded"),
+            InputKind::Field => f.write_str("field"),
+            InputKind::BlurredField => f.write_str("blurred-field"),
+            InputKind::SplitBlurredField => f.write_str("split-blurred-field"),
+        }
+    }
+}
+
+/// What `phasefront.input` may be.
+const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
+
+/// How far the modulator may stand from where a pre-filter was trained for, as at the display it was trained for: what
+/// light spreads over it stays below a tenth of a pixel of 8 µm.
+const OFFSET_TOLERANCE_M: f64 = 20e-6;
+/// How far λ·V/p² may lie over what a network was trained for, relative.
+const RANGE_TOLERANCE: f64 = 0.02;
+/// How far a colour's own λ·V/p² may lie from the mean over the colours, relative: 35 dB from its exact hologram, which
+/// is more than networks have.
+const COLOUR_TOLERANCE: f64 = 0.05;
+
+/// The display that a network was trained for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrainedDisplay {
+    /// Pixel pitch of the modulator, metres.
+    pub pitch_m: f64,
+    /// Wavelengths of red, green and blue, metres.
+    pub wavelengths_m: [f64; 3],
+    /// Depth of the volume, metres.
+    pub volume_depth_m: f64,
+    /// Distance of the hologram plane from the volume's middle, metres; 0 for a midpoint hologram.
+    pub offset_m: f64,
+    /// Whether its holograms correct an aberration of the display's optics, so that they are for it alone.
+    pub corrected: bool,
+}
+
+/// How a network serves a display.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Served {
+    /// What depths are stretched by about the middle of the volume.
+    pub(super) scale: f64,
+    /// Of a display of one laser, the colour whose output is its field: 0 red, 1 green, 2 blue.
+    pub(super) colour: Option<usize>,
+}
+
+impl TrainedDisplay {
+    /// What depths d of frames for `display` are stretched by about the middle of the volume, d' = ½ + s·(d − ½), for a
+    /// network for this display to give their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over the colours.
+    ///
+    /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display
+    /// of another pitch, volume or laser is one for this display with its depth stretched. One laser takes the output
+    /// of one colour: the nearest of those whose depths were trained as far as the display's reach.
+    ///
+    /// # Errors
+    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch;
+    /// any other display where an aberration is corrected.
+    pub(super) fn serve(&self, display: &Display) -> Result<Served> {
+        let trained = self.pitch_m.powi(2) / self.volume_depth_m;
+        let given = display.volume_depth_m() / display.pitch_m().powi(2);
+        let of_colour = |(trained_m, given_m): (f64, &f64)| given_m / trained_m * given * trained;
+        let lasers = self
+            .wavelengths_m
+            .into_iter()
+            .zip(display.wavelengths_m().iter().cycle());
+        let mut each: Vec<f64> = lasers.map(of_colour).collect();
+        let colour = (display.colours() == 1).then(|| nearest(&self.wavelengths_m, display.wavelengths_m()[0], &each));
+        if let Some(colour) = colour {
+            each = vec![each[colour]];
+        }
+        let scale = each.iter().sum::<f64>() / each.len() as f64;
+        let same = |trained: f64, given: f64| (trained - given).abs() <= RANGE_TOLERANCE * trained;
+        if self.corrected && !(same(self.pitch_m, display.pitch_m()) && each.iter().all(|own| same(1.0, *own))) {
+            return Err(Error::Network(format!(
+                "it corrects the optics of one display, of {:.3} µm and {:.3} mm, and serves no other; train one for this display",
+                self.pitch_m * 1e6,
+                self.volume_depth_m * 1e3
+            )));
+        }
+        if each.iter().any(|own| (own - scale).abs() > COLOUR_TOLERANCE * scale) {
+            let nm = |all: &[f64]| (all.iter().map(|m| format!("{:.0}", m * 1e9)).collect::<Vec<_>>()).join(", ");
+            return Err(Error::Network(format!(
+                "it was trained for wavelengths of {} nm, the display has {}; train one for this display, or use a method without a network",
+                nm(&self.wavelengths_m),
+                nm(display.wavelengths_m())
+            )));
+        }
+        if scale > 1.0 + RANGE_TOLERANCE {
+            return Err(Error::Network(format!(
+                "it was trained for depths of {:.3} mm at a pitch of {:.3} µm, the display's {:.3} mm at {:.3} µm need {scale:.2} times the range; train one for this display, or use a method without a network",
+                self.volume_depth_m * 1e3,
+                self.pitch_m * 1e6,
+                display.volume_depth_m() * 1e3,
+                display.pitch_m() * 1e6
+            )));
+        }
+        Ok(Served { scale, colour })
+    }
+
+    /// Checks that a pre-filter for this display is one for `display`: that λ·offset/p² is the same.
+    ///
+    /// # Errors
+    /// As [`Self::serve`], or an offset that differs by over 20 µm at the pitch it was trained for.
+    pub(super) fn check_offset(&self, display: &Display) -> Result<()> {
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+        let trained_m = match self.serve(display)?.colour {
+            Some(colour) => self.wavelengths_m[colour],
+            None => mean(&self.wavelengths_m),
+        };
+        let finer = (self.pitch_m / display.pitch_m()).powi(2);
+        let longer = mean(display.wavelengths_m()) / trained_m;
+        let (trained, given) = (self.offset_m, display.offset_m());
+        if (trained - given * finer * longer).abs() > OFFSET_TOLERANCE_M {
+            return Err(Error::Network(format!(
+                "the pre-filter was trained for an offset of {:.3} mm on this display, which has {:.3} mm; take one for this offset, or another encoder",
+                trained / (finer * longer) * 1e3,
+                given * 1e3
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// The colour of the wavelength nearest to `given_m` of those whose stretch, of `each`, stays within the depths that
+/// were trained; where none does, the one of the least stretch.
+fn nearest(trained_m: &[f64; 3], given_m: f64, each: &[f64]) -> usize {
+    let apart = |colour: &usize| (trained_m[*colour] / given_m).ln().abs();
+    let within = (0..3).filter(|colour| each[*colour] <= 1.0 + RANGE_TOLERANCE);
+    let least = (0..3).min_by(|a, b| each[*a].total_cmp(&each[*b]));
+    let nearest = within.min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.or(least).unwrap_or(0)
+}
+
+/// What a file says of its network.
+pub(super) struct Description {
+    pub(super) input: InputKind,
+    pub(super) head: Head,
+    pub(super) display: TrainedDisplay,
+    /// Of a seeded network, if it says so.
+    pub(super) seed_planes: Option<usize>,
+}
+
+/// Reads all that the metadata must say, and what it may.
+pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
+    let input = text(metadata, "input", INPUTS)?;
+    let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;
+    let heads = "'amplitude-phase' or 'real-imaginary'";
+    let head = text(metadata, "head", heads)?;
+    let head = [Head::AmplitudePhase, Head::RealImaginary]
+        .into_iter()
+        .find(|known| known.name() == head)
+        .ok_or_else(|| wrong("head", head, heads))?;
+    let positive = |v: &f64| *v > 0.0;
+    let wavelengths = numbers(
+        metadata,
+        "wavelengths_nm",
+        "three numbers in nm such as '638,520,450'",
+        positive,
+    )?;
+    let display = TrainedDisplay {
+        pitch_m: number(metadata, "pitch_um", "a number in µm such as '8.0'", positive)? * 1e-6,
+        wavelengths_m: wavelengths.map(|nm: f64| nm * 1e-9),
+        volume_depth_m: number(metadata, "volume_depth_mm", "a number in mm such as '6.0'", positive)? * 1e-3,
+        offset_m: number(metadata, "offset_mm", "a number in mm such as '0'", |v| v.is_finite())? * 1e-3,
+        corrected: found(metadata, "corrected") == Some("true"),
+    };
+    let seed_planes = match found(metadata, "seed_planes") {
+        Some(planes) if input == InputKind::Seeded => {
+            let right = format!("a number from 1 to {MAX_PLANES}");
+            let known = (planes.parse().ok()).filter(|n| (1..=MAX_PLANES).contains(n));
+            Some(known.ok_or_else(|| wrong("seed_planes", planes, &right))?)
+        }
+        _ => None,
+    };
+    Ok(Description {
+        input,
+        head,
+        display,
+        seed_planes,
+    })
+}
+
+fn found<'a>(metadata: &'a [Entry], key: &str) -> Option<&'a str> {
+    metadata
+        .iter()
+        .find(|entry| entry.key.strip_prefix("phasefront.") == Some(key))
+        .map(|entry| entry.value.trim())
+}
+
+fn text<'a>(metadata: &'a [Entry], key: &str, right: &str) -> Result<&'a str> {
+    found(metadata, key)
+        .ok_or_else(|| Error::Network(format!("metadata 'phasefront.{key}' is missing; {right} is right")))
+}
+
+fn number(metadata: &[Entry], key: &str, right: &str, valid: impl Fn(&f64) -> bool) -> Result<f64> {
+    numbers::<1>(metadata, key, right, valid).map(|[one]| one)
+}
+
+fn numbers<const N: usize>(
+    metadata: &[Entry],
+    key: &str,
+    right: &str,
+    valid: impl Fn(&f64) -> bool,
+) -> Result<[f64; N]> {
+    let value = text(metadata, key, right)?;
+    let parsed: Option<Vec<f64>> = value.split(',').map(|n| n.trim().parse().ok()).collect();
+    parsed
+        .filter(|all| all.iter().all(|v| v.is_finite() && valid(v)))
+        .and_then(|all| all.try_into().ok())
+        .ok_or_else(|| wrong(key, value, right))
+}
+
+fn wrong(key: &str, value: &str, right: &str) -> Error {
+    Error::Network(format!("metadata 'phasefront.{key}' is '{value}'; {right} is right"))
+}

@@ -1,0 +1,388 @@
+//! The plane sweep: holograms of RGB-D frames by waves, without training, for any display.
+//!
+//! As in the silhouette-mask layer-based method (SM-LBM, Eq. 1–4 of the paper) the scene is cut into planes and a wave
+//! carried over them from the back to the front, each plane's silhouette replacing what comes from behind it. What is
+//! new makes it fast and good:
+//!
+//! - [`hidden`] adds the surfaces that an RGB-D frame does not show, so that edges are lit from behind;
+//! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)), not a Fourier transform;
+//! - a point that lies between planes is not moved to one: its light is carried there, to first order;
+//! - a tile of the frame does the planes that hold points in it and its halo, and crosses the others in one step;
+//! - the last step goes from the front straight to the midpoint, or on to the display.
+//!
+//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance
+//! s from its point to the plane light u becomes u + i·λs/4π·∇²u to first order. Of that [`CARRIED`] is added: on a
+//! slope, what spreads to farther neighbours would be blocked by points nearer to the plane. [`reference`] is the naive
+//! oracle.
+
+mod filters;
+mod fit;
+pub mod hidden;
+pub mod reference;
+mod tile;
+mod workers;
+
+use crate::display::Display;
+use crate::frame::RgbdFrame;
+use crate::runtime::cancel::Cancel;
+use crate::runtime::error::{Error, Result};
+use filters::Filters;
+pub use filters::Optics;
+use hidden::{Hidden, HiddenScratch};
+use num_complex::Complex32;
+use phasefront_kernels::Isa;
+use phasefront_kernels::fir::Fir;
+use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
+pub use tile::MARGIN;
+use tile::{Layout, Surfaces, Tile, TileScratch};
+use workers::Workers;
+
+/// Most planes of a sweep.
+pub const MAX_PLANES: usize = 1024;
+/// Most taps of a step.
+pub const MAX_TAPS: usize = 63;
+/// The part of a point's first-order spread to its plane that is carried there.
+pub const CARRIED: f64 = 0.5;
+/// Most hidden layers.
+pub const MAX_HIDDEN_LAYERS: usize = 2;
+/// Light that spreads farther than this through the volume, in pixels, is not swept: a tile is swept with a halo as
+/// wide, so that even a small frame would take minutes.
+pub const MAX_REACH: usize = 512;
+/// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
+/// from the midpoint by Fourier transforms.
+pub const MAX_HOME_REACH: usize = 32;
+
+/// How a sweep is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sweep {
+    /// Planes that the volume is cut into.
+    pub planes: usize,
+    /// Taps of the filter from plane to plane along each axis, an odd number.
+    pub taps: usize,
+    /// Hidden layers that are added, 0 to [`MAX_HIDDEN_LAYERS`].
+    pub hidden_layers: usize,
+    /// Whether points may lie between planes, their light being carried to the plane by a first-order step; otherwise
+    /// each is moved to its plane, as in SM-LBM.
+    pub between_planes: bool,
+    /// Pixels along each side of a tile, a multiple of 16.
+    pub tile: usize,
+}
+
+impl Sweep {
+    /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far
+    /// as [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
+    pub fn for_display(display: &Display) -> Self {
+        let reach = reach_px(display, display.volume_depth_m());
+        let planes = (reach * 4.0 / 3.0).ceil() as usize;
+        let planes = planes.clamp(*Self::USUAL_PLANES.start(), *Self::USUAL_PLANES.end());
+        Self::of_planes(display, planes)
+    }
+
+    /// A sweep of `planes` planes for `display`, with as many taps as its steps need.
+    pub fn of_planes(display: &Display, planes: usize) -> Self {
+        Sweep {
+            planes,
+            taps: Self::taps_for(display, planes),
+            hidden_layers: MAX_HIDDEN_LAYERS,
+            between_planes: true,
+            tile: Self::TILE,
+        }
+    }
+
+    /// Pixels along each side of the usual tile.
+    pub const TILE: usize = 256;
+
+    /// Planes that [`Sweep::for_display`] chooses from.
+    pub const USUAL_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
+
+    /// The taps that a step between `planes` planes needs: light's reach and four more on each side.
+    pub fn taps_for(display: &Display, planes: usize) -> usize {
+        let step_m = display.volume_depth_m() / planes.max(1) as f64;
+        let radius = reach_px(display, step_m).ceil() as usize + 4;
+        (2 * radius + 1).min(MAX_TAPS)
+    }
+
+    fn check(&self, display: &Display) -> Result<()> {
+        let refuse = |what: String| Err(Error::Plan(format!("sweep: {what}")));
+        if !(1..=MAX_PLANES).contains(&self.planes) {
+            return refuse(format!("{} planes; 1 to {MAX_PLANES} are right", self.planes));
+        }
+        if !(3..=MAX_TAPS).contains(&self.taps) || self.taps.is_multiple_of(2) {
+            return refuse(format!(
+                "{} taps; an odd number from 3 to {MAX_TAPS} is right",
+                self.taps
+            ));
+        }
+        let reach = reach_px(display, display.volume_depth_m() / self.planes as f64);
+        if self.planes > 1 && self.taps / 2 < reach.ceil() as usize {
+            return refuse(format!(
+                "light spreads {reach:.1} pixels from plane to plane, farther than {} taps; {} taps or {} planes are right",
+                self.taps,
+                2 * reach.ceil() as usize + 1,
+                (reach * self.planes as f64 / (self.taps / 2) as f64).ceil(),
+            ));
+        }
+        let reach = reach_px(display, display.volume_depth_m());
+        if reach > MAX_REACH as f64 {
+            return refuse(format!(
+                "light spreads {reach:.0} pixels through the volume; {MAX_REACH} are the most: a volume of {:.3} mm or a larger pitch is right",
+                display.volume_depth_m() * 1e3 * MAX_REACH as f64 / reach
+            ));
+        }
+        if self.hidden_layers > MAX_HIDDEN_LAYERS {
+            return refuse(format!(
+                "{} hidden layers; 0 to {MAX_HIDDEN_LAYERS} are right",
+                self.hidden_layers
+            ));
+        }
+        if !(16..=4096).contains(&self.tile) || !self.tile.is_multiple_of(16) {
+            return refuse(format!(
+                "tiles of {} pixels; a multiple of 16 from 16 to 4096 is right",
+                self.tile
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// How far light of the longest wavelength spreads over `distance_m`, pixels.
+fn reach_px(display: &Display, distance_m: f64) -> f64 {
+    crate::optics::asm::reach_m(distance_m, display.longest_wavelength_m(), display.pitch_m()) / display.pitch_m()
+}
+
+/// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall
+/// as the spectra of images do; 0 is perfect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitError {
+    /// Of one step.
+    pub step: f64,
+    /// Of all steps through the volume.
+    pub volume: f64,
+}
+
+/// A plan of the sweep for one frame shape and display. Immutable; shared between threads.
+pub struct SweepPlan {
+    height: usize,
+    width: usize,
+    sweep: Sweep,
+    z_m: f64,
+    fir: Fir,
+    filters: Vec<Filters>,
+    hidden: Hidden,
+    layout: Layout,
+}
+
+/// Working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
+pub struct SweepScratch {
+    planes: Vec<u16>,
+    sources: Vec<u32>,
+    hidden: HiddenScratch,
+    tiles: Workers<TileScratch>,
+    cancel: Cancel,
+}
+
+impl SweepScratch {
+    /// Has frames end where `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        self.cancel = cancel.clone();
+    }
+}
+
+impl SweepPlan {
+    /// Plans (`height`, `width`) frames for `display`; the hologram stands at `z_m`, 0 being the midpoint. The filters
+    /// are fitted here.
+    ///
+    /// # Errors
+    /// An empty or too large frame, numbers of `sweep` out of their range, or a hologram so far away that light spreads
+    /// over [`MAX_HOME_REACH`] from the front of the volume.
+    pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
+        sweep.check(display)?;
+        if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
+            return Err(Error::Plan(format!(
+                "sweep: a frame of {width}×{height} pixels is empty or too large"
+            )));
+        }
+        let optics = optics(display, &sweep, z_m)?;
+        // Fitting is the plan's only slow part, and colours do not depend on each other.
+        let filters = optics.par_iter().map(|optics| Filters::new(optics, sweep.taps / 2));
+        let filters: Vec<Filters> = filters.collect();
+        let way_m = |k: usize| optics[0].home_m.abs() + k as f64 * optics[0].step_m;
+        let layout = Layout::new(
+            sweep.tile,
+            sweep.planes,
+            |k| reach_px(display, way_m(k)).ceil() as usize,
+            |k| reach_px(display, k as f64 * optics[0].step_m).ceil() as usize,
+            &filters,
+        );
+        Ok(SweepPlan {
+            height,
+            width,
+            sweep,
+            z_m,
+            fir: Fir::fastest(),
+            filters,
+            hidden: Hidden::new(height, width, hidden_reach(display)),
+            layout,
+        })
+    }
+
+    /// The same plan on one instruction set; None where this processor lacks it. All give the same bits.
+    pub fn on(self, isa: Isa) -> Option<Self> {
+        Fir::new(isa).map(|fir| SweepPlan { fir, ..self })
+    }
+
+    /// The same plan with every step between planes by itself, however many are empty: what merging them is worth.
+    pub fn unmerged(mut self) -> Self {
+        self.filters.iter_mut().for_each(Filters::unmerge);
+        self
+    }
+
+    /// The instruction set that the filters run on.
+    pub fn isa(&self) -> Isa {
+        self.fir.isa()
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// How it is done.
+    pub fn sweep(&self) -> Sweep {
+        self.sweep
+    }
+
+    /// Where the hologram stands, metres from the midpoint toward the viewer.
+    pub fn z_m(&self) -> f64 {
+        self.z_m
+    }
+
+    /// The filters of each colour.
+    pub fn filters(&self) -> &[Filters] {
+        &self.filters
+    }
+
+    /// How well the filters of each colour fit.
+    pub fn fit_errors(&self) -> Vec<FitError> {
+        let of = |filters: &Filters| FitError {
+            step: filters.errors[0],
+            volume: filters.errors[1],
+        };
+        self.filters.iter().map(of).collect()
+    }
+
+    /// Working memory for one frame at a time, for the current thread pool.
+    pub fn scratch(&self) -> SweepScratch {
+        let size = self.height * self.width;
+        let layers = self.sweep.hidden_layers;
+        SweepScratch {
+            planes: vec![0; size],
+            sources: vec![0; if layers > 0 { MAX_HIDDEN_LAYERS * size } else { 0 }],
+            hidden: self.hidden.scratch(),
+            tiles: Workers::new(|| {
+                let mut scratch = self.layout.scratch();
+                let all = (layers + 1) * size;
+                scratch.reserve(self.layout.most_points(layers + 1).min(all));
+                scratch
+            }),
+            cancel: Cancel::default(),
+        }
+    }
+
+    /// The hologram of `frame`, carrier-free, at [`SweepPlan::z_m`], into `field`, (C, H, W). Allocates nothing.
+    ///
+    /// # Errors
+    /// A frame of another shape or of other colours.
+    ///
+    /// # Panics
+    /// If `field` has not C·H·W values or `scratch` is another plan's.
+    pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
+        frame.check(self.shape(), self.filters.len())?;
+        let size = self.height * self.width;
+        assert_eq!(field.len(), self.filters.len() * size);
+        let (rgb, depth) = frame.values();
+        const PART: usize = 1 << 14;
+        (scratch.planes.par_chunks_mut(PART))
+            .zip(depth.par_chunks(PART))
+            .for_each(|(planes, depth)| {
+                for (plane, d) in planes.iter_mut().zip(depth) {
+                    *plane = plane_of_depth(*d, self.sweep.planes) as u16;
+                }
+            });
+        let layers = self.sweep.hidden_layers;
+        if layers > 0 {
+            self.hidden.find(depth, &mut scratch.sources, &mut scratch.hidden);
+        }
+        let surfaces = Surfaces {
+            rgb,
+            depth,
+            planes: &scratch.planes,
+            hidden: &scratch.sources[..layers * size],
+            height: self.height,
+            width: self.width,
+        };
+        let mut planes = field.chunks_exact_mut(size);
+        // As many as there may be, for nothing is allocated here.
+        let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
+        let (down, across) = self.layout.count(self.height, self.width);
+        (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
+            if scratch.cancel.requested() {
+                return;
+            }
+            let tile = Tile::of(&self.layout, self.fir, surfaces, index);
+            scratch.tiles.with(|scratch| {
+                tile.gather(scratch);
+                for (colour, filters) in self.filters.iter().enumerate() {
+                    tile.sweep(colour, filters, scratch);
+                    let mut plane = planes[colour].lock().unwrap_or_else(PoisonError::into_inner);
+                    tile.store(&mut plane, scratch);
+                }
+            });
+        });
+        Ok(())
+    }
+}
+
+/// The plane of a pixel of depth `d` among `planes`, 0 the nearest.
+pub fn plane_of_depth(d: f32, planes: usize) -> usize {
+    ((f64::from(d) * planes as f64) as usize).min(planes - 1)
+}
+
+/// How far hidden surfaces are searched for: as far as light spreads through the volume.
+pub fn hidden_reach(display: &Display) -> usize {
+    (reach_px(display, display.volume_depth_m()).ceil() as usize).max(1)
+}
+
+/// Whether a sweep can end at `z_m`: not farther from the front of the volume than short filters reach.
+pub fn reaches(display: &Display, z_m: f64) -> bool {
+    reach_px(display, z_m.abs() + display.volume_depth_m() / 2.0) <= MAX_HOME_REACH as f64
+}
+
+/// The optics of each colour between the planes of `sweep` and to `z_m`.
+pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>> {
+    if !z_m.is_finite() {
+        return Err(Error::Plan(format!(
+            "sweep: the hologram cannot stand at z = {z_m} m; it must be finite"
+        )));
+    }
+    let step_m = display.volume_depth_m() / sweep.planes as f64;
+    let home_m = z_m - (display.volume_depth_m() - step_m) / 2.0;
+    let reach = reach_px(display, home_m);
+    // The volume itself may be wide; what ends at the midpoint is always served.
+    if z_m != 0.0 && !reaches(display, z_m) {
+        return Err(Error::Plan(format!(
+            "sweep: light spreads {reach:.0} pixels from the front of the volume to z = {:.3} mm, more than {MAX_HOME_REACH}; end at the midpoint and propagate from there",
+            z_m * 1e3
+        )));
+    }
+    let of = |&wavelength_m: &f64| Optics {
+        pitch_m: display.pitch_m(),
+        wavelength_m,
+        step_m,
+        planes: sweep.planes,
+        home_m,
+        between_planes: sweep.between_planes,
+    };
+    Ok(display.wavelengths_m().iter().map(of).collect())
+}

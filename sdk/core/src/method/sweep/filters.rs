@@ -1,0 +1,289 @@
+//! The filters of one colour: a step between planes, what several steps through empty space become, and the way home.
+//!
+//! Everything is made of one step H and one filter B from plane 0 to where the hologram stands, both fitted
+//! ([`super::fit`]). Over a gap of m empty planes Hᵐ is one filter, nearly as short as light's reach over the gap, and
+//! from plane k the way home is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so it makes
+//! no difference to a result which planes were empty and merged.
+
+use super::CARRIED;
+use super::fit::{self, Coefficients};
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+use std::f64::consts::PI;
+
+/// The sum of magnitudes that a merged filter may lose at its ends.
+const TAIL: f64 = 2e-5;
+/// What a pass over the field costs beside its taps, in taps: reading and writing it.
+const PASS: usize = 3;
+/// Taps that the filter home has beyond light's reach, on each side.
+const MARGIN: usize = 6;
+
+/// A symmetric filter as the kernels take it: the centre, then the taps at distances 1, 2 …
+pub(super) type Taps = Vec<[f32; 2]>;
+
+/// The optics of one colour between the planes.
+#[derive(Debug, Clone, Copy)]
+pub struct Optics {
+    pub(super) pitch_m: f64,
+    pub(super) wavelength_m: f64,
+    /// Between neighbouring planes.
+    pub step_m: f64,
+    pub(super) planes: usize,
+    /// From plane 0, the nearest to the viewer, to the hologram.
+    pub home_m: f64,
+    /// Whether light of points between planes is carried to theirs.
+    pub(super) between_planes: bool,
+}
+
+impl Optics {
+    /// How far light spreads over `distance_m`, pixels.
+    pub fn reach(&self, distance_m: f64) -> usize {
+        let reach_m = crate::optics::asm::reach_m(distance_m, self.wavelength_m, self.pitch_m);
+        (reach_m / self.pitch_m).ceil() as usize
+    }
+
+    /// The radius of the filter home.
+    pub(super) fn home_radius(&self) -> usize {
+        match self.home_m {
+            0.0 => 1,
+            distance => self.reach(distance) + MARGIN,
+        }
+    }
+}
+
+/// The filters of one colour.
+pub struct Filters {
+    /// What light gains beside its point, over i, its amplitude and how much deeper in normalized depth the point lies
+    /// than its plane; the point itself loses four times that.
+    pub carry: f32,
+    /// H and B, for the oracle.
+    pub step: Taps,
+    pub home: Taps,
+    /// Weighted errors of H and of its power over the whole volume.
+    pub(super) errors: [f64; 2],
+    /// Hᵐ for m − 1; only what [`Filters::part`] names is used.
+    merged: Vec<Taps>,
+    /// The first part, in steps, of the cheapest way over a gap of m − 1 steps more.
+    parts: Vec<usize>,
+    /// HᵏB for each plane k.
+    ends: Vec<Taps>,
+    /// How many steps to do before `ends` is the cheapest way from plane k.
+    before_end: Vec<usize>,
+}
+
+impl Filters {
+    /// Fits a step of `radius` taps on each side, and the way home.
+    pub(super) fn new(optics: &Optics, radius: usize) -> Self {
+        let &Optics {
+            pitch_m,
+            wavelength_m,
+            step_m,
+            planes,
+            home_m,
+            between_planes,
+        } = optics;
+        let free = |f: f64, distance_m: f64| fit::transfer(f, distance_m, wavelength_m, pitch_m);
+        let steps = (planes - 1).max(1);
+        let step = fit::powers(radius, steps, |f| free(f, step_m));
+        let errors = [1, steps].map(|power| fit::error(&step, |f| free(f, step_m), power));
+        // The best way home for light from all planes together: it also makes good what the steps did wrong.
+        let home = fit::once(optics.home_radius(), |f| {
+            let h = fit::gain(&step, f);
+            let (mut right, mut energy) = (Complex64::ZERO, 0.0);
+            let mut power = Complex64::ONE;
+            for k in 0..planes {
+                right += power.conj() * free(f, home_m + k as f64 * step_m);
+                energy += power.norm_sqr();
+                power *= h;
+            }
+            right / energy
+        });
+        let grid = Grid::new(optics);
+        let spectrum = grid.spectrum(&step);
+        let merged: Vec<Taps> = (1..planes.max(2))
+            .map(|m| match m {
+                1 => taps(&step),
+                _ => grid.cut(spectrum.iter().map(|h| h.powu(m as u32))),
+            })
+            .collect();
+        let home_spectrum = grid.spectrum(&home);
+        let ends: Vec<Taps> = (0..planes)
+            .map(|k| match k {
+                0 => taps(&home),
+                _ => grid.cut((spectrum.iter().zip(&home_spectrum)).map(|(h, b)| h.powu(k as u32) * b)),
+            })
+            .collect();
+        let per_m = wavelength_m / (4.0 * PI * pitch_m * pitch_m);
+        let volume_m = step_m * planes as f64;
+        let mut filters = Filters {
+            carry: match between_planes {
+                true => (CARRIED * per_m * volume_m) as f32,
+                false => 0.0,
+            },
+            step: taps(&step),
+            home: taps(&home),
+            errors,
+            merged,
+            parts: Vec::new(),
+            ends,
+            before_end: Vec::new(),
+        };
+        filters.choose_ways();
+        filters
+    }
+
+    /// The cheapest ways over gaps and home, by dynamic programming over their lengths.
+    fn choose_ways(&mut self) {
+        let cost = |taps: &Taps| taps.len() + PASS;
+        let mut costs = vec![0];
+        for gap in 1..=self.merged.len() {
+            let (part, least) = (1..=gap)
+                .map(|part| (part, cost(&self.merged[part - 1]) + costs[gap - part]))
+                .min_by_key(|(_, cost)| *cost)
+                .unwrap_or((gap, 0));
+            self.parts.push(part);
+            costs.push(least);
+        }
+        for k in 0..self.ends.len() {
+            let (before, _) = (0..=k)
+                .map(|before| (before, costs[before] + cost(&self.ends[k - before])))
+                .min_by_key(|(_, cost)| *cost)
+                .unwrap_or((0, 0));
+            self.before_end.push(before);
+        }
+    }
+
+    /// One step after the other, over gaps and home.
+    pub(super) fn unmerge(&mut self) {
+        self.parts.fill(1);
+        for (k, before) in self.before_end.iter_mut().enumerate() {
+            *before = k;
+        }
+    }
+
+    /// The first part of the way over a gap of `steps`, at least 1: its filter, and how many steps it is.
+    pub(super) fn part(&self, steps: usize) -> (&Taps, usize) {
+        let part = self.parts[steps - 1];
+        (&self.merged[part - 1], part)
+    }
+
+    /// The steps to do from plane `k` before [`Filters::end`].
+    pub(super) fn before_end(&self, k: usize) -> usize {
+        self.before_end[k]
+    }
+
+    /// From plane `k` to the hologram.
+    pub(super) fn end(&self, k: usize) -> &Taps {
+        &self.ends[k]
+    }
+
+    /// The longest radius of a filter between planes.
+    pub(super) fn longest_part(&self) -> usize {
+        let used = self.parts.iter().map(|part| &self.merged[part - 1]);
+        used.map(|taps| taps.len() - 1).max().unwrap_or(0)
+    }
+}
+
+/// A filter's taps in f32; the centre takes up the rounding of the others, so that the gain at frequency 0 stays 1.
+fn taps(coefficients: &Coefficients) -> Taps {
+    let sides: Taps = (coefficients.iter()).map(|c| [c.re as f32, c.im as f32]).collect();
+    with_centre(sides)
+}
+
+fn with_centre(sides: Taps) -> Taps {
+    let sum = |part: usize| sides.iter().map(|tap| f64::from(tap[part])).sum::<f64>();
+    let centre = [(1.0 - 2.0 * sum(0)) as f32, (-2.0 * sum(1)) as f32];
+    std::iter::once(centre).chain(sides).collect()
+}
+
+/// Frequencies fine enough for the longest filter not to wrap around.
+struct Grid {
+    size: usize,
+    inverse: std::sync::Arc<dyn rustfft::Fft<f64>>,
+}
+
+impl Grid {
+    fn new(optics: &Optics) -> Self {
+        let volume_m = optics.step_m * (optics.planes - 1) as f64;
+        let longest = optics.reach(volume_m) + optics.home_radius();
+        let size = (4 * longest).next_power_of_two().max(1024);
+        Grid {
+            size,
+            inverse: FftPlanner::new().plan_fft_inverse(size),
+        }
+    }
+
+    fn spectrum(&self, coefficients: &Coefficients) -> Vec<Complex64> {
+        let f = |i: usize| 2.0 * i.min(self.size - i) as f64 / self.size as f64;
+        (0..self.size).map(|i| fit::gain(coefficients, f(i))).collect()
+    }
+
+    /// The filter of a spectrum, as long as [`TAIL`] asks for.
+    fn cut(&self, spectrum: impl Iterator<Item = Complex64>) -> Taps {
+        let mut filter: Vec<_> = spectrum.collect();
+        self.inverse.process(&mut filter);
+        let scale = 1.0 / self.size as f64;
+        let mut radius = self.size / 2 - 1;
+        let mut tail = 0.0;
+        while radius > 1 {
+            tail += 2.0 * filter[radius].norm() * scale;
+            if tail > TAIL {
+                break;
+            }
+            radius -= 1;
+        }
+        let sides = filter[1..=radius].iter().map(|c| c * scale);
+        with_centre(sides.map(|c| [c.re as f32, c.im as f32]).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn optics() -> Optics {
+        Optics {
+            pitch_m: 8e-6,
+            wavelength_m: 638e-9,
+            step_m: 6e-3 / 24.0,
+            planes: 24,
+            home_m: -2.9e-3,
+            between_planes: true,
+        }
+    }
+
+    fn gain(taps: &Taps, f: f64) -> Complex64 {
+        let tap = |j: usize| Complex64::new(taps[j][0].into(), taps[j][1].into());
+        let sides = (1..taps.len()).map(|j| tap(j) * 2.0 * (std::f64::consts::PI * j as f64 * f).cos());
+        tap(0) + sides.sum::<Complex64>()
+    }
+
+    #[test]
+    fn merged_filters_are_powers_and_keep_the_mean_of_a_field() {
+        let filters = Filters::new(&optics(), 4);
+        for gap in 1..24 {
+            let (mut left, mut total) = (gap, Complex64::ONE);
+            while left > 0 {
+                let (taps, part) = filters.part(left);
+                assert!((gain(taps, 0.0) - 1.0).norm() < 2e-7, "{gap}");
+                total *= gain(taps, 0.37);
+                left -= part;
+            }
+            let power = gain(&filters.step, 0.37).powu(gap as u32);
+            assert!((total - power).norm() < 3e-4, "{gap}: {total} for {power}");
+        }
+        for k in 0..24 {
+            let end = gain(filters.end(k), 0.37);
+            let power = gain(&filters.step, 0.37).powu(k as u32) * gain(&filters.home, 0.37);
+            assert!((end - power).norm() < 3e-4, "{k}: {end} for {power}");
+            assert!(filters.before_end(k) <= k);
+        }
+    }
+
+    #[test]
+    fn wide_gaps_cost_less_than_their_steps() {
+        let filters = Filters::new(&optics(), 4);
+        let (taps, part) = filters.part(16);
+        assert!(part > 2 && taps.len() < 5 * part);
+    }
+}

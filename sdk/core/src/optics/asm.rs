@@ -1,0 +1,403 @@
+//! The angular spectrum method, Eq. 2 of the paper: the field at a distance s from a plane.
+//!
+//! ASM(u, s) = F⁻¹(F(u) · exp(+i2πs·√(λ⁻² − µ² − ν²))), s positive toward the viewer; the
+//! evanescent part is zero. It is a linear convolution: the frame is padded with zeros and the
+//! result cropped to it.
+//!
+//! The carrier exp(i2πs/λ) is left out of the exponent, as
+//! √(λ⁻² − f²) − λ⁻¹ = −λf²/(1 + √(1 − λ²f²)), f² = µ² + ν². At 20 mm and 450 nm the carrier is
+//! 2.8·10⁵ rad: with it an f32 phase would be worth 0.03 rad; without it only what bends the
+//! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
+//! phase zero here, and both agree at z = 0.
+
+use super::aperture::Opening;
+use super::aperture::passes;
+use super::fft::{ConvolveScratch, Fft2, fast_size};
+use super::zernike::Aberration;
+use crate::runtime::error::{Error, Result};
+use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// The most values a padded plane may hold: 1 GiB of complex numbers.
+pub const MAX_PADDED_VALUES: usize = 1 << 27;
+
+/// How far a frame is padded with zeros before its transform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Padding {
+    /// As far as light diffracted at the pitch can reach from the distance, see [`reach_m`].
+    Reach,
+    /// To twice the size, whatever the distance; beyond the distance that this can hold, the band
+    /// limit of Matsushima and Shimobaba keeps the kernel from wrapping around (Opt. Express 17,
+    /// 19662, 2009). The oracle of [`Padding::Reach`].
+    Double,
+    /// Not at all: the plane is periodic.
+    Circular,
+}
+
+/// How far sideways light of `wavelength_m` can travel over `distance_m` when diffracted by pixels
+/// of `pitch_m`: |s|·tan(asin(λ/2p)), metres.
+pub fn reach_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
+    distance_m.abs() * (wavelength_m / (2.0 * pitch_m)).asin().tan()
+}
+
+/// The carrier that fields here leave out: exp(i2πs/λ), its phase reduced in f64.
+pub fn carrier(distance_m: f64, wavelength_m: f64) -> Complex32 {
+    let turns = (distance_m / wavelength_m).fract();
+    let phase = Complex64::from_polar(1.0, 2.0 * PI * turns);
+    Complex32::new(phase.re as f32, phase.im as f32)
+}
+
+/// The padded shape (H', W') in which a (`height`, `width`) frame moves by up to `distance_m`.
+///
+/// # Errors
+/// A distance that is not finite, or whose padded plane would exceed [`MAX_PADDED_VALUES`].
+pub fn padded_shape(
+    height: usize,
+    width: usize,
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    padding: Padding,
+) -> Result<(usize, usize)> {
+    if height == 0 || width == 0 {
+        return Err(Error::Plan(format!(
+            "a plane of {width}×{height} is empty; each side must be at least 1"
+        )));
+    }
+    if !distance_m.is_finite() {
+        return Err(Error::Plan(format!(
+            "a distance of {distance_m} m cannot be propagated; it must be finite"
+        )));
+    }
+    let padded = |n: usize| -> f64 {
+        match padding {
+            Padding::Reach => n as f64 + (reach_m(distance_m, wavelength_m, pitch_m) / pitch_m).ceil(),
+            Padding::Double => 2.0 * n as f64,
+            Padding::Circular => n as f64,
+        }
+    };
+    let (h, w) = (padded(height), padded(width));
+    if h * w > MAX_PADDED_VALUES as f64 {
+        return Err(Error::Plan(format!(
+            "a distance of {:.3} mm needs a padded plane of {w:.0}×{h:.0}, over the {} Mi values that fit; \
+             a shorter distance or a smaller frame is needed",
+            distance_m * 1e3,
+            MAX_PADDED_VALUES >> 20,
+        )));
+    }
+    Ok(match padding {
+        Padding::Circular => (height, width),
+        _ => (fast_size(h as usize), fast_size(w as usize)),
+    })
+}
+
+/// The transfer function of one distance on a padded plane: one quadrant of it where it is even in both
+/// frequencies, as free space is.
+pub struct Transfer {
+    /// (W'/2 + 1, H'/2 + 1), or (W', H') where it is not even; scaled by 1/(H'·W') for the unnormalized
+    /// transforms.
+    factors: Vec<Complex32>,
+    even: bool,
+    padded_height: usize,
+    padded_width: usize,
+}
+
+/// The exponent of free space at the frequency (`mu`, `nu`), cycles a metre, without the carrier, radians;
+/// None where the wave is evanescent.
+fn free_space(mu: f64, nu: f64, wavelength_m: f64, distance_m: f64) -> Option<f64> {
+    let f2 = mu * mu + nu * nu;
+    let cosine2 = 1.0 - wavelength_m * wavelength_m * f2;
+    (cosine2 >= 0.0).then(|| -2.0 * PI * distance_m * wavelength_m * f2 / (1.0 + cosine2.sqrt()))
+}
+
+impl Transfer {
+    /// H(µ, ν) of `distance_m` on a padded plane (H', W'), zero where `keep` says no to |µ|, |ν| (cycles
+    /// a metre) and where the wave is evanescent.
+    pub fn new(
+        (padded_height, padded_width): (usize, usize),
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        keep: impl Fn(f64, f64) -> bool,
+    ) -> Self {
+        let (rows, columns) = (padded_height / 2 + 1, padded_width / 2 + 1);
+        let scale = 1.0 / (padded_height * padded_width) as f64;
+        let mut factors = Vec::with_capacity(rows * columns);
+        for kx in 0..columns {
+            let mu = kx as f64 / (padded_width as f64 * pitch_m);
+            for ky in 0..rows {
+                let nu = ky as f64 / (padded_height as f64 * pitch_m);
+                factors.push(match free_space(mu, nu, wavelength_m, distance_m) {
+                    Some(phase) if keep(mu, nu) => polar(scale, phase),
+                    _ => Complex32::ZERO,
+                });
+            }
+        }
+        Transfer {
+            factors,
+            even: true,
+            padded_height,
+            padded_width,
+        }
+    }
+
+    /// H(µ, ν)·exp(i·`phase`(µ, ν)) of `distance_m` on a padded plane (H', W'), µ and ν signed: free space and
+    /// a correction in the pupil. Four times the memory of [`Self::new`].
+    pub fn corrected(
+        (padded_height, padded_width): (usize, usize),
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        phase: impl Fn(f64, f64) -> f64,
+    ) -> Self {
+        let scale = 1.0 / (padded_height * padded_width) as f64;
+        let frequency = |k: usize, n: usize| {
+            let k = if 2 * k < n { k as f64 } else { k as f64 - n as f64 };
+            k / (n as f64 * pitch_m)
+        };
+        let mut factors = Vec::with_capacity(padded_height * padded_width);
+        for kx in 0..padded_width {
+            let mu = frequency(kx, padded_width);
+            for ky in 0..padded_height {
+                let nu = frequency(ky, padded_height);
+                factors.push(match free_space(mu, nu, wavelength_m, distance_m) {
+                    Some(free) => polar(scale, free + phase(mu, nu)),
+                    None => Complex32::ZERO,
+                });
+            }
+        }
+        Transfer {
+            factors,
+            even: false,
+            padded_height,
+            padded_width,
+        }
+    }
+
+    /// The factors, one quadrant of them, (W'/2 + 1, H'/2 + 1), where they are even, else (W', H').
+    pub fn factors(&self) -> &[Complex32] {
+        &self.factors
+    }
+
+    /// [`Self::factors`] behind an aperture of `radius`, 1 reaching the Nyquist frequency.
+    pub fn factors_through(&self, radius: f64) -> Vec<Complex32> {
+        let (width, height) = (self.padded_width, self.padded_height);
+        let rows = if self.even { height / 2 + 1 } else { height };
+        let stopped = |(at, factor): (usize, &Complex32)| {
+            let (kx, ky) = (at / rows, at % rows);
+            let fx = kx.min(width - kx) as f64 / width as f64;
+            let fy = ky.min(height - ky) as f64 / height as f64;
+            if passes(fx, fy, radius) {
+                *factor
+            } else {
+                Complex32::ZERO
+            }
+        };
+        self.factors.iter().enumerate().map(stopped).collect()
+    }
+
+    /// Multiplies column `x` of a spectrum by the transfer function.
+    pub fn apply(&self, x: usize, column: &mut [Complex32]) {
+        wide!(self.multiply(x, column));
+    }
+
+    #[inline(always)]
+    fn multiply(&self, x: usize, column: &mut [Complex32]) {
+        if !self.even {
+            let factors = &self.factors[x * self.padded_height..][..self.padded_height];
+            for (value, factor) in column.iter_mut().zip(factors) {
+                *value *= factor;
+            }
+            return;
+        }
+        let rows = self.padded_height / 2 + 1;
+        let x = x.min(self.padded_width - x);
+        let transfer = &self.factors[x * rows..][..rows];
+        let (near, far) = column.split_at_mut(rows);
+        for (value, factor) in near.iter_mut().zip(transfer) {
+            *value *= factor;
+        }
+        for (value, factor) in far.iter_mut().rev().zip(&transfer[1..]) {
+            *value *= factor;
+        }
+    }
+}
+
+/// `scale`·exp(i·`phase`), the angle in f64.
+fn polar(scale: f64, phase: f64) -> Complex32 {
+    let (sin, cos) = phase.sin_cos();
+    Complex32::new((cos * scale) as f32, (sin * scale) as f32)
+}
+
+/// What [`Transfer::new`] is to keep under `padding`: everything, or the frequencies under the
+/// band limit where the doubled plane cannot hold the kernel.
+fn band_limit(
+    (padded_height, padded_width): (usize, usize),
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    padding: Padding,
+) -> impl Fn(f64, f64) -> bool {
+    // Matsushima's limit 1/(λ√((2s·Δf)² + 1)) with Δf the sampling of the spectrum.
+    let limit = |n: usize| match padding {
+        Padding::Double => {
+            let df = 1.0 / (n as f64 * pitch_m);
+            1.0 / (wavelength_m * ((2.0 * distance_m * df).powi(2) + 1.0).sqrt())
+        }
+        _ => f64::INFINITY,
+    };
+    let (limit_x, limit_y) = (limit(padded_width), limit(padded_height));
+    move |mu, nu| mu <= limit_x && nu <= limit_y
+}
+
+/// A plan for one shape, wavelength and distance. Immutable; shared between threads.
+///
+/// ```
+/// use num_complex::Complex32;
+/// use phasefront::unstable::wave::asm::{Padding, Propagator};
+///
+/// let plan = Propagator::new(64, 48, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
+/// let mut scratch = plan.scratch();
+/// let mut plane = vec![Complex32::new(1.0, 0.0); 64 * 48];
+/// plan.propagate(&mut plane, &mut scratch);
+/// # Ok::<(), phasefront::Error>(())
+/// ```
+#[derive(Clone)]
+pub struct Propagator {
+    shape: (usize, usize),
+    fft: Arc<Fft2>,
+    transfer: Arc<Transfer>,
+}
+
+impl Propagator {
+    /// Plans ASM(·, `distance_m`) of (`height`, `width`) planes.
+    ///
+    /// # Errors
+    /// As [`padded_shape`].
+    pub fn new(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelength_m: f64,
+        distance_m: f64,
+        padding: Padding,
+    ) -> Result<Self> {
+        let padded = padded_shape(height, width, pitch_m, wavelength_m, distance_m, padding)?;
+        let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
+        Ok(Propagator {
+            shape: (height, width),
+            fft: Arc::new(Fft2::new(height, width, padded.0, padded.1)),
+            transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
+        })
+    }
+
+    /// A plan for each wavelength, which share one padded shape (that of the longest, the widest) and so
+    /// one [`ConvolveScratch`].
+    ///
+    /// # Errors
+    /// As [`padded_shape`].
+    pub fn for_colours(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelengths_m: &[f64],
+        distance_m: f64,
+        padding: Padding,
+    ) -> Result<Vec<Self>> {
+        let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
+        let padded = padded_shape(height, width, pitch_m, longest, distance_m, padding)?;
+        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        let plan = |&wavelength_m: &f64| {
+            let keep = band_limit(padded, pitch_m, wavelength_m, distance_m, padding);
+            Propagator {
+                shape: (height, width),
+                fft: fft.clone(),
+                transfer: Arc::new(Transfer::new(padded, pitch_m, wavelength_m, distance_m, keep)),
+            }
+        };
+        Ok(wavelengths_m.iter().map(plan).collect())
+    }
+
+    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is
+    /// that of a modulator of `modulator_pitch_m`, on its way.
+    ///
+    /// # Errors
+    /// As [`padded_shape`], the light that the correction moves counted in; a correction of other colours.
+    pub fn for_colours_corrected(
+        height: usize,
+        width: usize,
+        pitch_m: f64,
+        wavelengths_m: &[f64],
+        distance_m: f64,
+        aberration: &Aberration,
+        modulator_pitch_m: f64,
+    ) -> Result<Vec<Self>> {
+        if aberration.coefficients().len() != wavelengths_m.len() {
+            return Err(Error::Plan(format!(
+                "a correction of {} colours for {}; both must have as many",
+                aberration.coefficients().len(),
+                wavelengths_m.len()
+            )));
+        }
+        let longest = wavelengths_m.iter().copied().fold(0.0, f64::max);
+        let more = (aberration.reach_m(modulator_pitch_m) / pitch_m).ceil() as usize;
+        let (h, w) = (height.saturating_add(more), width.saturating_add(more));
+        let padded = padded_shape(h, w, pitch_m, longest, distance_m, Padding::Reach)?;
+        let fft = Arc::new(Fft2::new(height, width, padded.0, padded.1));
+        let plan = |(colour, &wavelength_m): (usize, &f64)| {
+            let transfer = Transfer::corrected(padded, pitch_m, wavelength_m, distance_m, |mu, nu| {
+                aberration.phase(colour, mu, nu, modulator_pitch_m)
+            });
+            Propagator {
+                shape: (height, width),
+                fft: fft.clone(),
+                transfer: Arc::new(transfer),
+            }
+        };
+        Ok(wavelengths_m.iter().enumerate().map(plan).collect())
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.shape
+    }
+
+    /// (H', W').
+    pub fn padded_shape(&self) -> (usize, usize) {
+        self.fft.padded_shape()
+    }
+
+    /// The transfer function.
+    pub fn transfer(&self) -> &Transfer {
+        &self.transfer
+    }
+
+    /// Working memory for one call at a time, sized for the current thread pool.
+    pub fn scratch(&self) -> ConvolveScratch {
+        self.fft.convolve_scratch()
+    }
+
+    /// Replaces `plane`, (H, W), by the field at the planned distance. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `plane` has not H·W values or `scratch` is another plan's.
+    pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
+        self.fft
+            .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
+    }
+
+    /// [`Self::propagate`] through an aperture of `radius`, 1 reaching the Nyquist frequency.
+    ///
+    /// # Panics
+    /// As [`Self::propagate`].
+    pub fn propagate_through(&self, plane: &mut [Complex32], radius: f64, scratch: &mut ConvolveScratch) {
+        let (shape, opening) = (self.padded_shape(), Opening::centred(radius));
+        let filter = |x: usize, column: &mut [Complex32]| {
+            opening.stop(x, shape, column);
+            self.transfer.apply(x, column);
+        };
+        self.fft.convolve(plane, filter, scratch);
+    }
+}

@@ -1,0 +1,374 @@
+//! Aberrations and their correction, Eq. 14–19: five Zernike terms over the pupil, per colour and per
+//! distance.
+//!
+//! # The pupil
+//! Its coordinates are those of frequency: ρ·(cos θ, sin θ) = (µ, ν)/f₁ with f₁ = 1/(2·pitch), the Nyquist
+//! frequency, so that the paper's aperture is ρ ≤ 1. The five terms, in radians, with x = ρ cos θ
+//! and y = ρ sin θ:
+//!
+//! a₃(2ρ² − 1) + a₄(x² − y²) + 2a₅xy + (3ρ² − 2)(a₆x + a₇y)
+//!
+//! A coefficient is that of the *correction*: what makes the wave come to a tight focus. The aberration of
+//! the display has the other sign. Beyond ρ = 1 the polynomials go on, as a lens does.
+//!
+//! # Sub-holograms and the corrected transfer function
+//! The paper puts the terms on the sub-hologram φ⁰ that focuses a plane wave to the distance d (Eq. 19), takes it
+//! to its focus, and calls the Fourier transform of what it finds there Φ. The light that leaves the
+//! sub-hologram at (x, y) arrives with the frequency −(x, y)/(λd), so its pupil is ours, turned by π where
+//! d > 0. As its aperture grows Φ becomes exp(i·terms), [`Aberration::phase`]: that is what is used,
+//! for every d, 0 included, where a sub-hologram has no size; and |Φ| is 1 where diffraction at the rim of
+//! a sub-hologram ripples it. [`sub_hologram`] and [`corrected_transfer_function`] are the paper's way: the
+//! one for captures of a focused spot, the other as the oracle.
+
+use super::asm::{Padding, Propagator};
+use super::reference;
+use crate::runtime::error::{Error, Result};
+use ndarray::Array2;
+use num_complex::{Complex32, Complex64};
+use std::f64::consts::PI;
+
+/// The names of the five terms.
+pub const TERMS: [&str; 5] = [
+    "focus",
+    "vertical astigmatism",
+    "oblique astigmatism",
+    "horizontal coma",
+    "vertical coma",
+];
+
+/// The coefficients a₃ to a₇ of one colour, radians.
+pub type Coefficients = [f64; 5];
+
+/// The most that a coefficient may be, radians: beyond it no padding holds the light.
+const MOST: f64 = 1e4;
+
+/// Eq. 14–18 summed, radians, at (`x`, `y`) of the pupil, both 1 at its rim.
+pub fn terms(a: &Coefficients, x: f64, y: f64) -> f64 {
+    let square = x * x + y * y;
+    a[0] * (2.0 * square - 1.0)
+        + a[1] * (x * x - y * y)
+        + a[2] * 2.0 * x * y
+        + (3.0 * square - 2.0) * (a[3] * x + a[4] * y)
+}
+
+/// The correction of one distance: coefficients of each colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aberration {
+    coefficients: Vec<Coefficients>,
+}
+
+impl Aberration {
+    /// Nothing to correct in so many colours.
+    pub fn none(colours: usize) -> Self {
+        Aberration {
+            coefficients: vec![[0.0; 5]; colours],
+        }
+    }
+
+    /// From the coefficients a₃ to a₇ of red, green and blue or of the one laser, radians.
+    ///
+    /// # Errors
+    /// Neither three colours nor one; a coefficient that is not finite or beyond ±10⁴.
+    pub fn new(coefficients: impl Into<Vec<Coefficients>>) -> Result<Self> {
+        let coefficients = coefficients.into();
+        if ![1, 3].contains(&coefficients.len()) {
+            return Err(Error::Plan(format!(
+                "an aberration of {} colours; three are right, or one",
+                coefficients.len()
+            )));
+        }
+        match coefficients.iter().flatten().find(|a| a.is_nan() || a.abs() > MOST) {
+            Some(a) => Err(Error::Plan(format!(
+                "an aberration coefficient of {a} rad; it must lie in -10000..=10000"
+            ))),
+            None => Ok(Aberration { coefficients }),
+        }
+    }
+
+    /// The coefficients of each colour, radians.
+    pub fn coefficients(&self) -> &[Coefficients] {
+        &self.coefficients
+    }
+
+    /// The phase of Φ at the frequency (`mu`, `nu`), cycles a metre, radians.
+    pub fn phase(&self, colour: usize, mu: f64, nu: f64, pitch_m: f64) -> f64 {
+        let rim = 1.0 / (2.0 * pitch_m);
+        terms(&self.coefficients[colour], mu / rim, nu / rim)
+    }
+
+    /// How far sideways the correction moves light, at most, metres: the slope of the phase over 2π, over the
+    /// whole square of frequencies.
+    pub fn reach_m(&self, pitch_m: f64) -> f64 {
+        let slope = |a: &Coefficients| {
+            // |∂/∂x| and |∂/∂y| of the terms on |x|, |y| ≤ 1, each bounded by its parts.
+            let x = 4.0 * a[0].abs() + 2.0 * a[1].abs() + 2.0 * a[2].abs();
+            x + 10.0 * a[3].abs().max(a[4].abs()) + 6.0 * a[3].abs().min(a[4].abs())
+        };
+        let steepest = self.coefficients.iter().map(slope).fold(0.0, f64::max);
+        steepest / (2.0 * PI) * 2.0 * pitch_m
+    }
+
+    /// What this corrects: the aberration itself.
+    pub fn reversed(&self) -> Self {
+        Aberration {
+            coefficients: self.coefficients.iter().map(|a| a.map(|a| -a)).collect(),
+        }
+    }
+
+    /// `1 − t` of this one and `t` of `other`, which is of the same colours.
+    pub fn mix(&self, other: &Self, t: f64) -> Self {
+        let colours = self.coefficients.iter().zip(&other.coefficients);
+        let mix = |(a, b): (&Coefficients, &Coefficients)| std::array::from_fn(|j| a[j] + (b[j] - a[j]) * t);
+        Aberration {
+            coefficients: colours.map(mix).collect(),
+        }
+    }
+}
+
+/// Corrections at calibrated distances; between two they are interpolated linearly, beyond the ends the last
+/// one holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Aberrations {
+    at: Vec<(f64, Aberration)>,
+}
+
+impl Aberrations {
+    /// From the corrections at z against the midpoint, metres, positive toward the viewer.
+    ///
+    /// # Errors
+    /// None at all, z that are not finite or do not ascend, or corrections of different numbers of colours.
+    pub fn new(at: Vec<(f64, Aberration)>) -> Result<Self> {
+        if at.is_empty() {
+            return Err(Error::Plan(
+                "no distances at which aberrations are known; give at least one".into(),
+            ));
+        }
+        if !at.iter().all(|(z, _)| z.is_finite()) || !at.is_sorted_by(|a, b| a.0 < b.0) {
+            let z: Vec<_> = at.iter().map(|(z, _)| z * 1e3).collect();
+            return Err(Error::Plan(format!(
+                "aberrations at z = {z:?} mm; distances must ascend"
+            )));
+        }
+        let colours = at[0].1.coefficients.len();
+        if at.iter().any(|(_, a)| a.coefficients.len() != colours) {
+            return Err(Error::Plan(
+                "aberrations of one colour and of three; all distances must have the same".into(),
+            ));
+        }
+        Ok(Aberrations { at })
+    }
+
+    /// The calibrated distances, metres, and their corrections.
+    pub fn calibrated(&self) -> &[(f64, Aberration)] {
+        &self.at
+    }
+
+    /// The correction at `z_m`.
+    pub fn at(&self, z_m: f64) -> Aberration {
+        let next = self.at.partition_point(|(z, _)| *z <= z_m);
+        match (next.checked_sub(1), self.at.get(next)) {
+            (Some(i), Some((z, far))) => {
+                let (z0, near) = &self.at[i];
+                near.mix(far, (z_m - z0) / (z - z0))
+            }
+            (Some(i), None) => self.at[i].1.clone(),
+            (None, _) => self.at[0].1.clone(),
+        }
+    }
+
+    /// The correction, where it is one for all depths: what a phone can undo on the way to the modulator.
+    pub fn constant(&self) -> Option<Aberration> {
+        let first = &self.at[0].1;
+        self.at.iter().all(|(_, a)| a == first).then(|| first.clone())
+    }
+}
+
+/// How far from its centre a sub-hologram reaches that focuses to `distance_m`, metres: |d|·tan(asin(λ/2p)).
+pub fn sub_hologram_radius_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
+    super::asm::reach_m(distance_m, wavelength_m, pitch_m)
+}
+
+/// The corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of (`height`, `width`) pixels: amplitude 1 in its
+/// circle, where it bends a plane wave to a focus at the signed `distance_m` (positive toward the viewer),
+/// with the correction `a` on it; 0 outside.
+///
+/// # Errors
+/// A distance of 0 or one that is not finite, or an aperture that does not fit into the plane.
+pub fn sub_hologram(
+    height: usize,
+    width: usize,
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    a: &Coefficients,
+) -> Result<Vec<Complex32>> {
+    let radius_m = sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
+    let pixels = radius_m / pitch_m;
+    if !(pixels >= 1.0 && 2.0 * pixels <= height.min(width) as f64) {
+        return Err(Error::Plan(format!(
+            "a focus at {:.3} mm from the modulator needs a sub-hologram {:.0} pixels wide; the plane is {width}×{height}, and at least 2 are needed",
+            distance_m * 1e3,
+            2.0 * pixels
+        )));
+    }
+    let centre = |n: usize| ((n - 1) / 2) as f64;
+    let mut plane = Vec::with_capacity(height * width);
+    for y in 0..height {
+        for x in 0..width {
+            let (x, y) = (x as f64 - centre(width), y as f64 - centre(height));
+            let square = (x * x + y * y) * pitch_m * pitch_m;
+            if square > radius_m * radius_m {
+                plane.push(Complex32::ZERO);
+                continue;
+            }
+            // The conjugate of the wave that a point at the focus would send here.
+            let path = square / (distance_m.abs() + (distance_m * distance_m + square).sqrt());
+            let lens = -2.0 * PI / wavelength_m * path * distance_m.signum();
+            let side = -distance_m.signum() / pixels;
+            let phase = lens + terms(a, side * x, side * y);
+            plane.push(Complex32::new(phase.cos() as f32, phase.sin() as f32));
+        }
+    }
+    Ok(plane)
+}
+
+/// Φ_d = F(ASM(φ_d, d)), the paper's way, (H, W), frequencies in the order of the discrete Fourier transform and phases
+/// against the centre of the sub-hologram; scaled so that the uncorrected one has a mean magnitude of 1 over
+/// half the pupil. Naive sums: for small planes.
+///
+/// # Errors
+/// As [`sub_hologram`].
+pub fn corrected_transfer_function(
+    height: usize,
+    width: usize,
+    pitch_m: f64,
+    wavelength_m: f64,
+    distance_m: f64,
+    a: &Coefficients,
+) -> Result<Array2<Complex64>> {
+    let spectrum = |a: &Coefficients| -> Result<Array2<Complex64>> {
+        let mut plane = sub_hologram(height, width, pitch_m, wavelength_m, distance_m, a)?;
+        let padding = Padding::Reach;
+        let plan = Propagator::new(height, width, pitch_m, wavelength_m, distance_m, padding)?;
+        plan.propagate(&mut plane, &mut plan.scratch());
+        // The centre comes to the corner, so that Φ says nothing of where the sub-hologram stood.
+        let (cy, cx) = ((height - 1) / 2, (width - 1) / 2);
+        let spot = Array2::from_shape_fn((height, width), |(y, x)| {
+            let v = plane[(y + cy) % height * width + (x + cx) % width];
+            Complex64::new(v.re.into(), v.im.into())
+        });
+        Ok(reference::dft(&spot, -1.0))
+    };
+    let ideal = spectrum(&[0.0; 5])?;
+    let frequency = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
+    let inner = ideal.indexed_iter().filter(|((ky, kx), _)| {
+        let (fx, fy) = (frequency(*kx, width), frequency(*ky, height));
+        fx * fx + fy * fy < 0.25 * 0.25
+    });
+    let (sum, count) = inner.fold((Complex64::ZERO, 0), |(sum, n), (_, v)| (sum + v, n + 1));
+    // A converging wave is also turned by a constant, which is no aberration.
+    Ok(spectrum(a)? / (sum / f64::from(count)))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const PITCH: f64 = 8e-6;
+    const GREEN: f64 = 520e-9;
+
+    #[test]
+    fn the_terms_are_those_of_equations_14_to_18() {
+        for (rho, theta) in [(0.0, 0.3), (0.5, 1.1), (1.0, -2.0), (0.8, 3.0f64)] {
+            let square: f64 = rho * rho;
+            let polar = [
+                2.0 * square - 1.0,
+                square * (2.0 * theta).cos(),
+                square * (2.0 * theta).sin(),
+                (3.0 * square - 2.0) * rho * theta.cos(),
+                (3.0 * square - 2.0) * rho * theta.sin(),
+            ];
+            for (j, expected) in polar.iter().enumerate() {
+                let mut a = [0.0; 5];
+                a[j] = 1.7;
+                let ours = terms(&a, rho * theta.cos(), rho * theta.sin());
+                assert!((ours - 1.7 * expected).abs() < 1e-12, "{j}: {ours} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn coefficients_run_piecewise_linearly_over_depth() {
+        let of = |a: f64| Aberration::new([[a; 5], [2.0 * a; 5], [0.0; 5]]).unwrap();
+        let all = Aberrations::new(vec![(-1e-3, of(1.0)), (0.0, of(2.0)), (2e-3, of(4.0))]).unwrap();
+        for (z, a) in [(-5e-3, 1.0), (-1e-3, 1.0), (-0.5e-3, 1.5), (1e-3, 3.0), (9e-3, 4.0)] {
+            let at = all.at(z);
+            assert!((at.coefficients()[1][4] - 2.0 * a).abs() < 1e-12, "{z}: {at:?}");
+        }
+        assert!(all.constant().is_none());
+        let same = Aberrations::new(vec![(0.0, of(1.0)), (1e-3, of(1.0))]).unwrap();
+        assert_eq!(same.constant(), Some(of(1.0)));
+        assert!(Aberrations::new(vec![]).is_err());
+        assert!(Aberrations::new(vec![(0.0, of(1.0)), (0.0, of(1.0))]).is_err());
+        assert!(Aberration::new([[f64::NAN; 5]; 3]).is_err());
+    }
+
+    #[test]
+    fn no_slope_is_beyond_the_reach() {
+        let cases = [
+            [1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, -2.0, 1.0, 0.0, 0.0],
+            [0.3, 0.2, -0.5, 1.5, -0.7],
+        ];
+        for a in cases {
+            let aberration = Aberration::new([a; 3]).unwrap();
+            let reach = aberration.reach_m(PITCH);
+            let df = 1.0 / (2.0 * PITCH) * 1e-4;
+            for i in -10..=10 {
+                for j in -10..=10 {
+                    let (mu, nu) = (f64::from(i) / 20.0 / PITCH, f64::from(j) / 20.0 / PITCH);
+                    let at = |mu: f64, nu: f64| aberration.phase(1, mu, nu, PITCH);
+                    for slope in [at(mu + df, nu) - at(mu - df, nu), at(mu, nu + df) - at(mu, nu - df)] {
+                        assert!((slope / (4.0 * PI * df)).abs() <= reach * 1.001, "{a:?} {i} {j}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// The paper's Φ of a sub-hologram has the phase that is used, before and behind the modulator.
+    #[test]
+    fn the_sub_hologram_has_the_transfer_function() {
+        let n = 128;
+        let a = [0.6, -0.8, 0.5, 0.7, -0.4];
+        let aberration = Aberration::new([a; 3]).unwrap();
+        for distance in [14e-3, -14e-3] {
+            let literal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &a).unwrap();
+            let ideal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
+            let (mut square, mut count) = (0.0, 0.0);
+            for ((ky, kx), value) in literal.indexed_iter() {
+                let signed = |k: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
+                let (fx, fy) = (signed(kx), signed(ky));
+                if fx.hypot(fy) > 0.4 {
+                    continue;
+                }
+                let expected = aberration.phase(1, fx / PITCH, fy / PITCH, PITCH);
+                // Against the uncorrected one: rim and lens are alike in both.
+                let apart = (value / ideal[(ky, kx)] * Complex64::from_polar(1.0, -expected)).arg();
+                square += apart * apart;
+                count += 1.0;
+            }
+            let rms = (square / count).sqrt();
+            assert!(rms < 0.12, "{distance}: {rms} rad");
+        }
+    }
+
+    #[test]
+    fn sub_holograms_that_cannot_be_are_named() {
+        for distance in [0.0, f64::NAN, 1.0] {
+            let e = sub_hologram(64, 64, PITCH, GREEN, distance, &[0.0; 5]).unwrap_err();
+            assert!(e.to_string().contains("sub-hologram"), "{e}");
+        }
+    }
+}

@@ -1,0 +1,511 @@
+//! A hologram's levels as the images that a modulator's driver takes: colours in one image or one after another,
+//! flipped, shifted, at the modulator's resolution with the hologram in its middle.
+//!
+//! Around the hologram the modulator shows amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light
+//! does not pass the aperture. One level everywhere would be a bright frame.
+//!
+//! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
+//! and a shifted hologram does not stand where the table takes it to be.
+
+mod cells;
+pub mod modulator;
+mod split;
+
+pub use cells::{BitPlanes, Cells};
+pub use split::Split;
+
+use crate::display::response::Response;
+use crate::display::response::per_pixel::PerPixel;
+use crate::display::target::Target;
+use crate::runtime::error::{Error, Result};
+use std::f32::consts::FRAC_PI_2;
+use std::sync::Arc;
+
+/// How the levels of the colours lie in images. Where all colours are in one, those of one laser stand at each. Levels
+/// of fewer bits than their place in the image stand in its upper bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Layout {
+    /// One image, bytes red, green, blue.
+    Rgb,
+    /// One image, bytes red, green, blue, alpha 255.
+    Rgba,
+    /// One image, bytes blue, green, red, alpha 255.
+    Bgra,
+    /// One image, 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
+    /// RGBA_1010102, Metal's rgb10a2.
+    Rgb10,
+    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
+    Grey,
+    /// An image for each colour, one after another: red, green, blue; a 16-bit little-endian word a pixel.
+    Grey16,
+    /// An image for each colour, one after another; bytes red, green, blue, over which a level's bits are spread.
+    Split(Split),
+}
+
+/// A hologram's levels, (C, H, W).
+#[derive(Debug, Clone, Copy)]
+pub enum Levels<'a> {
+    /// As the planned response makes them, up to 8 bits.
+    Bytes(&'a [u8]),
+    /// Of the display's bits, 9 or 10.
+    Words(&'a [u16]),
+}
+
+impl Layout {
+    /// How many images a hologram of `colours` becomes.
+    pub fn images(self, colours: usize) -> usize {
+        match self {
+            Layout::Grey | Layout::Grey16 | Layout::Split(_) => colours,
+            _ => 1,
+        }
+    }
+
+    /// Bytes of a pixel.
+    pub fn pixel_bytes(self) -> usize {
+        match self {
+            Layout::Rgb | Layout::Split(_) => 3,
+            Layout::Rgba | Layout::Bgra | Layout::Rgb10 => 4,
+            Layout::Grey => 1,
+            Layout::Grey16 => 2,
+        }
+    }
+
+    /// Bits of a level's place.
+    pub(crate) fn place_bits(self) -> u32 {
+        match self {
+            Layout::Rgb10 => 10,
+            Layout::Grey16 => 16,
+            Layout::Split(split) => split.bits(),
+            _ => 8,
+        }
+    }
+
+    /// A pixel of image `image` from `level` of each colour, levels being as wide as their place.
+    fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
+        let byte = |colour| level(colour) as u8;
+        match self {
+            Layout::Rgb => pixel.copy_from_slice(&[byte(0), byte(1), byte(2)]),
+            Layout::Rgba => pixel.copy_from_slice(&[byte(0), byte(1), byte(2), 255]),
+            Layout::Bgra => pixel.copy_from_slice(&[byte(2), byte(1), byte(0), 255]),
+            Layout::Rgb10 => {
+                let colours = (0..3).map(|c| u32::from(level(c)) << (10 * c));
+                let word = colours.fold(3 << 30, |word, colour| word | colour);
+                pixel.copy_from_slice(&word.to_le_bytes());
+            }
+            Layout::Grey => pixel[0] = byte(image),
+            Layout::Grey16 => pixel.copy_from_slice(&level(image).to_le_bytes()),
+            Layout::Split(split) => pixel.copy_from_slice(&split.pixel(level(image))),
+        }
+    }
+
+    /// The level of `colour` in a pixel of image `image`, as wide as its place; None where it is another image's.
+    fn read_pixel(self, image: usize, colour: usize, pixel: &[u8]) -> Option<u16> {
+        let alone = |level: u16| (colour == image).then_some(level);
+        match self {
+            Layout::Rgb | Layout::Rgba => Some(pixel[colour].into()),
+            Layout::Bgra => Some(pixel[2 - colour].into()),
+            Layout::Rgb10 => {
+                let word = u32::from_le_bytes([pixel[0], pixel[1], pixel[2], pixel[3]]);
+                Some((word >> (10 * colour)) as u16 & 0x3ff)
+            }
+            Layout::Grey => alone(pixel[0].into()),
+            Layout::Grey16 => alone(u16::from_le_bytes([pixel[0], pixel[1]])),
+            Layout::Split(split) => alone(split.level([pixel[0], pixel[1], pixel[2]])),
+        }
+    }
+}
+
+/// How a hologram is put on its modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Placement {
+    /// How colours lie in images.
+    pub layout: Layout,
+    /// Whether left and right are exchanged, of the whole image.
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole image.
+    pub flip_y: bool,
+    /// How many pixels to the right of the middle the hologram stands, before flips. What leaves the modulator is cut.
+    pub shift_x: i32,
+    /// How many pixels below the middle it stands, before flips.
+    pub shift_y: i32,
+}
+
+impl Placement {
+    /// In the middle, not flipped.
+    pub fn centred(layout: Layout) -> Self {
+        Placement {
+            layout,
+            flip_x: false,
+            flip_y: false,
+            shift_x: 0,
+            shift_y: 0,
+        }
+    }
+}
+
+/// A plan for one modulator, hologram shape and placement. Immutable; shared between threads.
+#[derive(Debug, Clone)]
+pub struct Output {
+    colours: usize,
+    modulator: (usize, usize),
+    hologram: (usize, usize),
+    placement: Placement,
+    /// Of the image's upper left pixel, its place in the hologram, which may lie outside.
+    from: (i64, i64),
+    /// Bits of a level in bytes, and of one in words.
+    bits: (u32, u32),
+    dark: Dark,
+}
+
+/// What is shown around the hologram: double phase of amplitude 0.
+#[derive(Debug, Clone)]
+enum Dark {
+    /// The levels where x + y of the hologram is even and where it is odd.
+    Everywhere([u8; 2]),
+    /// Those of each pixel of the modulator.
+    PerPixel(Arc<PerPixel>),
+}
+
+/// The phases of darkness where x + y is even and where it is odd.
+const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
+
+impl Output {
+    /// Plans images of the modulator's resolution for (H, W) holograms for `target`.
+    ///
+    /// # Errors
+    /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
+    pub fn new(target: &Target, (height, width): (usize, usize), placement: Placement) -> Result<Self> {
+        target.check()?;
+        let (modulator, bits) = (target.modulator(), target.display.bits());
+        if height > modulator.0 || width > modulator.1 {
+            return Err(Error::Plan(format!(
+                "a hologram of {width}×{height} does not fit the modulator of {}×{}",
+                modulator.1, modulator.0
+            )));
+        }
+        let from =
+            |modulator: usize, hologram: usize, shift: i32| -(((modulator - hologram) / 2) as i64 + i64::from(shift));
+        Ok(Output {
+            colours: target.display.colours(),
+            modulator,
+            hologram: (height, width),
+            placement,
+            from: (
+                from(modulator.0, height, placement.shift_y),
+                from(modulator.1, width, placement.shift_x),
+            ),
+            bits: match &target.response {
+                Response::Linear { bits: bytes } => (*bytes, bits),
+                Response::Lut { .. } if target.panel.levels_turns.is_some() => (bits, bits),
+                Response::Lut { .. } | Response::PerPixel(_) => (8, bits),
+            },
+            dark: match target.response.clone() {
+                Response::PerPixel(table) => Dark::PerPixel(table),
+                same => Dark::Everywhere(DARK.map(|phase| same.level(phase, 0))),
+            },
+        })
+    }
+
+    /// Bytes of an image.
+    pub fn image_bytes(&self) -> usize {
+        self.modulator.0 * self.modulator.1 * self.placement.layout.pixel_bytes()
+    }
+
+    /// (H, W) of an image.
+    pub fn shape(&self) -> (usize, usize) {
+        self.modulator
+    }
+
+    /// Image `image` of a hologram of `levels`, (C, H, W), into `bytes`, rows without gaps. Allocates nothing.
+    ///
+    /// # Errors
+    /// An image that the layout has not.
+    ///
+    /// # Panics
+    /// If `levels` or `bytes` has another length than planned.
+    pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
+        let size = self.colours * self.hologram.0 * self.hologram.1;
+        let (byte_bits, word_bits) = self.bits;
+        match levels {
+            Levels::Bytes(levels) => {
+                assert_eq!(levels.len(), size);
+                let level = |at: usize| u16::from(levels[at]);
+                let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.dark {
+                    Dark::Everywhere(levels) => levels[odd].into(),
+                    Dark::PerPixel(table) => {
+                        let (height, width) = self.modulator;
+                        let at = (colour * height + y) * width + x;
+                        table.level(DARK[odd], at).into()
+                    }
+                };
+                self.write_levels(level, byte_bits, dark, image, bytes)
+            }
+            Levels::Words(levels) => {
+                assert_eq!(levels.len(), size);
+                // Of π/2 and 3π/2.
+                let quarter = (1u16 << word_bits) / 4;
+                let dark = |odd: usize, _: usize, _: (usize, usize)| quarter * [1, 3][odd];
+                self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
+            }
+        }
+    }
+
+    /// The inverse of [`Self::write`]: the levels that image `image` shows, of the display's bits, into their places of
+    /// (C, H, W). What other images hold is left as it is, and so are pixels that were shifted off the modulator.
+    ///
+    /// # Errors
+    /// An image that the layout has not, or whose pixels have fewer bits than the display.
+    ///
+    /// # Panics
+    /// If `levels` or `bytes` has another length than planned.
+    pub fn read(&self, bytes: &[u8], image: usize, levels: &mut [u16]) -> Result<()> {
+        let layout = self.placement.layout;
+        let (height, width) = self.hologram;
+        let (out_height, out_width) = self.modulator;
+        assert_eq!(bytes.len(), self.image_bytes());
+        assert_eq!(levels.len(), self.colours * height * width);
+        self.check_image(image)?;
+        let (place, bits) = (layout.place_bits(), self.bits.1);
+        if place < bits {
+            return Err(Error::Plan(format!(
+                "{layout:?} has {place} bits a level, the display has {bits}; what it leaves out cannot be read"
+            )));
+        }
+        for y in 0..height {
+            for x in 0..width {
+                let (row, column) = (y as i64 - self.from.0, x as i64 - self.from.1);
+                if !(0..out_height as i64).contains(&row) || !(0..out_width as i64).contains(&column) {
+                    continue;
+                }
+                let row = flip(row as usize, out_height, self.placement.flip_y);
+                let column = flip(column as usize, out_width, self.placement.flip_x);
+                let pixel = &bytes[(row * out_width + column) * layout.pixel_bytes()..][..layout.pixel_bytes()];
+                for colour in 0..self.colours {
+                    if let Some(level) = layout.read_pixel(image, colour, pixel) {
+                        levels[(colour * height + y) * width + x] = level >> (place - bits);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn check_image(&self, image: usize) -> Result<()> {
+        let layout = self.placement.layout;
+        if image >= layout.images(self.colours) {
+            return Err(Error::Plan(format!(
+                "there is no image {image}; {layout:?} has {}",
+                layout.images(self.colours)
+            )));
+        }
+        Ok(())
+    }
+
+    fn write_levels(
+        &self,
+        level: impl Fn(usize) -> u16,
+        bits: u32,
+        dark: impl Fn(usize, usize, (usize, usize)) -> u16,
+        image: usize,
+        bytes: &mut [u8],
+    ) -> Result<()> {
+        let layout = self.placement.layout;
+        let (height, width) = self.hologram;
+        let (out_height, out_width) = self.modulator;
+        assert_eq!(bytes.len(), self.image_bytes());
+        self.check_image(image)?;
+        let place = layout.place_bits();
+        let placed = |level: u16| match bits <= place {
+            true => level << (place - bits),
+            false => level >> (bits - place),
+        };
+        let pixel_bytes = layout.pixel_bytes();
+        for (y, row) in bytes.chunks_exact_mut(out_width * pixel_bytes).enumerate() {
+            let modulator_y = flip(y, out_height, self.placement.flip_y);
+            let y = self.from.0 + modulator_y as i64;
+            for (x, pixel) in row.chunks_exact_mut(pixel_bytes).enumerate() {
+                let modulator_x = flip(x, out_width, self.placement.flip_x);
+                let x = self.from.1 + modulator_x as i64;
+                let inside = (0..height as i64).contains(&y) && (0..width as i64).contains(&x);
+                let level = |place: usize| {
+                    let colour = place % self.colours;
+                    placed(match inside {
+                        true => level((colour * height + y as usize) * width + x as usize),
+                        false => dark((x + y).rem_euclid(2) as usize, colour, (modulator_y, modulator_x)),
+                    })
+                };
+                layout.write_pixel(image, level, pixel);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Place `at` of `n`, counted from the other end where `flipped`.
+fn flip(at: usize, n: usize, flipped: bool) -> usize {
+    if flipped { n - 1 - at } else { at }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::display::Display;
+
+    fn target(width: usize, height: usize, bits: u32) -> Target {
+        let toml = format!("width = {width}\nheight = {height}\nbits = {bits}");
+        Display::from_toml(&toml).unwrap().into()
+    }
+
+    /// Levels that say colour, row and column.
+    fn levels(height: usize, width: usize) -> Vec<u8> {
+        (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                (100 + 50 * c + 10 * y + x) as u8
+            })
+            .collect()
+    }
+
+    fn image(output: &Output, levels: &[u8], image: usize) -> Vec<u8> {
+        let mut bytes = vec![7; output.image_bytes()];
+        output.write(Levels::Bytes(levels), image, &mut bytes).unwrap();
+        bytes
+    }
+
+    #[test]
+    fn each_layout_holds_each_colour_in_its_place() {
+        let levels = levels(2, 3);
+        for (layout, expected) in [
+            (Layout::Rgb, vec![100, 150, 200, 101, 151, 201]),
+            (Layout::Rgba, vec![100, 150, 200, 255, 101, 151]),
+            (Layout::Bgra, vec![200, 150, 100, 255, 201, 151]),
+            (Layout::Grey, vec![100, 101, 102, 110, 111, 112]),
+            (Layout::Grey16, vec![0, 100, 0, 101, 0, 102]),
+        ] {
+            let output = Output::new(&target(3, 2, 8), (2, 3), Placement::centred(layout));
+            let output = output.unwrap();
+            assert_eq!(image(&output, &levels, 0)[..6], expected, "{layout:?}");
+            assert!(
+                output
+                    .write(
+                        Levels::Bytes(&levels),
+                        layout.images(3),
+                        &mut vec![0; output.image_bytes()]
+                    )
+                    .is_err()
+            );
+            if layout == Layout::Grey {
+                assert_eq!(image(&output, &levels, 2), [200, 201, 202, 210, 211, 212]);
+            }
+        }
+    }
+
+    #[test]
+    fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
+        let levels = levels(2, 3);
+        // In a 7×4 modulator two columns and one row are left of and above it.
+        let place = |x: usize, y: usize, p: &Placement| {
+            let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
+            let y = if p.flip_y { 3 - y } else { y } as i32 - 1 - p.shift_y;
+            match (0..3).contains(&x) && (0..2).contains(&y) {
+                true => (100 + 10 * y + x) as u8,
+                // π/2 and 3π/2 go on the hologram's checkerboard.
+                false => [64, 192][(x + y).rem_euclid(2) as usize],
+            }
+        };
+        for (flip_x, flip_y, shift_x, shift_y) in [
+            (false, false, 0, 0),
+            (true, false, 0, 0),
+            (false, true, 1, 0),
+            (true, true, -3, 2),
+            (false, false, 100, 0),
+        ] {
+            let placement = Placement {
+                flip_x,
+                flip_y,
+                shift_x,
+                shift_y,
+                ..Placement::centred(Layout::Grey)
+            };
+            let output = Output::new(&target(7, 4, 8), (2, 3), placement).unwrap();
+            for (i, byte) in image(&output, &levels, 0).into_iter().enumerate() {
+                assert_eq!(byte, place(i % 7, i / 7, &placement), "{placement:?} {i}");
+            }
+        }
+        assert!(Output::new(&target(2, 4, 8), (2, 3), Placement::centred(Layout::Rgb)).is_err());
+    }
+
+    #[test]
+    fn few_bits_stand_in_the_upper_ones() {
+        for bits in 1..=8 {
+            let placement = Placement::centred(Layout::Grey);
+            let output = Output::new(&target(1, 1, bits), (1, 1), placement).unwrap();
+            let top = ((1u32 << bits) - 1) as u8;
+            assert_eq!(image(&output, &[top; 3], 0), [top << (8 - bits)]);
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let ten = Split::new([&[9, 8, 7], &[6, 5, 4], &[3, 2, 1, 0]]).unwrap();
+        let all = [
+            (Layout::Rgb, 8),
+            (Layout::Bgra, 5),
+            (Layout::Rgb10, 10),
+            (Layout::Grey, 4),
+            (Layout::Grey16, 10),
+            (Layout::Split(ten), 10),
+        ];
+        for (layout, bits) in all {
+            let placement = Placement {
+                flip_x: true,
+                flip_y: true,
+                shift_x: 1,
+                ..Placement::centred(layout)
+            };
+            let output = Output::new(&target(9, 6, bits), (3, 5), placement).unwrap();
+            let words: Vec<u16> = (0..45).map(|i| (i * 37 + 5) % (1 << bits)).collect();
+            let bytes: Vec<u8> = words.iter().map(|word| *word as u8).collect();
+            let mut read = vec![0; words.len()];
+            for image in 0..layout.images(3) {
+                let mut pixels = vec![0; output.image_bytes()];
+                let levels = if bits > 8 {
+                    Levels::Words(&words)
+                } else {
+                    Levels::Bytes(&bytes)
+                };
+                output.write(levels, image, &mut pixels).unwrap();
+                output.read(&pixels, image, &mut read).unwrap();
+            }
+            assert_eq!(read, words, "{layout:?}");
+        }
+        let output = Output::new(&target(2, 1, 10), (1, 2), Placement::centred(Layout::Grey)).unwrap();
+        let error = output.read(&[0; 2], 0, &mut [0; 6]).unwrap_err().to_string();
+        assert!(error.contains("10"), "{error}");
+    }
+
+    #[test]
+    fn ten_bits_stand_in_words() {
+        let target = target(2, 1, 10);
+        let words = [1023, 5, 512, 6, 256, 7];
+        for (layout, expected) in [
+            (
+                Layout::Rgb10,
+                (1023u32 | 512 << 10 | 256 << 20 | 3 << 30).to_le_bytes().to_vec(),
+            ),
+            (Layout::Grey16, (1023u16 << 6).to_le_bytes().to_vec()),
+            (Layout::Rgb, vec![255, 128, 64]),
+        ] {
+            let output = Output::new(&target, (1, 2), Placement::centred(layout)).unwrap();
+            let mut bytes = vec![0; output.image_bytes()];
+            output.write(Levels::Words(&words), 0, &mut bytes).unwrap();
+            assert_eq!(bytes[..expected.len()], expected, "{layout:?}");
+        }
+        let around = Output::new(&target, (1, 1), Placement::centred(Layout::Grey16)).unwrap();
+        let mut bytes = vec![0; around.image_bytes()];
+        around.write(Levels::Words(&[1, 2, 3]), 1, &mut bytes).unwrap();
+        assert_eq!(bytes[..4], [0x80, 0, 0, 0xc0]);
+    }
+}

@@ -1,0 +1,251 @@
+//! Modulators of moving mirrors, whose pixels are memory cells: a level is a pattern of bits in the 2×2 cells below a
+//! pixel, and a frame of 24 bits carries 24 such patterns, one after another in time.
+//!
+//! Plane n of a frame is bit n mod 8 of red (n < 8), green (n < 16) or blue.
+
+use super::flip;
+use crate::runtime::error::{Error, Result};
+use rayon::prelude::*;
+
+/// Planes of a frame.
+const PLANES: usize = 24;
+
+/// How a level becomes the bits of its pixel's cells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Cells {
+    memory: Vec<u8>,
+    layout: [[u8; 2]; 2],
+}
+
+impl Cells {
+    /// `memory`: of each level, the number that its cells hold; `layout`: of each cell, rows from above, which bit of
+    /// that number.
+    ///
+    /// # Errors
+    /// Other than 2, 4, 8 or 16 levels, numbers that are not 0, 1, 2 … each once, or bits over 3 or twice.
+    pub fn new(memory: &[u8], layout: [[u8; 2]; 2]) -> Result<Self> {
+        let refuse = |what: &str| Err(Error::Plan(format!("a modulator's cells: {what}")));
+        let once = |values: &[u8]| {
+            let mut sorted = values.to_vec();
+            sorted.sort_unstable();
+            sorted.iter().enumerate().all(|(n, value)| n == usize::from(*value))
+        };
+        if ![2, 4, 8, 16].contains(&memory.len()) || !once(memory) {
+            return refuse("memory must hold each number from 0 on once, for 2, 4, 8 or 16 levels");
+        }
+        if !once(layout.as_flattened()) {
+            return refuse("layout must hold the bits 0, 1, 2 and 3 once each");
+        }
+        Ok(Cells {
+            memory: memory.to_vec(),
+            layout,
+        })
+    }
+
+    /// Levels of a pixel.
+    pub fn levels(&self) -> usize {
+        self.memory.len()
+    }
+
+    /// Whether each cell is set for `level`.
+    fn bits(&self, level: usize) -> [[bool; 2]; 2] {
+        let memory = self.memory[level];
+        self.layout.map(|row| row.map(|bit| (memory >> bit) & 1 == 1))
+    }
+}
+
+/// A plan for frames of (H, W) pixels. Immutable; shared between threads.
+#[derive(Debug, Clone)]
+pub struct BitPlanes {
+    levels: usize,
+    shape: (usize, usize),
+    flip_x: bool,
+    flip_y: bool,
+    /// Of each level the four cells' bits as they stand in the frame, in the lowest bit of a byte each: upper left,
+    /// upper right, lower left, lower right.
+    spread: [u32; 16],
+    /// The same of two levels of neighbouring planes, the later in the upper four bits of the index and in the second
+    /// bit of each byte: looking up is what takes the time.
+    pairs: Box<[u32; 256]>,
+}
+
+impl BitPlanes {
+    /// Plans frames of the 2·H×2·W cells of `shape` = (H, W) pixels, left and right, top and bottom exchanged where
+    /// asked for: cells and pixels alike.
+    pub fn new(cells: &Cells, shape: (usize, usize), flip_x: bool, flip_y: bool) -> Self {
+        let spread: [u32; 16] = std::array::from_fn(|level| {
+            // Bits above a level's mean nothing.
+            let bits = cells.bits(level % cells.levels());
+            let cell = |n: usize| bits[flip(n / 2, 2, flip_y)][flip(n % 2, 2, flip_x)];
+            (0..4).fold(0, |all, n| all | u32::from(cell(n)) << (8 * n))
+        });
+        BitPlanes {
+            levels: cells.levels(),
+            shape,
+            flip_x,
+            flip_y,
+            pairs: Box::new(std::array::from_fn(|pair| spread[pair % 16] | spread[pair / 16] << 1)),
+            spread,
+        }
+    }
+
+    /// (H, W) of a frame: two cells for each pixel along each axis.
+    pub fn frame_shape(&self) -> (usize, usize) {
+        (2 * self.shape.0, 2 * self.shape.1)
+    }
+
+    /// Bytes of a frame, red, green and blue of each cell.
+    pub fn frame_bytes(&self) -> usize {
+        12 * self.shape.0 * self.shape.1
+    }
+
+    /// A frame of `maps` of levels, (H, W) each, shown one after another for the same time: of N maps plane n shows map
+    /// ⌊n·N/24⌋. Three maps are one in each of red, green and blue; one map is shown all the time. Allocates nothing.
+    ///
+    /// # Errors
+    /// A number of maps that does not divide 24.
+    ///
+    /// # Panics
+    /// If a map or `frame` has another length than planned.
+    pub fn pack(&self, maps: &[&[u8]], frame: &mut [u8]) -> Result<()> {
+        let (height, width) = self.shape;
+        let count = maps.len();
+        if count == 0 || !PLANES.is_multiple_of(count) {
+            return Err(Error::Plan(format!(
+                "{count} maps; a frame of {PLANES} planes holds 1, 2, 3, 4, 6, 8, 12 or 24"
+            )));
+        }
+        assert!(maps.iter().all(|map| map.len() == height * width));
+        assert_eq!(frame.len(), self.frame_bytes());
+        frame
+            .par_chunks_exact_mut(12 * width)
+            .enumerate()
+            .for_each(|(y, rows)| {
+                let y = flip(y, height, self.flip_y);
+                let planes: [&[u8]; PLANES] = std::array::from_fn(|n| &maps[n * count / PLANES][y * width..][..width]);
+                self.pack_row(&planes, rows);
+            });
+        Ok(())
+    }
+
+    /// Two rows of a frame from one row of pixels.
+    fn pack_row(&self, planes: &[&[u8]; PLANES], rows: &mut [u8]) {
+        const RUN: usize = 64;
+        let width = planes[0].len();
+        let (upper, lower) = rows.split_at_mut(6 * width);
+        for first in (0..width).step_by(RUN) {
+            let count = RUN.min(width - first);
+            let at = if self.flip_x { width - first - count } else { first };
+            let mut cells = [[0; RUN]; 3];
+            for (n, [one, other]) in planes.as_chunks::<2>().0.iter().enumerate() {
+                let levels = one[at..at + count].iter().zip(&other[at..at + count]);
+                for (cells, (one, other)) in cells[n / 4].iter_mut().zip(levels) {
+                    *cells |= self.pairs[usize::from((one & 15) | (other << 4))] << (2 * (n % 4));
+                }
+            }
+            let upper = upper[6 * first..][..6 * count].as_chunks_mut::<6>().0;
+            let lower = lower[6 * first..][..6 * count].as_chunks_mut::<6>().0;
+            for (x, (upper, lower)) in upper.iter_mut().zip(lower).enumerate() {
+                let x = flip(x, count, self.flip_x);
+                for (colour, cells) in cells.iter().enumerate() {
+                    let [upper_left, upper_right, lower_left, lower_right] = cells[x].to_le_bytes();
+                    (upper[colour], upper[3 + colour]) = (upper_left, upper_right);
+                    (lower[colour], lower[3 + colour]) = (lower_left, lower_right);
+                }
+            }
+        }
+    }
+
+    /// The inverse: the levels of plane `plane` of `frame`, into `levels`, (H, W).
+    ///
+    /// # Errors
+    /// A plane beyond the 24, or cells that are no level's.
+    ///
+    /// # Panics
+    /// If `frame` or `levels` has another length than planned.
+    pub fn unpack(&self, frame: &[u8], plane: usize, levels: &mut [u8]) -> Result<()> {
+        let (height, width) = self.shape;
+        assert!(frame.len() == self.frame_bytes() && levels.len() == height * width);
+        if plane >= PLANES {
+            return Err(Error::Plan(format!("there is no plane {plane}; a frame has {PLANES}")));
+        }
+        let (colour, bit) = (plane / 8, plane % 8);
+        for (at, level) in levels.iter_mut().enumerate() {
+            let (y, x) = (at / width, at % width);
+            let (row, column) = (flip(y, height, self.flip_y), flip(x, width, self.flip_x));
+            let cell = |n: usize| {
+                let at = (2 * row + n / 2) * 2 * width + 2 * column + n % 2;
+                u32::from((frame[3 * at + colour] >> bit) & 1) << (8 * n)
+            };
+            let bits = (0..4).fold(0, |all, n| all | cell(n));
+            let found = (0..self.levels).find(|level| self.spread[*level] == bits);
+            *level =
+                found.ok_or_else(|| Error::Plan(format!("the cells of pixel {x}, {y} are those of no level")))? as u8;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    const MEMORY: [u8; 16] = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12];
+
+    /// Levels that differ between maps, rows and columns.
+    fn map(n: usize, (height, width): (usize, usize)) -> Vec<u8> {
+        (0..height * width)
+            .map(|at| ((at / width * 5 + at % width * 3 + n * 7) % 16) as u8)
+            .collect()
+    }
+
+    #[test]
+    fn frames_are_those_of_the_naive_rule_and_are_read_back() {
+        for (layout, flip_x, flip_y) in [
+            ([[2, 3], [0, 1]], false, false),
+            ([[1, 3], [0, 2]], true, false),
+            ([[1, 3], [0, 2]], true, true),
+        ] {
+            let (cells, shape) = (Cells::new(&MEMORY, layout).unwrap(), (5, 7));
+            let plan = BitPlanes::new(&cells, shape, flip_x, flip_y);
+            for count in [1, 2, 3, 8, 24] {
+                let maps: Vec<Vec<u8>> = (0..count).map(|n| map(n, shape)).collect();
+                let maps: Vec<&[u8]> = maps.iter().map(Vec::as_slice).collect();
+                let mut frame = vec![0; plan.frame_bytes()];
+                plan.pack(&maps, &mut frame).unwrap();
+                for plane in 0..24 {
+                    let shown = maps[plane * count / 24];
+                    for (at, value) in frame.chunks(3).enumerate() {
+                        let (row, column) = (flip(at / 14, 10, flip_y), flip(at % 14, 14, flip_x));
+                        let memory = MEMORY[usize::from(shown[row / 2 * 7 + column / 2])];
+                        let bit = (memory >> layout[row % 2][column % 2]) & 1;
+                        assert_eq!((value[plane / 8] >> (plane % 8)) & 1, bit, "{count} {plane} {at}");
+                    }
+                    let mut levels = vec![99; 35];
+                    plan.unpack(&frame, plane, &mut levels).unwrap();
+                    assert_eq!(levels, shown);
+                }
+            }
+            assert!(
+                plan.pack(&[map(0, shape).as_slice(); 5], &mut vec![0; plan.frame_bytes()])
+                    .is_err()
+            );
+            assert!(plan.unpack(&vec![0; plan.frame_bytes()], 24, &mut [0; 35]).is_err());
+        }
+    }
+
+    #[test]
+    fn cells_that_cannot_be_are_refused() {
+        let good = [[2, 3], [0, 1]];
+        for (memory, layout) in [
+            (&MEMORY[..15], good),
+            (&[0, 0], good),
+            (&[0, 2], good),
+            (&MEMORY[..], [[0, 1], [2, 2]]),
+            (&MEMORY[..], [[0, 1], [2, 4]]),
+        ] {
+            assert!(Cells::new(memory, layout).is_err(), "{memory:?} {layout:?}");
+        }
+    }
+}

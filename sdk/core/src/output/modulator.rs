@@ -1,0 +1,402 @@
+//! Modulators that can be bought: their size, pitch and bits, the phases of their levels, and how their input takes a
+//! frame. Each is a TOML file, those in `sdk/core/devices` come along, and users have their own beside them.
+//!
+//! ```
+//! use phasefront::device::Device;
+//!
+//! let device = Device::shipped("ti-plm-p47")?;
+//! assert_eq!((device.display.width(), device.display.bits()), (960, 4));
+//! # Ok::<(), phasefront::Error>(())
+//! ```
+
+use crate::display::Display;
+use crate::display::target::{Panel, Response, Target};
+use crate::output::{Cells, Layout, Split};
+use crate::runtime::error::{Error, Result};
+use crate::runtime::keys;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+
+/// A modulator as its file describes it.
+#[derive(Debug, Clone)]
+pub struct Device {
+    /// What it is called.
+    pub name: String,
+    /// The physics; what the file leaves out has the value of [`Display::default`].
+    pub display: Display,
+    /// How its input takes a hologram.
+    pub packing: Packing,
+    /// Whether left and right are exchanged, of the whole frame.
+    pub flip_x: bool,
+    /// Whether top and bottom are exchanged, of the whole frame.
+    pub flip_y: bool,
+    /// The phase that each level shows, in turns of 2π, from 0 on; None where they are even over one turn.
+    pub levels_turns: Option<Vec<f64>>,
+    /// Frames that it shows in a second.
+    pub rate_hz: Option<f64>,
+    /// Where a figure is from, by its key in the file.
+    pub sources: BTreeMap<String, String>,
+    /// Figures that no document of the maker's confirms, with what they rest on.
+    pub unconfirmed: BTreeMap<String, String>,
+}
+
+/// How a modulator's input takes a hologram.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Packing {
+    /// All colours in one image, or one colour after another.
+    Images(Layout),
+    /// Memory cells of moving mirrors, 24 maps a frame.
+    BitPlanes(Cells),
+}
+
+/// The file's keys beside those of [`Display`].
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DeviceToml {
+    #[serde(default)]
+    name: String,
+    packing: Option<PackingToml>,
+    #[serde(default)]
+    flip_x: bool,
+    #[serde(default)]
+    flip_y: bool,
+    levels_turns: Option<Vec<f64>>,
+    range_turns: Option<f64>,
+    rate_hz: Option<f64>,
+    #[serde(default)]
+    sources: BTreeMap<String, String>,
+    #[serde(default)]
+    unconfirmed: BTreeMap<String, String>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum PackingToml {
+    Named(String),
+    Split {
+        red: Vec<u8>,
+        green: Vec<u8>,
+        blue: Vec<u8>,
+    },
+    Cells {
+        memory: Vec<u8>,
+        layout: [[u8; 2]; 2],
+    },
+}
+
+/// The names of the packings that need no figures.
+const NAMED: [(&str, Layout); 3] = [
+    ("rgb", Layout::Rgb),
+    ("grey", Layout::Grey),
+    ("grey-16", Layout::Grey16),
+];
+
+/// The files that come along, by name.
+const SHIPPED: [(&str, &str); 9] = [
+    ("hamamatsu-x15213", include_str!("../../devices/hamamatsu-x15213.toml")),
+    ("holoeye-gaea-2", include_str!("../../devices/holoeye-gaea-2.toml")),
+    ("holoeye-leto", include_str!("../../devices/holoeye-leto.toml")),
+    ("holoeye-pluto", include_str!("../../devices/holoeye-pluto.toml")),
+    ("meadowlark-hdmi", include_str!("../../devices/meadowlark-hdmi.toml")),
+    ("santec-slm-200", include_str!("../../devices/santec-slm-200.toml")),
+    ("santec-slm-210", include_str!("../../devices/santec-slm-210.toml")),
+    ("ti-plm-p47", include_str!("../../devices/ti-plm-p47.toml")),
+    ("ti-plm-p67", include_str!("../../devices/ti-plm-p67.toml")),
+];
+
+fn refuse(what: impl std::fmt::Display) -> Error {
+    Error::Display(what.to_string())
+}
+
+impl Device {
+    /// The names of the devices that come along.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        SHIPPED.iter().map(|(name, _)| *name)
+    }
+
+    /// The device called `name` that comes along.
+    ///
+    /// # Errors
+    /// A name that none has.
+    pub fn shipped(name: &str) -> Result<Self> {
+        let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(|| {
+            let all: Vec<_> = Self::names().collect();
+            refuse(format!("there is no device {name}; there are {}", all.join(", ")))
+        })?;
+        Self::from_toml(text)
+    }
+
+    /// Reads the TOML form.
+    ///
+    /// # Errors
+    /// Text that is not TOML, an unknown key, or what cannot be.
+    pub fn from_toml(text: &str) -> Result<Self> {
+        let table = toml::from_str(text).map_err(|e| refuse(keys::message(&e)))?;
+        Self::from_table(table)
+    }
+
+    /// [`Self::from_toml`] of a table that was read.
+    ///
+    /// # Errors
+    /// An unknown key, or what cannot be.
+    pub fn from_table(mut table: toml::Table) -> Result<Self> {
+        keys::check(&table, &[&keys::DISPLAY[..], &keys::DEVICE].concat())?;
+        let own: toml::Table = (keys::DEVICE.iter())
+            .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
+            .collect();
+        let display = Display::deserialize(table).map_err(|e| refuse(keys::message(&e)))?;
+        let own = DeviceToml::deserialize(own).map_err(|e| match keys::message(&e) {
+            message if message.contains("untagged") => refuse(format!(
+                "packing must be {}, or say which bits red, green and blue hold, or memory and layout of cells",
+                NAMED.map(|(name, _)| name).join(", ")
+            )),
+            message => refuse(message),
+        })?;
+        let levels_turns = levels(&own, &display)?;
+        let packing = match &own.packing {
+            None => Packing::usual(&display),
+            Some(packing) => packing.packing()?,
+        };
+        packing.check(&display)?;
+        if let Some(rate) = own.rate_hz
+            && !(rate > 0.0 && rate <= 1e6)
+        {
+            return Err(refuse(format!(
+                "rate_hz is {rate}; it must lie above 0 and up to 1000000"
+            )));
+        }
+        Ok(Device {
+            name: own.name,
+            display,
+            packing,
+            flip_x: own.flip_x,
+            flip_y: own.flip_y,
+            levels_turns,
+            rate_hz: own.rate_hz,
+            sources: own.sources,
+            unconfirmed: own.unconfirmed,
+        })
+    }
+
+    /// What a hologram for it is made for: its levels show what it says.
+    ///
+    /// # Errors
+    /// Levels of over 8 bits that are not even over one turn.
+    pub fn target(&self) -> Result<Target> {
+        let target = Target::from(&self.display);
+        match &self.levels_turns {
+            None => Ok(target),
+            Some(turns) => Ok(Target {
+                response: Response::of_turns(turns)?,
+                panel: Panel {
+                    levels_turns: Some(turns.clone()),
+                    ..Panel::default()
+                },
+                ..target
+            }),
+        }
+    }
+}
+
+/// The phase of each level in turns, where they are not even over one turn.
+fn levels(of: &DeviceToml, display: &Display) -> Result<Option<Vec<f64>>> {
+    let count = 1usize << display.bits();
+    let turns = match (&of.levels_turns, of.range_turns) {
+        (None, None | Some(1.0)) => return Ok(None),
+        (Some(_), Some(_)) => return Err(refuse("levels_turns and range_turns say the same; give one")),
+        (Some(turns), None) => turns.clone(),
+        (None, Some(range)) => (0..count).map(|level| range * level as f64 / count as f64).collect(),
+    };
+    if display.bits() > 8 {
+        return Err(refuse(
+            "levels_turns and range_turns are for at most 8 bits; over that levels are even over one turn",
+        ));
+    }
+    if turns.len() != count {
+        return Err(refuse(format!(
+            "levels_turns has {} levels; {} bits have {count}",
+            turns.len(),
+            display.bits()
+        )));
+    }
+    Response::of_turns(&turns)?;
+    Ok(Some(turns))
+}
+
+impl PackingToml {
+    fn packing(&self) -> Result<Packing> {
+        Ok(match self {
+            PackingToml::Named(name) => {
+                let found = NAMED.iter().find(|(known, _)| known == name);
+                let (_, layout) = found.ok_or_else(|| {
+                    let all = NAMED.map(|(name, _)| name).join(", ");
+                    refuse(format!("packing is {name:?}; it must be {all}, bits or cells"))
+                })?;
+                Packing::Images(*layout)
+            }
+            PackingToml::Split { red, green, blue } => Packing::Images(Layout::Split(Split::new([red, green, blue])?)),
+            PackingToml::Cells { memory, layout } => Packing::BitPlanes(Cells::new(memory, *layout)?),
+        })
+    }
+}
+
+impl From<Display> for Device {
+    /// One whose input takes all colours in one image, or one grey image of one laser's levels.
+    fn from(display: Display) -> Self {
+        Device {
+            name: String::new(),
+            packing: Packing::usual(&display),
+            display,
+            flip_x: false,
+            flip_y: false,
+            levels_turns: None,
+            rate_hz: None,
+            sources: BTreeMap::new(),
+            unconfirmed: BTreeMap::new(),
+        }
+    }
+}
+
+impl Packing {
+    /// Where a file says nothing of it.
+    fn usual(display: &Display) -> Self {
+        Packing::Images(match (display.bits(), display.colours()) {
+            (0..=8, 1) => Layout::Grey,
+            (0..=8, _) => Layout::Rgb,
+            _ => Layout::Grey16,
+        })
+    }
+
+    /// # Errors
+    /// Levels that do not fit.
+    fn check(&self, display: &Display) -> Result<()> {
+        let (bits, place) = match self {
+            Packing::Images(layout) => (display.bits(), layout.place_bits()),
+            Packing::BitPlanes(cells) if 1 << display.bits() != cells.levels() => {
+                return Err(refuse(format!(
+                    "the cells' memory has {} levels; {} bits have {}",
+                    cells.levels(),
+                    display.bits(),
+                    1 << display.bits()
+                )));
+            }
+            Packing::BitPlanes(_) => return Ok(()),
+        };
+        match bits <= place {
+            true => Ok(()),
+            false => Err(refuse(format!(
+                "levels of {bits} bits do not fit the packing's {place}"
+            ))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::output::BitPlanes;
+
+    /// Levels as the lowest digits of a text, one for each of 256 steps of 2π.
+    fn digits(text: &str) -> Vec<u8> {
+        text.chars().map(|c| c.to_digit(16).unwrap() as u8).collect()
+    }
+
+    #[test]
+    fn every_shipped_device_says_where_its_figures_are_from() {
+        for (name, text) in SHIPPED {
+            let device = Device::shipped(name).unwrap();
+            assert!(!device.name.is_empty() && device.target().is_ok(), "{name}");
+            let table: toml::Table = toml::from_str(text).unwrap();
+            for key in [
+                "width",
+                "pitch_um",
+                "bits",
+                "packing",
+                "levels_turns",
+                "flip_x",
+                "rate_hz",
+            ] {
+                let told = device.sources.contains_key(key) || device.unconfirmed.contains_key(key);
+                assert_eq!(told, table.contains_key(key), "{name}: {key}");
+            }
+        }
+    }
+
+    /// Of `PLM.quantize` of Texas Instruments' package ti-plm 1.1.0, for the phases 2πi/256; the second with the levels
+    /// of our p67.
+    #[test]
+    fn levels_are_those_of_the_makers_package() {
+        for (name, golden) in [
+            ("ti-plm-p47", include_str!("modulator/p47_levels.txt")),
+            ("ti-plm-p67", include_str!("modulator/p67_levels.txt")),
+        ] {
+            let response = Device::shipped(name).unwrap().target().unwrap().response;
+            let Response::Lut { level, .. } = response else {
+                panic!("{name} has levels of its own")
+            };
+            let turns = Device::shipped(name).unwrap().levels_turns.unwrap();
+            for (step, (level, golden)) in level.iter().zip(digits(golden.trim())).enumerate() {
+                // Half-way between two levels the package's rounding decides: at step 111 of p47.
+                let apart = |level: u8| (turns[usize::from(level)] - step as f64 / 256.0).abs();
+                let tie = level.abs_diff(golden) == 1 && (apart(*level) - apart(golden)).abs() < 1e-12;
+                assert!(
+                    *level == golden || tie,
+                    "{name}: {level} for step {step}, {golden} is right"
+                );
+            }
+        }
+    }
+
+    /// Of `PLM.electrode_map` of the same package, for the levels 0 to 15 in two rows; one map is shown all the time.
+    #[test]
+    fn frames_are_those_of_the_makers_package() {
+        let p47 = "0000001000101010 1101101100011000 0101010111111111 1101100011011000";
+        let p67 = "0000010001000101 1011100011010001 1010111110101111 1011101100010001";
+        for (name, golden) in [("ti-plm-p47", p47), ("ti-plm-p67", p67)] {
+            let device = Device::shipped(name).unwrap();
+            let Packing::BitPlanes(cells) = &device.packing else {
+                panic!("{name} has cells")
+            };
+            let plan = BitPlanes::new(cells, (2, 8), device.flip_x, device.flip_y);
+            let levels: Vec<u8> = (0..16).collect();
+            let mut frame = vec![0; plan.frame_bytes()];
+            plan.pack(&[&levels], &mut frame).unwrap();
+            let cells = golden.chars().filter(|c| *c != ' ');
+            let want: Vec<u8> = cells.flat_map(|c| [if c == '1' { 255 } else { 0 }; 3]).collect();
+            assert_eq!(frame, want, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_named_in_one_line() {
+        for (text, word) in [
+            ("width = ", "expected"),
+            ("widht = 4", "unknown key `widht`; did you mean `width`?"),
+            ("pack = \"rgb\"", "unknown key `pack`; did you mean `packing`?"),
+            ("wavelengths_nm = [450, 520, 638]", "the longest first: [638, 520, 450]"),
+            ("bits = 12", "bits"),
+            ("packing = \"rbg\"", "rbg"),
+            ("packing = 3", "packing"),
+            ("packing = { red = [0] }", "packing"),
+            ("packing = { red = [0], green = [0], blue = [] }", "once"),
+            ("bits = 10\npacking = \"grey\"", "10 bits"),
+            (
+                "bits = 4\npacking = { memory = [0, 1], layout = [[0, 1], [2, 3]] }",
+                "2 levels",
+            ),
+            ("bits = 2\nlevels_turns = [0, 0.5]", "2 levels"),
+            ("bits = 1\nlevels_turns = [0.5, 0.25]", "rise"),
+            ("bits = 1\nlevels_turns = [0, 0.5]\nrange_turns = 2", "give one"),
+            ("bits = 10\nrange_turns = 2\npacking = \"grey-16\"", "8 bits"),
+            ("rate_hz = -1", "rate_hz"),
+        ] {
+            let message = Device::from_toml(text).unwrap_err().to_string();
+            assert!(message.contains(word), "{text}: {message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+        let message = Device::shipped("pluto").unwrap_err().to_string();
+        assert!(message.contains("holoeye-pluto"), "{message}");
+    }
+}

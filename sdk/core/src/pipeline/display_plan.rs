@@ -1,0 +1,323 @@
+//! From the midpoint hologram to the modulator's levels: offset, correction of what the display does to the
+//! wave, phase encoding, look-up table.
+//!
+//! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
+
+use crate::display::panel::PanelPlan;
+use crate::display::registration::RegistrationPlan;
+use crate::display::response;
+use crate::display::target::Target;
+use crate::encode::brightness::{Brightness, Past, Percentile};
+use crate::encode::midpoint::{MidpointScratch, MidpointSteps};
+use crate::encode::{Encoder, EncoderOptions, EncoderScratch, Encoding};
+use crate::optics::asm::Propagator;
+use crate::optics::fft::ConvolveScratch;
+use crate::runtime::cancel::Cancel;
+use crate::runtime::error::Result;
+use crate::runtime::stage::stage;
+use num_complex::{Complex32, Complex64};
+use phasefront_kernels::wide;
+use rayon::prelude::*;
+use std::time::Duration;
+
+/// A plan for one shape, target and encoding. Immutable; shared between threads.
+pub struct Modulator {
+    colours: usize,
+    height: usize,
+    width: usize,
+    /// None where the field stands at the modulator and there is nothing to correct.
+    offset: Option<Vec<Propagator>>,
+    registration: Option<RegistrationPlan>,
+    encoder: Encoder,
+    midpoint: Option<MidpointSteps>,
+    panel: Option<PanelPlan>,
+    bits: u32,
+    keeps_phase: bool,
+    brightness: Brightness,
+}
+
+/// Working memory of a [`Modulator`] for one call at a time.
+pub struct ModulatorScratch {
+    propagation: Option<ConvolveScratch>,
+    /// A plane, where colours are moved.
+    moved: Vec<Complex32>,
+    encoder: EncoderScratch,
+    midpoint: Option<MidpointScratch>,
+    /// Where phases lie in memory before they become levels.
+    phases: Vec<f32>,
+    percentile: Percentile,
+    cancel: Cancel,
+}
+
+impl ModulatorScratch {
+    /// Has fields end where `cancel` is requested.
+    pub fn set_cancel(&mut self, cancel: &Cancel) {
+        self.encoder.set_cancel(cancel);
+        if let Some(midpoint) = &mut self.midpoint {
+            midpoint.set_cancel(cancel);
+        }
+        self.cancel = cancel.clone();
+    }
+}
+
+/// What became of a field on the modulator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Modulation {
+    /// The amplitude that full light stands for.
+    pub scale: f32,
+    /// Time from the field to levels.
+    pub encode: Duration,
+}
+
+impl Modulator {
+    /// Plans the way of (C, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
+    /// the offset's transfer function, so that it costs nothing beside it.
+    ///
+    /// # Errors
+    /// A shape, offset or correction that cannot be planned, a scale that is not positive, a pre-filter for another
+    /// display or offset, or a table for another modulator.
+    pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
+        Self::from_z(shape, 0.0, target, options)
+    }
+
+    /// The same for fields at `z_m`.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn from_z(shape: (usize, usize), z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
+        if let Encoding::Deep(network) = &options.encoding {
+            network.check_prefilter(&target.display)?;
+        }
+        let distance_m = target.display.offset_m() - z_m;
+        let colours = target.display.colours();
+        Ok(Modulator {
+            colours,
+            height: shape.0,
+            width: shape.1,
+            offset: target.propagators(shape, 1, distance_m, target.correction.as_ref())?,
+            registration: RegistrationPlan::new(shape, colours, &target.registration)?,
+            encoder: Encoder::new(shape, target, options)?,
+            midpoint: match options.midpoint_steps {
+                0 => None,
+                steps => Some(MidpointSteps::new(shape, target, steps)?),
+            },
+            panel: PanelPlan::new(&target.panel, &target.display, shape)?,
+            bits: target.display.bits(),
+            keeps_phase: options.encoding.keeps_phase(),
+            brightness: options.brightness,
+        })
+    }
+
+    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
+    /// take from it what it knows.
+    pub fn keeps_phase(&self) -> bool {
+        self.keeps_phase
+    }
+
+    /// How many colours it is for.
+    pub fn colours(&self) -> usize {
+        self.colours
+    }
+
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        (self.height, self.width)
+    }
+
+    /// Working memory for one call at a time.
+    pub fn scratch(&self) -> ModulatorScratch {
+        ModulatorScratch {
+            propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
+            encoder: self.encoder.scratch(),
+            moved: match &self.registration {
+                None => Vec::new(),
+                Some(_) => vec![Complex32::ZERO; self.height * self.width],
+            },
+            midpoint: self.midpoint.as_ref().map(MidpointSteps::scratch),
+            phases: match self.midpoint.is_some() || self.panel.is_some() {
+                true => vec![0.0; self.colours * self.height * self.width],
+                false => Vec::new(),
+            },
+            percentile: Percentile::new(),
+            cancel: Cancel::default(),
+        }
+    }
+
+    /// Takes `field`, (C, H, W), to the modulator, in place. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `scratch` is another plan's, or `field` has not C·H·W values.
+    pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
+        if let (Some(plans), Some(waves)) = (&self.offset, &mut scratch.propagation) {
+            for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
+                if scratch.cancel.requested() {
+                    return;
+                }
+                plan.propagate(plane, waves);
+            }
+        }
+        if let Some(plan) = &self.registration {
+            let planes = field.chunks_exact_mut(self.height * self.width);
+            for (colour, plane) in planes.enumerate() {
+                plan.apply(colour, plane, &mut scratch.moved);
+            }
+        }
+    }
+
+    /// Encodes a field at the modulator, (C, H, W), into `levels`. `field` is worked on: what it holds afterwards means
+    /// nothing. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `field` or `levels` has not C·H·W values.
+    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut ModulatorScratch) -> Modulation {
+        self.modulate_after(None, field, levels, scratch)
+    }
+
+    /// [`Self::modulate`] of a frame that follows another: smoothed brightness comes from `past`, and steps at the
+    /// midpoint go on where the frame before ended.
+    pub fn modulate_after(
+        &self,
+        past: Option<Past>,
+        field: &mut [Complex32],
+        levels: &mut [u8],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let stage = stage!("encode");
+        if scratch.phases.is_empty() {
+            let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+            let scale = (self.encoder).encode_levels(field, scale, levels, &mut scratch.encoder);
+            return Modulation {
+                scale,
+                encode: stage.end(),
+            };
+        }
+        let mut phases = std::mem::take(&mut scratch.phases);
+        let scale = self.phases(past, field, &mut phases, scratch);
+        if !(self.panel.as_ref()).is_some_and(|panel| panel.levels(&phases, levels)) {
+            self.encoder.levels(&phases, levels);
+        }
+        scratch.phases = phases;
+        Modulation {
+            scale,
+            encode: stage.end(),
+        }
+    }
+
+    /// [`Self::modulate`] to levels of the display's bits that do not fit bytes. `phases` is worked on and holds the
+    /// phases in the end.
+    ///
+    /// # Panics
+    /// If `field`, `phases` or `words` has not C·H·W values.
+    pub fn modulate_words(
+        &self,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        words: &mut [u16],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        self.modulate_words_after(None, field, phases, words, scratch)
+    }
+
+    /// [`Self::modulate_words`] of a frame that follows another, as [`Self::modulate_after`].
+    pub fn modulate_words_after(
+        &self,
+        past: Option<Past>,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        words: &mut [u16],
+        scratch: &mut ModulatorScratch,
+    ) -> Modulation {
+        let stage = stage!("encode");
+        let scale = self.phases(past, field, phases, scratch);
+        response::linear_words(phases, self.bits, words);
+        Modulation {
+            scale,
+            encode: stage.end(),
+        }
+    }
+
+    /// Phases in \[0, 2π), and the amplitude that full light stands for.
+    fn phases(
+        &self,
+        past: Option<Past>,
+        field: &mut [Complex32],
+        phases: &mut [f32],
+        scratch: &mut ModulatorScratch,
+    ) -> f32 {
+        let scale = self.brightness.scale(field, past, &mut scratch.percentile);
+        let mut midpoint = self.midpoint.as_ref().zip(scratch.midpoint.as_mut());
+        if let Some((plan, of)) = &mut midpoint {
+            plan.keep(field, past.map(|past| past.scale), of);
+        }
+        let scale = self.encoder.encode(field, scale, phases, &mut scratch.encoder);
+        if let Some((plan, of)) = midpoint {
+            let _stage = stage!("midpoint");
+            plan.correct(scale, phases, of);
+        }
+        if let Some(panel) = &self.panel {
+            panel.add(phases);
+        }
+        scale
+    }
+}
+
+/// Turns each of the `colours` planes of `field`, (C, H, W), by its mean phase arg Σu, so that its phase is centred on
+/// 0: a network's constant phase is arbitrary, and double phase wraps least around 0.
+pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
+    let size = field.len() / colours;
+    if size == 0 {
+        return;
+    }
+    for plane in field.chunks_exact_mut(size) {
+        let turn = Complex64::from_polar(1.0, -sum(plane).arg());
+        let turn = Complex32::new(turn.re as f32, turn.im as f32);
+        plane.par_chunks_mut(PART).for_each(|part| {
+            wide!({
+                for value in part {
+                    *value *= turn;
+                }
+            });
+        });
+    }
+}
+
+/// Values of a part that one thread takes.
+const PART: usize = 1 << 14;
+
+/// The sum of `values`, halved again and again at fixed places: the same bits on any number of threads.
+fn sum(values: &[Complex32]) -> Complex64 {
+    if values.len() > PART {
+        let (first, second) = values.split_at(values.len().div_ceil(PART).div_ceil(2) * PART);
+        let (first, second) = rayon::join(|| sum(first), || sum(second));
+        return first + second;
+    }
+    const LANES: usize = 16;
+    wide!({
+        let (runs, rest) = values.as_chunks::<LANES>();
+        let mut sums = [Complex32::ZERO; LANES];
+        for run in runs {
+            for (sum, value) in sums.iter_mut().zip(run) {
+                *sum += value;
+            }
+        }
+        let all = sums.iter().chain(rest);
+        all.map(|v| Complex64::new(v.re.into(), v.im.into())).sum()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_phase_is_taken_from_each_colour() {
+        let mut field: Vec<_> = (0..3 * 20_000)
+            .map(|i| Complex32::from_polar(1.0 + (i % 7) as f32, (i / 20_000) as f32 + 0.1 * (i % 3) as f32))
+            .collect();
+        remove_mean_phase(&mut field, 3);
+        for plane in field.chunks_exact(20_000) {
+            let sum: Complex32 = plane.iter().sum();
+            assert!(sum.arg().abs() < 1e-4);
+        }
+    }
+}

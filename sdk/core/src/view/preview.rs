@@ -1,0 +1,307 @@
+//! A small view of a hologram, cheap enough for every frame: what an eye focused at z sees, as an RGBA image of a
+//! screen's size. [`crate::view::refocus`] looks at all of it.
+//!
+//! The light of `factor` × `factor` modulator pixels is averaged into one, which keeps the middle of the Fourier plane
+//! as the aperture does and takes the checkerboard of double phase away; the small field is then propagated.
+//! Frequencies over 1/(2·`factor`) cycles a pixel are lost, so fine detail far from focus is blurred less than it would
+//! be.
+
+use crate::display::illumination::Illumination;
+use crate::display::panel::PanelPlan;
+use crate::display::response::Response;
+use crate::display::target::Target;
+use crate::frame::Axis;
+use crate::optics::asm::Propagator;
+use crate::optics::fft::ConvolveScratch;
+use crate::optics::zernike::Aberration;
+use crate::runtime::error::{Error, Result};
+use num_complex::Complex32;
+use rayon::prelude::*;
+
+/// Most pixels of an image.
+pub const MOST_PIXELS: usize = 1 << 26;
+/// Most pixels along a side of one.
+const MOST_SIDE: usize = 1 << 14;
+
+/// A plan for one hologram shape, z and screen size. Immutable; shared between threads.
+pub struct Preview {
+    colours: usize,
+    hologram: (usize, usize),
+    small: (usize, usize),
+    factor: usize,
+    /// None where the hologram stands at z.
+    propagators: Option<Vec<Propagator>>,
+    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    illumination: Option<(Illumination, (usize, usize))>,
+    response: Response,
+    panel: Option<PanelPlan>,
+    screen: (usize, usize),
+    x: Axis,
+    y: Axis,
+}
+
+/// Checks that an image of `screen` (H, W) is one for a screen, before there is memory for it.
+///
+/// # Errors
+/// One over [`MOST_PIXELS`], or over 2¹⁴ pixels a side.
+pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
+    if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
+        return Err(Error::Plan(format!(
+            "a preview of {width}×{height} is too large; {MOST_SIDE} pixels a side and {MOST_PIXELS} in all are the most"
+        )));
+    }
+    Ok(())
+}
+
+/// Working memory of a [`Preview`] for one call at a time.
+pub struct PreviewScratch {
+    field: Vec<Complex32>,
+    amplitude: Vec<f32>,
+    propagation: Option<ConvolveScratch>,
+}
+
+impl Preview {
+    /// Plans views at `z_m` of (H, W) holograms for `target`, through what it corrects, as images of `screen` (H, W).
+    ///
+    /// # Errors
+    /// A hologram under 2 pixels a side, an empty screen or one over [`MOST_PIXELS`], a z too far away, or a table for
+    /// another modulator.
+    pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
+        if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
+            return Err(Error::Plan(format!(
+                "a preview of {}×{} of a hologram of {width}×{height}: the screen's sides must be at least 1, the hologram's 2",
+                screen.1, screen.0
+            )));
+        }
+        check_screen(screen)?;
+        // Even, so that both colours of the checkerboard weigh alike.
+        let ratio = (height as f64 / screen.0 as f64).min(width as f64 / screen.1 as f64);
+        let factor = ((ratio / 2.0) as usize * 2).clamp(2, 8);
+        let factor = factor.min(height.min(width) / 2 * 2);
+        let small = (height / factor, width / factor);
+        target.check()?;
+        let distance_m = z_m - target.display.offset_m();
+        let aberration = target.correction.as_ref().map(Aberration::reversed);
+        let illumination = target.illumination.clone();
+        Ok(Preview {
+            colours: target.display.colours(),
+            hologram: (height, width),
+            small,
+            factor,
+            propagators: target.propagators(small, factor, distance_m, aberration.as_ref())?,
+            illumination: illumination.map(|light| (light, target.modulator())),
+            response: target.response.clone().centred(height, width)?,
+            panel: PanelPlan::new(&target.panel, &target.display, (height, width))?,
+            screen,
+            x: Axis::new(small.1, 0.0, small.1 as f64, screen.1),
+            y: Axis::new(small.0, 0.0, small.0 as f64, screen.0),
+        })
+    }
+
+    /// Modulator pixels, along each side, whose light is averaged.
+    pub fn factor(&self) -> usize {
+        self.factor
+    }
+
+    /// (H, W) of the image.
+    pub fn screen(&self) -> (usize, usize) {
+        self.screen
+    }
+
+    /// Working memory for one call at a time, sized for the current thread pool.
+    pub fn scratch(&self) -> PreviewScratch {
+        let size = self.small.0 * self.small.1;
+        PreviewScratch {
+            field: vec![Complex32::ZERO; size],
+            amplitude: vec![0.0; self.colours * size],
+            propagation: self.propagators.as_ref().map(|p| p[0].scratch()),
+        }
+    }
+
+    /// The view of `levels`, (C, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red,
+    /// green, blue, alpha 255; amplitude 1 is 255, and one laser's view is grey. Allocates nothing.
+    ///
+    /// # Panics
+    /// If `levels` or `rgba` has another length than planned.
+    pub fn look(&self, levels: &[u8], scale: f32, rgba: &mut [u8], scratch: &mut PreviewScratch) {
+        let (height, width) = self.hologram;
+        let (small_height, small_width) = self.small;
+        let (screen_height, screen_width) = self.screen;
+        assert_eq!(levels.len(), self.colours * height * width);
+        assert_eq!(rgba.len(), 4 * screen_height * screen_width);
+        let light = scale / (self.factor * self.factor) as f32;
+        // Where all pixels answer alike each level is one phase.
+        let shown: [Complex32; 256] = match &self.response {
+            Response::PerPixel(_) => [Complex32::ZERO; 256],
+            alike => std::array::from_fn(|l| Complex32::from_polar(light, alike.phase(l as u8, 0))),
+        };
+        let planes = levels.chunks_exact(height * width);
+        let amplitudes = (scratch.amplitude).chunks_exact_mut(small_height * small_width);
+        for (colour, (levels, amplitude)) in planes.zip(amplitudes).enumerate() {
+            (scratch.field.par_chunks_exact_mut(small_width))
+                .zip(levels.par_chunks_exact(width * self.factor))
+                .enumerate()
+                .for_each(|(y, (sums, rows))| {
+                    let first = (colour * height + y * self.factor) * width;
+                    match (&self.response, &self.panel) {
+                        (Response::PerPixel(_), _) | (_, Some(_)) => self.sum(rows, sums, |level, at| {
+                            let added = (self.panel.as_ref()).map_or(0.0, |panel| panel.added(first + at));
+                            Complex32::from_polar(light, self.response.phase(level, first + at) - added)
+                        }),
+                        _ => self.sum(rows, sums, |level, _| shown[usize::from(level)]),
+                    }
+                    self.divide_by_light(colour, y, sums);
+                });
+            if let (Some(plans), Some(scratch_wave)) = (&self.propagators, &mut scratch.propagation) {
+                plans[colour].propagate(&mut scratch.field, scratch_wave);
+            }
+            for (amplitude, value) in amplitude.iter_mut().zip(&scratch.field) {
+                *amplitude = value.norm();
+            }
+        }
+        self.draw(&scratch.amplitude, rgba);
+    }
+
+    /// The light of `factor` × `factor` pixels a value, out of `factor` rows of levels. `light` gives that of a level
+    /// at an index in them.
+    fn sum(&self, rows: &[u8], sums: &mut [Complex32], light: impl Fn(u8, usize) -> Complex32) {
+        let width = self.hologram.1;
+        sums.fill(Complex32::ZERO);
+        for (y, row) in rows.chunks_exact(width).enumerate() {
+            for (x, (sum, pixels)) in (sums.iter_mut()).zip(row.chunks_exact(self.factor)).enumerate() {
+                let first = y * width + x * self.factor;
+                let lights = pixels.iter().enumerate();
+                *sum += lights.map(|(i, l)| light(*l, first + i)).sum::<Complex32>();
+            }
+        }
+    }
+
+    /// Divides row `y` of the small field by the gain of the light that falls on it.
+    fn divide_by_light(&self, colour: usize, y: usize, sums: &mut [Complex32]) {
+        let Some((illumination, modulator)) = &self.illumination else {
+            return;
+        };
+        let (height, width) = self.hologram;
+        let middle = |at: usize, hologram: usize, modulator: usize| {
+            at * self.factor + self.factor / 2 + modulator.saturating_sub(hologram) / 2
+        };
+        let all = (modulator.0.max(height), modulator.1.max(width));
+        let y = middle(y, height, modulator.0);
+        for (x, sum) in sums.iter_mut().enumerate() {
+            let x = middle(x, width, modulator.1);
+            *sum /= illumination.gain(colour, y, x, all);
+        }
+    }
+
+    /// The planes of amplitudes as pixels of the screen.
+    fn draw(&self, amplitude: &[f32], rgba: &mut [u8]) {
+        let (height, width) = self.small;
+        (rgba.par_chunks_exact_mut(4 * self.screen.1))
+            .enumerate()
+            .for_each(|(y, pixels)| {
+                let byte = |colour: usize, x: usize| {
+                    let plane = &amplitude[colour * height * width..];
+                    let row = |(row, weight): (usize, f32)| {
+                        let row = &plane[row * width..][..width];
+                        weight * self.x.taps(x).map(|(at, w)| w * row[at]).sum::<f32>()
+                    };
+                    (self.y.taps(y).map(row).sum::<f32>() * 255.0 + 0.5) as u8
+                };
+                for (x, pixel) in pixels.as_chunks_mut::<4>().0.iter_mut().enumerate() {
+                    let [red, green, blue] = match self.colours {
+                        1 => [byte(0, x); 3],
+                        _ => [0, 1, 2].map(|colour| byte(colour, x)),
+                    };
+                    *pixel = [red, green, blue, 255];
+                }
+            });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::display::Display;
+    use crate::encode::brightness::Brightness;
+    use crate::encode::{EncoderOptions, Encoding};
+    use crate::optics::aperture::Opening;
+    use crate::pipeline::display_plan::Modulator;
+    use crate::view::refocus::{Refocus, phase_only_field};
+
+    const SHAPE: (usize, usize) = (96, 128);
+
+    /// The levels of soft blobs of each colour that lie at z = 1 mm.
+    fn hologram(display: &Display, response: &Response) -> (Vec<u8>, f32) {
+        let (height, width) = SHAPE;
+        let mut field: Vec<Complex32> = (0..3 * height * width)
+            .map(|i| {
+                let (c, y, x) = (i / (height * width), i / width % height, i % width);
+                let square = (x as f32 - 40.0 - 20.0 * c as f32).powi(2) + (y as f32 - 48.0).powi(2);
+                Complex32::new(0.1 + 0.8 * (-square / 400.0).exp(), 0.0)
+            })
+            .collect();
+        // From where they lie to the midpoint, and to the modulator.
+        let home = display.clone().with_offset_m(display.offset_m() - 1e-3).unwrap();
+        let target = Target {
+            response: response.clone(),
+            ..home.into()
+        };
+        let options = EncoderOptions {
+            brightness: Brightness::FrameMax,
+            ..Encoding::DoublePhase.into()
+        };
+        let home = Modulator::new(SHAPE, &target, &options).unwrap();
+        let mut scratch = home.scratch();
+        home.propagate(&mut field, &mut scratch);
+        let mut levels = vec![0; 3 * height * width];
+        let modulation = home.modulate(&mut field, &mut levels, &mut scratch);
+        (levels, modulation.scale)
+    }
+
+    #[test]
+    fn the_small_view_is_the_full_one_made_small() {
+        let response = Response::linear(8).unwrap();
+        let (height, width) = SHAPE;
+        for offset_m in [0.0, 3e-3] {
+            let display = Display::default().with_offset_m(offset_m).unwrap();
+            let (levels, scale) = hologram(&display, &response);
+            let target = Target::from(&display);
+            let mut shown = vec![Complex32::ZERO; levels.len()];
+            phase_only_field(&levels, &response, scale, &mut shown);
+            for z_m in [1e-3, -2e-3, offset_m] {
+                let full = Refocus::new(height, width, &display, &[z_m], Some(Opening::centred(1.0))).unwrap();
+                let full = full.focal_stack(&shown, &[z_m]).unwrap().remove(0);
+                for (screen, factor) in [((48, 64), 2), ((24, 32), 4)] {
+                    let plan = Preview::new(SHAPE, &target, z_m, screen).unwrap();
+                    assert_eq!(plan.factor(), factor);
+                    let mut rgba = vec![0; 4 * screen.0 * screen.1];
+                    plan.look(&levels, scale, &mut rgba, &mut plan.scratch());
+                    let mut squares = 0.0;
+                    for (i, pixel) in rgba.as_chunks::<4>().0.iter().enumerate() {
+                        assert_eq!(pixel[3], 255);
+                        let (y, x) = (i / screen.1 * factor, i % screen.1 * factor);
+                        for (c, byte) in pixel[..3].iter().enumerate() {
+                            let row = |dy| &full[(c * height + y + dy) * width + x..][..factor];
+                            let sum: f32 = (0..factor).flat_map(row).map(|a| a.min(1.0)).sum();
+                            let mean = sum / (factor * factor) as f32;
+                            squares += (mean - f32::from(*byte) / 255.0).powi(2);
+                        }
+                    }
+                    let error = (squares / (3 * screen.0 * screen.1) as f32).sqrt();
+                    assert!(error < 0.03, "offset {offset_m} z {z_m} {screen:?}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn impossible_views_are_refused() {
+        let target = Target::default();
+        assert!(Preview::new((1, 50), &target, 0.0, (10, 10)).is_err());
+        assert!(Preview::new(SHAPE, &target, 0.0, (0, 10)).is_err());
+        assert!(Preview::new(SHAPE, &target, f64::NAN, (10, 10)).is_err());
+        // A screen larger than the hologram has a view too.
+        assert_eq!(Preview::new((5, 7), &target, 1e-3, (300, 200)).unwrap().factor(), 2);
+    }
+}

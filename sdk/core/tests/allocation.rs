@@ -1,0 +1,185 @@
+//! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../tests/counting.rs"]
+mod counting;
+#[path = "../../../tests/network_models.rs"]
+mod network_models;
+
+use counting::ALLOCATIONS;
+use ndarray::{Array2, Array3};
+use network_models::Model;
+use num_complex::Complex32;
+use phasefront_core::depth::refine::Refiner;
+use phasefront_core::display::Display;
+use phasefront_core::display::response::per_pixel;
+use phasefront_core::display::target::Target;
+use phasefront_core::display::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
+use phasefront_core::encode::Encoding;
+use phasefront_core::frame::RgbdFrame;
+use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
+use phasefront_core::frame::{ColourPlan, Crop};
+use phasefront_core::method::Method;
+use phasefront_core::method::MethodPlan;
+use phasefront_core::method::network::Network;
+use phasefront_core::method::sweep::Sweep;
+use phasefront_core::optics::aperture::{Aperture, Opening};
+use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::pipeline::Pipeline;
+use phasefront_core::pipeline::display_plan::Modulator;
+use phasefront_core::view::preview::Preview;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+fn count(mut call: impl FnMut()) -> usize {
+    // The first calls may grow the pool's queues, and later ones a network's memory where more bands than before happen
+    // to run at once: what a call allocates by itself, every call does.
+    for _ in 0..3 {
+        call();
+    }
+    let counted = (0..8).map(|_| {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        call();
+        ALLOCATIONS.load(Ordering::Relaxed) - before
+    });
+    counted.min().unwrap_or_default()
+}
+
+/// Colour, depth and a preview, on the current thread pool.
+fn camera_frames_and_previews() {
+    let (h, w) = (30, 40);
+    let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
+    let image = ColourImage::new(ColourFormat::Rgba, 60, 50, &[Plane::new(&bytes, 240, 4)]).unwrap();
+    let plan = ColourPlan::new(&image, Orientation::default(), h, w).unwrap();
+    let mut scratch = plan.scratch();
+    let mut rgb = vec![0.0; 3 * h * w];
+    let convert = || plan.convert(&image, &mut rgb, &mut scratch).unwrap();
+    assert_eq!(count(convert), 0);
+    let plan = Refiner::new((15, 20), Crop::cover((15, 20), (h, w)), (h, w)).unwrap();
+    let mut scratch = plan.scratch();
+    let depth: Vec<f32> = (0..300)
+        .map(|i| if i % 7 == 0 { f32::NAN } else { (i % 20) as f32 / 20.0 })
+        .collect();
+    let mut refined = vec![0.0; h * w];
+    let refine = || {
+        plan.refine(&depth, &[1.0; 300], &rgb, &mut refined, &mut scratch)
+            .unwrap()
+    };
+    assert_eq!(count(refine), 0);
+    let plan = Preview::new((h, w), &Target::default(), 2e-3, (20, 20)).unwrap();
+    let mut scratch = plan.scratch();
+    let (levels, mut rgba) = (vec![3; 3 * h * w], vec![0; 1600]);
+    assert_eq!(count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)), 0);
+}
+
+/// A target with all that a calibration and a bench may put there.
+fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
+    let (rows, columns) = per_pixel::nodes(h, w, 8);
+    let levels_of = |i: usize| (i % 9) as f32 * 32.0;
+    let table: Vec<f32> = (0..27 * rows * columns).map(levels_of).collect();
+    let turns = vec![6.0; 3 * rows * columns];
+    let table = PerPixel::new(h, w, 8, 8, &table, &turns).unwrap();
+    let laser = Illumination::new(ndarray::Array3::ones((3, 5, 6)).view()).unwrap();
+    let correction = Aberration::new([[0.1, 0.2, 0.3, 0.4, 0.5]; 3]).unwrap();
+    let flatness = Flatness::new((h, w), (0..h * w).map(|i| 7 * i as u16).collect()).unwrap();
+    Target {
+        display: display.clone().with_size(h, w).unwrap(),
+        panel: Panel {
+            flatness: Some(flatness),
+            ..Panel::default()
+        },
+        registration: Registration {
+            scale: vec![1.01, 1.0, 0.99],
+            ..Registration::default()
+        },
+        response: Response::PerPixel(table.into()),
+        illumination: Some(laser),
+        correction: Some(correction),
+    }
+}
+
+/// Whole frames on a display of one laser, on the current thread pool.
+fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
+    let display = Display::from_toml("wavelengths_nm = [520]\noffset_mm = 6").unwrap();
+    let (h, w) = frame.shape();
+    let frame = frame.clone().for_display(&display);
+    let (mut field, mut levels) = (vec![Complex32::ZERO; h * w], vec![0; h * w]);
+    for method in [Method::Sweep(Sweep::for_display(&display)), Method::trained(seeded)] {
+        let plan = Pipeline::new((h, w), method.clone(), &(&display).into(), &Encoding::ANTI_ALIAS.into()).unwrap();
+        let mut scratch = plan.scratch();
+        let process = || {
+            plan.process(&frame, &mut field, &mut levels, &mut scratch).unwrap();
+        };
+        assert_eq!(count(process), 0, "one laser, {method:?}");
+    }
+}
+
+#[test]
+fn hot_calls_allocate_nothing() {
+    let (h, w) = (61, 47);
+    let mut plane = vec![Complex32::new(0.5, 0.1); h * w];
+    let mut field = vec![Complex32::new(0.5, 0.1); 3 * h * w];
+    let mut levels = vec![0; 3 * h * w];
+    let display = Display::default().with_offset_m(6e-3).unwrap();
+    let prefilter = Model {
+        input: "blurred-field",
+        ..Model::prefilter("6")
+    };
+    let prefilter = Arc::new(Network::from_onnx(&prefilter.bytes()).unwrap());
+    let seeded = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(4, 8)
+    };
+    let seeded = Arc::new(Network::from_onnx(&seeded.bytes()).unwrap());
+    let swept = RgbdFrame::new(
+        Array3::from_elem((3, h, w), 0.4),
+        Array2::from_shape_fn((h, w), |(y, x)| ((x / 9 + y / 7) % 5) as f32 / 4.0),
+    )
+    .unwrap();
+    for threads in [1, 3] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let plan = Propagator::new(h, w, 8e-6, 520e-9, 3e-3, Padding::Reach).unwrap();
+            let mut scratch = plan.scratch();
+            assert_eq!(count(|| plan.propagate(&mut plane, &mut scratch)), 0);
+            let plan = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
+            let mut scratch = plan.scratch();
+            assert_eq!(count(|| plan.filter(&mut plane, &mut scratch)), 0);
+            for encoding in [
+                Encoding::DoublePhase,
+                Encoding::ANTI_ALIAS,
+                Encoding::BAND_LIMIT,
+                Encoding::Deep(prefilter.clone()),
+            ] {
+                let plan = Modulator::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
+                let mut scratch = plan.scratch();
+                let frame = || {
+                    plan.propagate(&mut field, &mut scratch);
+                    plan.modulate(&mut field, &mut levels, &mut scratch);
+                };
+                assert_eq!(count(frame), 0, "{encoding:?}");
+            }
+            let target = calibrated(&display, (h, w));
+            let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
+            let mut scratch = plan.scratch();
+            let frame = || {
+                plan.propagate(&mut field, &mut scratch);
+                plan.modulate(&mut field, &mut levels, &mut scratch);
+            };
+            assert_eq!(count(frame), 0, "a calibrated display");
+            one_laser(&swept, seeded.clone());
+            for method in [
+                Method::Sweep(Sweep::for_display(&display)),
+                Method::trained(seeded.clone()),
+                Method::Auto(Sweep::for_display(&display), seeded.clone()),
+            ] {
+                let plan = MethodPlan::new(h, w, method.clone(), &display).unwrap();
+                let mut scratch = plan.scratch();
+                let sweep = || plan.field(&swept, &mut field, &mut scratch).unwrap();
+                assert_eq!(count(sweep), 0, "{method:?}");
+            }
+            camera_frames_and_previews();
+        });
+    }
+}

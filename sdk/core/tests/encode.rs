@@ -1,0 +1,462 @@
+//! The dark and the local steps of encoders against sums over whole planes in f64, and what they are there for.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../tests/reference.rs"]
+mod reference;
+
+use ndarray::{Array2, Array3};
+use phasefront_core::display::Display;
+use phasefront_core::display::target::Target;
+use phasefront_core::display::target::{Illumination, Response};
+use phasefront_core::encode::Encoder;
+use phasefront_core::encode::band_limit::BandLimit;
+use phasefront_core::encode::brightness::Brightness;
+use phasefront_core::encode::local::{self, LocalFilter};
+use phasefront_core::encode::midpoint::{self, MidpointSteps};
+use phasefront_core::encode::{EncoderOptions, Encoding};
+use phasefront_core::optics::aperture::{Aperture, Opening};
+use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::pipeline::display_plan::Modulator;
+use reference::test_plane;
+use rustfft::num_complex::{Complex32, Complex64};
+
+/// A display's first line.
+const ONE_LASER: &str = "wavelengths_nm = [532]\n";
+
+/// What double phase begins with, value by value: the field drawn to the real axis where it is dark, blurred, divided
+/// by the light, over `scale`.
+fn start(
+    field: &[Complex32],
+    (h, w): (usize, usize),
+    encoding: &Encoding,
+    (dark, scale): (f64, f64),
+    light: &[f64],
+) -> Vec<Complex64> {
+    let drawn = |u: &Complex32| {
+        let u = Complex64::new(u.re.into(), u.im.into());
+        let weight = if dark > 0.0 {
+            (u.norm() / (dark * scale)).min(1.0)
+        } else {
+            1.0
+        };
+        u * weight + (1.0 - weight) * u.norm()
+    };
+    let drawn: Vec<Complex64> = field.iter().map(drawn).collect();
+    let (sigma, taps) = match encoding {
+        Encoding::AntiAlias { sigma, width } => (f64::from(*sigma), *width as isize),
+        _ => (1.0, 1),
+    };
+    let half = taps / 2;
+    let weight = |i: isize| (-0.5 * (i as f64 / sigma).powi(2)).exp();
+    let sum: f64 = (-half..=half).map(weight).sum();
+    let near = |at: usize, by: isize, count: usize| (at as isize + by).clamp(0, count as isize - 1) as usize;
+    let blurred = |i: usize| {
+        let around = (-half..=half).flat_map(|dy| (-half..=half).map(move |dx| (dy, dx)));
+        let value = |(dy, dx)| drawn[near(i / w, dy, h) * w + near(i % w, dx, w)] * weight(dy) * weight(dx);
+        around.map(value).sum::<Complex64>() / (sum * sum)
+    };
+    (0..h * w).map(|i| blurred(i) / light[i] / scale).collect()
+}
+
+/// A case against the oracle, by phases and by levels; the same bits on any number of threads.
+fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderOptions) {
+    const SCALE: f32 = 1.3;
+    let (h, w) = shape;
+    let response = Response::linear(8).unwrap();
+    let radius = if laser.is_some() { 0.9 } else { 1.0 };
+    let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
+    let colours = display.colours() as u32;
+    let target = Target {
+        response: response.clone(),
+        illumination: laser.cloned(),
+        ..display.with_size(h, w).unwrap().into()
+    };
+    let given: Vec<_> = (0..colours).flat_map(|c| test_plane(shape, 40 + c)).collect();
+    let mut results = [1, 3].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        pool.build().unwrap().install(|| {
+            let encoder = Encoder::new(shape, &target, options).unwrap();
+            let mut scratch = encoder.scratch();
+            let (mut phases, mut levels) = (vec![0.0; given.len()], vec![0; given.len()]);
+            encoder.encode(&mut given.clone(), Some(SCALE), &mut phases, &mut scratch);
+            encoder.encode_levels(&mut given.clone(), Some(SCALE), &mut levels, &mut scratch);
+            (phases, levels)
+        })
+    });
+    let why = format!("{w}×{h}, {colours} colours, light {}, {options:?}", laser.is_some());
+    assert!(results[0] == results[1], "other bits on other threads: {why}");
+    let (phases, levels) = std::mem::take(&mut results[0]);
+    assert!((phases.iter().zip(&levels).enumerate()).all(|(at, (p, l))| response.level(*p, at) == *l));
+
+    for (c, (plane, phases)) in given.chunks_exact(h * w).zip(phases.chunks_exact(h * w)).enumerate() {
+        let light = |i: usize| laser.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, shape)));
+        let light: Vec<f64> = (0..h * w).map(light).collect();
+        let mut filtered = plane.to_vec();
+        if let Encoding::BandLimit { k } = options.encoding {
+            let filter = BandLimit::new(h, w, k).unwrap();
+            filter.filter(&mut filtered, &mut filter.scratch());
+        }
+        let dark = (f64::from(options.dark), f64::from(SCALE));
+        let start = start(&filtered, shape, &options.encoding, dark, &light);
+        let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
+        let goal: Vec<Complex64> = plane.iter().map(goal).collect();
+        let filter = LocalFilter::of_aperture(radius);
+        let expected = local::reference(&filter, shape, &start, &goal, &light, options.local_steps);
+        let mut squares = 0.0;
+        for (z, phase) in expected.iter().zip(phases) {
+            assert!((0.0..std::f32::consts::TAU).contains(phase));
+            // Where little is left of a value its direction is rounding's.
+            let sure = z.norm().min(1.0);
+            let apart = sure * (z / z.norm().max(1e-30) - Complex64::from_polar(1.0, f64::from(*phase))).norm();
+            assert!(apart < 4e-3, "{z} {phase}: {apart}, {why}");
+            squares += apart * apart;
+        }
+        let error = (squares / (h * w) as f64).sqrt();
+        assert!(error < 2e-4, "{error}, {why}");
+    }
+}
+
+#[test]
+fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
+    let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
+    let laser = Illumination::new(beam.view()).unwrap();
+    let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
+    let wide = Encoding::AntiAlias { sigma: 2.0, width: 9 };
+    let encodings = [Encoding::DoublePhase, Encoding::ANTI_ALIAS, wide, Encoding::BAND_LIMIT];
+    for shape in [(61, 47), (40, 150), (7, 130), (1, 1), (2, 2), (33, 1), (1, 40), (3, 5)] {
+        for encoding in &encodings {
+            for (dark, local_steps) in [(0.4, 0), (0.0, 1), (0.4, 1), (0.4, 2), (1.0, 3)] {
+                let options = EncoderOptions {
+                    dark,
+                    local_steps,
+                    ..encoding.clone().into()
+                };
+                for light in [None, Some(&laser)] {
+                    check("", shape, light, &options);
+                }
+                check(ONE_LASER, shape, Some(&alone), &options);
+            }
+        }
+    }
+}
+
+/// A picture with noise where it is dark, by what is seen of it behind the aperture: root mean square of the
+/// amplitudes' difference.
+fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illumination>) -> f64 {
+    let shape @ (h, w) = (96, 120);
+    let target = Target {
+        illumination: laser.cloned(),
+        ..Display::default().with_size(h, w).unwrap().into()
+    };
+    let value = |i: usize| {
+        let (c, y, x) = (i / (h * w), i / w % h, i % w);
+        let bright = (y / 12 + x / 15 + c) % 3 != 0;
+        let noise = ((i * 7919 + 13) % 1009) as f32 / 1009.0;
+        let amplitude = if bright {
+            0.5 + 0.3 * (x as f32 * 0.2).sin()
+        } else {
+            0.02
+        };
+        Complex32::from_polar(
+            amplitude,
+            if bright {
+                0.3 * (y as f32 * 0.1).sin()
+            } else {
+                std::f32::consts::TAU * noise
+            },
+        )
+    };
+    let field: Vec<Complex32> = (0..3 * h * w).map(value).collect();
+    let encoder = Encoder::new(shape, &target, options).unwrap();
+    let mut phases = vec![0.0; field.len()];
+    encoder.encode(&mut field.clone(), Some(1.0), &mut phases, &mut encoder.scratch());
+    let mut shown: Vec<_> = phases.iter().map(|phase| Complex32::from_polar(1.0, *phase)).collect();
+    if let Some(laser) = laser {
+        laser.shine(&mut shown, shape, shape);
+    }
+    let aperture = Aperture::new(h, w, Opening::centred(1.0)).unwrap();
+    for plane in shown.chunks_exact_mut(h * w) {
+        aperture.filter(plane, &mut aperture.scratch());
+    }
+    let apart = |(shown, wanted): (&Complex32, &Complex32)| f64::from(shown.norm() - wanted.norm()).powi(2);
+    let sum: f64 = shown.iter().zip(&field).map(apart).sum();
+    (sum / field.len() as f64).sqrt()
+}
+
+#[test]
+fn each_stage_brings_what_is_shown_nearer_to_the_field() {
+    let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 30.0));
+    let laser = Illumination::new(beam.view()).unwrap();
+    for light in [None, Some(&laser)] {
+        for encoding in [Encoding::DoublePhase, Encoding::ANTI_ALIAS, Encoding::BAND_LIMIT] {
+            let error = |dark, local_steps| {
+                let options = EncoderOptions {
+                    dark,
+                    local_steps,
+                    ..encoding.clone().into()
+                };
+                error_behind_the_aperture(&options, light)
+            };
+            let [plain, dark, one, two] = [error(0.0, 0), error(0.4, 0), error(0.4, 1), error(0.4, 2)];
+            println!("{encoding:?}: {plain:.4} {dark:.4} {one:.4} {two:.4}");
+            assert!(
+                dark < 0.7 * plain && one < 0.85 * dark && two < 1.02 * one,
+                "{encoding:?}"
+            );
+        }
+    }
+}
+
+/// What a colour of (H, W) = `shape` becomes over `distance_m`, the carrier left out, through an aperture of `radius`.
+fn through_aperture(
+    plane: &[Complex64],
+    (h, w): (usize, usize),
+    padded: (usize, usize),
+    wavelength_m: f64,
+    distance_m: f64,
+    radius: f64,
+) -> Vec<Complex64> {
+    let mut all = Array2::from_elem(padded, Complex64::ZERO);
+    for (i, value) in plane.iter().enumerate() {
+        all[(i / w, i % w)] = *value;
+    }
+    let mut spectrum = reference::fft2(&all, false);
+    let pitch_m = Display::default().pitch_m();
+    for ((y, x), value) in spectrum.indexed_iter_mut() {
+        let frequency = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
+        let square = frequency(y, padded.0).powi(2) + frequency(x, padded.1).powi(2);
+        let f2 = square / pitch_m.powi(2);
+        let root = (1.0 - wavelength_m.powi(2) * f2).sqrt();
+        let phase = -2.0 * std::f64::consts::PI * distance_m * wavelength_m * f2 / (1.0 + root);
+        *value *= if square <= 0.25 * radius * radius {
+            Complex64::from_polar(1.0, phase)
+        } else {
+            Complex64::ZERO
+        };
+    }
+    let back = reference::fft2(&spectrum, true);
+    (0..h * w).map(|i| back[(i / w, i % w)]).collect()
+}
+
+#[test]
+fn steps_at_the_midpoint_agree_with_sums_in_f64() {
+    const SCALE: f32 = 1.3;
+    let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y * 2 + x) as f32 / 9.0));
+    let laser = Illumination::new(beam.view()).unwrap();
+    let alone = Illumination::new(beam.slice(ndarray::s![1..2, .., ..])).unwrap();
+    for (display, shape @ (h, w), offset_m, radius, light, steps) in [
+        ("", (61, 47), 0.0, 1.0, None, 1),
+        ("", (40, 66), 2e-3, 0.9, Some(&laser), 2),
+        ("", (33, 20), 1e-3, 0.3, None, 2),
+        ("", (1, 9), -1e-3, 1.2, None, 3),
+        ("", (1, 1), 0.0, 1.0, None, 1),
+        (ONE_LASER, (61, 47), 0.0, 1.0, None, 1),
+        (ONE_LASER, (40, 66), 2e-3, 0.9, Some(&alone), 2),
+    ] {
+        let display = Display::from_toml(&format!("{display}aperture_radius = {radius:?}")).unwrap();
+        let display = display.with_offset_m(offset_m).unwrap();
+        let target = Target {
+            illumination: light.cloned(),
+            ..display.clone().with_size(h, w).unwrap().into()
+        };
+        let planes = 0..display.colours() as u32;
+        let field: Vec<_> = planes.flat_map(|c| test_plane(shape, 40 + c)).collect();
+        let start: Vec<f32> = (0..field.len()).map(|i| (i * 37 % 628) as f32 / 100.0).collect();
+        let mut results = [1, 3].map(|threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            pool.build().unwrap().install(|| {
+                let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+                let mut phases = start.clone();
+                let mut scratch = plan.scratch();
+                plan.keep(&field, None, &mut scratch);
+                plan.correct(SCALE, &mut phases, &mut scratch);
+                phases
+            })
+        });
+        assert!(results[0] == results[1], "{w}×{h}: other bits on other threads");
+        let phases = std::mem::take(&mut results[0]);
+        let colours = display.wavelengths_m();
+        let plans = Propagator::for_colours(h, w, display.pitch_m(), colours, offset_m, Padding::Reach).unwrap();
+        let padded = plans[0].padded_shape();
+        for (c, (got, field)) in phases.chunks_exact(h * w).zip(field.chunks_exact(h * w)).enumerate() {
+            let light = |i: usize| light.map_or(1.0, |laser| 1.0 / f64::from(laser.gain(c, i / w, i % w, shape)));
+            let light: Vec<f64> = (0..h * w).map(light).collect();
+            let mut wanted = field.to_vec();
+            let back = Propagator::for_colours(h, w, display.pitch_m(), colours, -offset_m, Padding::Reach).unwrap();
+            back[c].propagate(&mut wanted, &mut back[c].scratch());
+            let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
+            let wanted: Vec<Complex64> = wanted.iter().map(goal).collect();
+            let start = start[c * h * w..].iter().zip(&light);
+            let start = start
+                .map(|(phase, light)| Complex64::from_polar(*light, f64::from(*phase)))
+                .collect();
+            let to = |distance_m: f64| {
+                move |u: &[Complex64]| through_aperture(u, shape, padded, colours[c], distance_m, radius)
+            };
+            let expected = midpoint::reference(to(-offset_m), to(offset_m), &wanted, start, &light, steps);
+            let apart =
+                |(e, phase): (&Complex64, &f32)| (e / e.norm() - Complex64::from_polar(1.0, f64::from(*phase))).norm();
+            let squares: f64 = expected.iter().zip(got).map(apart).map(|d| d * d).sum();
+            let error = (squares / (h * w) as f64).sqrt();
+            assert!(error < 2e-3, "{w}×{h} at {offset_m}, colour {c}: {error}");
+        }
+    }
+}
+
+#[test]
+fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
+    let shape @ (h, w) = (48, 70);
+    let target = Target::from(Display::from_toml("width = 70\nheight = 48\noffset_mm = 1").unwrap());
+    let field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
+    let levels = |midpoint_steps: usize| {
+        let options = EncoderOptions {
+            midpoint_steps,
+            brightness: Brightness::Fixed(1.2),
+            ..Default::default()
+        };
+        let plan = Modulator::new(shape, &target, &options).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        plan.modulate(&mut field.clone(), &mut levels, &mut plan.scratch());
+        levels
+    };
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let mut phases = vec![0.0; field.len()];
+    encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
+    assert!((levels(0).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
+    let plan = MidpointSteps::new(shape, &target, 2).unwrap();
+    let mut scratch = plan.scratch();
+    plan.keep(&field, None, &mut scratch);
+    plan.correct(1.2, &mut phases, &mut scratch);
+    assert!((levels(2).iter().zip(&phases)).all(|(level, phase)| target.response.level(*phase, 0) == *level));
+    assert_ne!(levels(0), levels(2));
+}
+
+/// In video one step a frame leads where many lead; where the field changes it begins anew, as a frame by itself.
+#[test]
+fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
+    const SCALE: f32 = 1.2;
+    let shape @ (_, w) = (40, 66);
+    let target = Target::from(Display::from_toml("width = 66\nheight = 40\noffset_mm = 1").unwrap());
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let first: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 70 + c)).collect();
+    let moved = |at: usize| at % w > w / 2;
+    let second = first
+        .iter()
+        .zip((0..3).flat_map(|c| test_plane(shape, 80 + c)))
+        .enumerate();
+    let second: Vec<_> = second
+        .map(|(at, (still, other))| if moved(at) { other } else { *still })
+        .collect();
+    let encoded = |field: &[Complex32]| {
+        let mut phases = vec![0.0; field.len()];
+        encoder.encode(&mut field.to_vec(), Some(SCALE), &mut phases, &mut encoder.scratch());
+        phases
+    };
+    let run = |steps: usize, frames: &[(&[Complex32], Option<f32>)]| {
+        let plan = MidpointSteps::new(shape, &target, steps).unwrap();
+        let mut scratch = plan.scratch();
+        let each = frames.iter().map(|(field, past)| {
+            let mut phases = encoded(field);
+            plan.keep(field, *past, &mut scratch);
+            plan.correct(SCALE, &mut phases, &mut scratch);
+            phases
+        });
+        each.last().unwrap()
+    };
+    let apart = |a: f32, b: f32| (Complex32::cis(a) - Complex32::cis(b)).norm();
+    let follows = Some(SCALE);
+    let still: [(&[Complex32], _); 3] = [(&first, None), (&first, follows), (&first, follows)];
+    let most = run(1, &still)
+        .into_iter()
+        .zip(run(3, &still[..1]))
+        .map(|(a, b)| apart(a, b));
+    assert!(most.fold(0.0, f32::max) < 1e-2);
+    assert_eq!(run(1, &[(&first, None), (&first, None)]), run(1, &still[..1]));
+
+    // Away from what stands still, what moves is as it would be by itself.
+    let anew = run(1, &[(&second, None)]);
+    let after = run(1, &[(&first, None), (&second, follows)]);
+    let far = (0..anew.len()).filter(|at| at % w > w / 2 + 20);
+    let squares: f32 = far.clone().map(|at| apart(anew[at], after[at]).powi(2)).sum();
+    assert!((squares / far.count() as f32).sqrt() < 0.1);
+    let still = (0..anew.len()).filter(|at| !moved(*at) && apart(anew[*at], after[*at]) > 1e-3);
+    assert!(still.count() * 3 > anew.len() / 2);
+}
+
+#[test]
+fn a_dark_frame_is_dark() {
+    let options = EncoderOptions {
+        dark: 0.4,
+        local_steps: 2,
+        ..Default::default()
+    };
+    let encoder = Encoder::new((4, 6), &Target::default(), &options).unwrap();
+    let mut phases = vec![1.0; 72];
+    let scale = encoder.encode(&mut [Complex32::ZERO; 72], None, &mut phases, &mut encoder.scratch());
+    assert_eq!(scale, 0.0);
+    let sum: Complex32 = phases[..24].iter().map(|p| Complex32::from_polar(1.0, *p)).sum();
+    assert!(sum.norm() < 1e-4);
+}
+
+/// A value that is no number costs what lies around it, not the frame.
+#[test]
+fn no_number_stays_where_it_is() {
+    let shape @ (h, w) = (40, 50);
+    let target = Target::from(Display::default().with_size(h, w).unwrap());
+    let good: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 60 + c)).collect();
+    let encoder = Encoder::new(shape, &target, &EncoderOptions::default()).unwrap();
+    let steps = MidpointSteps::new(shape, &target, 2).unwrap();
+    for bad in [f32::NAN, f32::INFINITY] {
+        let mut field = good.clone();
+        field[20 * w + 25].im = bad;
+        let [expected, phases] = [&good, &field].map(|field| {
+            let mut phases = vec![0.0; field.len()];
+            encoder.encode(&mut field.clone(), Some(1.2), &mut phases, &mut encoder.scratch());
+            phases
+        });
+        for (at, (expected, phase)) in expected.iter().zip(&phases).enumerate() {
+            let near = at < h * w && (at / w).abs_diff(20) <= 6 && (at % w).abs_diff(25) <= 6;
+            assert!((0.0..std::f32::consts::TAU).contains(phase));
+            assert!(near || expected == phase, "{at}: {expected} {phase}");
+        }
+        let mut corrected = phases.clone();
+        let mut scratch = steps.scratch();
+        steps.keep(&field, None, &mut scratch);
+        steps.correct(1.2, &mut corrected, &mut scratch);
+        assert_eq!(corrected[..h * w], phases[..h * w]);
+        assert_ne!(corrected[h * w..], phases[h * w..]);
+    }
+}
+
+fn refused(options: EncoderOptions, what: &str) {
+    let why = Encoder::new((4, 6), &Target::default(), &options)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(why.contains(what) && !why.contains('\n'), "{why}");
+}
+
+#[test]
+fn a_dark_that_is_no_share_is_refused() {
+    for dark in [-0.1, 1.5, f32::NAN, f32::INFINITY] {
+        let options = EncoderOptions {
+            dark,
+            ..Default::default()
+        };
+        refused(options, "from 0 to 1");
+    }
+}
+
+#[test]
+fn more_steps_than_bring_anything_are_refused() {
+    let options = EncoderOptions {
+        local_steps: 9,
+        ..Default::default()
+    };
+    refused(options, "at most 8");
+    let options = EncoderOptions {
+        midpoint_steps: 101,
+        ..Default::default()
+    };
+    refused(options, "at most 100");
+}

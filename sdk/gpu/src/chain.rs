@@ -1,0 +1,688 @@
+//! The convolution chain on the GPU: one dispatch a layer, or one for two layers and the skip around them where that
+//! is faster on this device. Its twins are [`phasefront_core::method::network::reference`] and the kernels' int8 module.
+
+use super::device::{Constants, Device, Dispatch};
+use super::input::{ChainInput, Form, Packer, Source};
+use super::{GpuError, Result};
+use phasefront_core::method::network::chain::{Chain, Layer, Precision, Weights};
+use phasefront_core::method::network::{Head, InputKind, Network};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Channels of a group.
+pub(super) const GROUP: usize = 4;
+/// Filters that a thread computes at a time.
+const BLOCK: usize = 8;
+/// Pixels of a workgroup of `layer` and `last`, columns and rows.
+const TILE: (usize, usize) = (32, 8);
+/// Pixels a side that a workgroup of `pair` computes of its first layer and of its second.
+const PAIR_TILE: usize = 16;
+const PAIR_INNER: usize = 14;
+/// Sums up to this are exact in f32, in which they are multiplied.
+const LARGEST_SUM: i64 = 1 << 24;
+
+/// The numbers that an f32 chain is computed in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Float {
+    /// 16 bits where the GPU has them, else 32.
+    #[default]
+    Fastest,
+    /// 16 bits for activations and weights, sums in both: to 2 % of the largest value, typically 0.3 %.
+    F16,
+    /// 32 bits.
+    F32,
+}
+
+/// The numbers of a planned chain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Numbers {
+    F32,
+    F16,
+    Int8,
+}
+
+impl Numbers {
+    /// What a chain is computed in on `device`.
+    pub(super) fn of(device: &Device, chain: &Chain, float: Float) -> Result<Numbers> {
+        if chain.halved && !chain.inputs.is_multiple_of(GROUP) {
+            return Err(GpuError::Refused(format!(
+                "{} input channels at half the resolution; fours are right, the CPU takes others",
+                chain.inputs
+            )));
+        }
+        Ok(match (chain.precision, float) {
+            (Precision::Int8, _) => Numbers::Int8,
+            (_, Float::F32) => Numbers::F32,
+            (_, Float::Fastest) if !device.features().half => Numbers::F32,
+            (_, Float::F16) if !device.features().half => {
+                return Err(GpuError::Refused(format!(
+                    "{} has no 16-bit floating point (shader-f16); f32 is right",
+                    device.name()
+                )));
+            }
+            _ => Numbers::F16,
+        })
+    }
+
+    /// Its name in reports.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Numbers::F32 => "f32",
+            Numbers::F16 => "f16",
+            Numbers::Int8 => "int8",
+        }
+    }
+
+    /// Bytes of a group's value at a pixel.
+    pub(super) fn value_bytes(self) -> usize {
+        match self {
+            Numbers::F32 => 16,
+            Numbers::F16 => 8,
+            Numbers::Int8 => 4,
+        }
+    }
+
+    /// How programs call a group's value at a pixel.
+    pub(super) fn value(self) -> &'static str {
+        match self {
+            Numbers::F32 => "vec4<f32>",
+            Numbers::F16 => "vec4<f16>",
+            Numbers::Int8 => "u32",
+        }
+    }
+}
+
+/// How many layers a dispatch computes. The result is the same to the bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fusion {
+    /// Whichever of the two is faster when the plan is made; one on drivers in software.
+    #[default]
+    Measured,
+    /// One.
+    Layers,
+    /// Two and the skip around them, what is between them in workgroup memory.
+    Pairs,
+}
+
+/// How a chain is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ChainOptions {
+    /// The numbers of an f32 chain; an int8 chain has its own.
+    pub float: Float,
+    /// How many layers a dispatch computes.
+    pub fusion: Fusion,
+}
+
+/// What the last layer writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum End {
+    /// The six planes.
+    Planes,
+    /// The complex field that they stand for, and its sums by workgroup.
+    Field(Head, InputKind),
+}
+
+/// A chain on the GPU for one frame size.
+pub(super) struct ChainPlan {
+    steps: Vec<Dispatch>,
+    pub(super) fusion: Fusion,
+    /// (6, H, W) f32 of [`End::Planes`].
+    pub(super) planes: wgpu::Buffer,
+    /// (3, H, W) complex f32 of [`End::Field`].
+    pub(super) field: wgpu::Buffer,
+    /// Sums of the field: three complex f32 for each of `parts` workgroups.
+    pub(super) partial: wgpu::Buffer,
+    pub(super) parts: usize,
+    /// What the dispatches read and write, each value once.
+    pub(super) bytes: usize,
+}
+
+/// What all steps of a chain share while they are made.
+struct Maker<'a> {
+    device: &'a Device,
+    numbers: Numbers,
+    /// Rows and columns of the layers' own pixels.
+    size: (usize, usize),
+    frame: Constants,
+}
+
+/// A layer's weights in the order in which programs read them, as bytes.
+struct Packed {
+    bytes: Vec<u8>,
+    groups: usize,
+    beside: usize,
+    outputs: usize,
+    /// Of an int8 layer.
+    requantise: Option<Tables>,
+    /// The word of four activations that stand for 0.
+    zero: u32,
+}
+
+/// What follows an int8 layer's sums; see chain_int8.wgsl.
+struct Tables {
+    skip: Vec<f32>,
+    relu: Option<Vec<f32>>,
+    next: Option<Vec<u8>>,
+}
+
+impl ChainPlan {
+    /// Plans `chain` for frames of `size` (height, width) from `input`, fused as asked or as is measured to be faster.
+    pub(super) fn new(
+        device: &Device,
+        chain: &Chain,
+        numbers: Numbers,
+        size: (usize, usize),
+        input: &ChainInput,
+        end: End,
+        fusion: Fusion,
+    ) -> Result<Self> {
+        let packed = match numbers {
+            Numbers::Int8 => pack_int8(chain)?,
+            _ => (chain.layers.iter().enumerate())
+                .map(|(i, layer)| pack_float(chain, i, layer, numbers))
+                .collect::<Result<_>>()?,
+        };
+        let pixels = size.0 * size.1;
+        let (height, width) = (size.0.div_ceil(chain.side()), size.1.div_ceil(chain.side()));
+        let tiles = (width.div_ceil(TILE.0), height.div_ceil(TILE.1));
+        let constants = [width, height, width * height, tiles.0, size.1, size.0, 0, 0].map(|n| n as u32);
+        let maker = Maker {
+            device,
+            numbers,
+            size: (height, width),
+            frame: device.constants("frame", bytemuck::cast_slice(&constants))?,
+        };
+        let groups = chain.filters().div_ceil(GROUP);
+        let bytes = groups * width * height * numbers.value_bytes();
+        let features = [
+            device.buffer("a layer's output", bytes)?,
+            device.buffer("a layer's output", bytes)?,
+        ];
+        let (planes, field) = match end {
+            End::Planes => (24 * pixels, 0),
+            End::Field(..) => (0, 24 * pixels),
+        };
+        let mut plan = ChainPlan {
+            steps: Vec::new(),
+            fusion: Fusion::Layers,
+            planes: device.buffer("the network's output", planes)?,
+            field: device.buffer("the field", field)?,
+            partial: device.buffer("sums", 24 * tiles.0 * tiles.1)?,
+            parts: tiles.0 * tiles.1,
+            bytes: 0,
+        };
+        let all = Layers {
+            chain,
+            packed: &packed,
+            input,
+            features: &features,
+            plan: &plan,
+            end,
+        };
+        let make = |fusion| maker.steps(&all, fusion);
+        let between = groups * PAIR_TILE * PAIR_TILE * numbers.value_bytes();
+        let fits = between <= device.limits().max_compute_workgroup_storage_size as usize;
+        let pairs = packed.len() > 3 && fits;
+        (plan.steps, plan.fusion) = match fusion {
+            Fusion::Pairs if pairs => (make(Fusion::Pairs)?, Fusion::Pairs),
+            Fusion::Measured if pairs && !device.is_software() => {
+                let (layers, fused) = (make(Fusion::Layers)?, make(Fusion::Pairs)?);
+                match time(device, &fused)? < time(device, &layers)? {
+                    true => (fused, Fusion::Pairs),
+                    false => (layers, Fusion::Layers),
+                }
+            }
+            _ => (make(Fusion::Layers)?, Fusion::Layers),
+        };
+        let input = chain.inputs.div_ceil(GROUP) * pixels * numbers.value_bytes();
+        // Features in and out of each hidden layer and into the last one; skips are read once more where layers are
+        // not fused; the input twice; the end once.
+        let hidden = plan.dispatches() - 1;
+        let skips = (1..packed.len()).filter(|&i| Chain::has_skip(i)).count();
+        let again = if plan.fusion == Fusion::Pairs { 0 } else { skips };
+        plan.bytes = (2 * hidden + again) * bytes + 2 * input + 24 * pixels;
+        Ok(plan)
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.steps.iter().for_each(|step| step.run(pass));
+    }
+
+    /// Dispatches a frame.
+    pub(super) fn dispatches(&self) -> usize {
+        self.steps.len()
+    }
+}
+
+/// The shortest of three runs, after one that is not counted.
+pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
+    let run = || {
+        let mut encoder = device.inner.create_command_encoder(&Default::default());
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        steps.iter().for_each(|step| step.run(&mut pass));
+        drop(pass);
+        let start = Instant::now();
+        device.wait(&device.queue.submit([encoder.finish()]))?;
+        Ok::<_, GpuError>(start.elapsed())
+    };
+    run()?;
+    let mut best = Duration::MAX;
+    for _ in 0..3 {
+        best = best.min(run()?);
+    }
+    Ok(best)
+}
+
+/// A chain's layers and what they read and write.
+struct Layers<'a> {
+    chain: &'a Chain,
+    packed: &'a [Packed],
+    input: &'a ChainInput,
+    /// What hidden layers write, in turn.
+    features: &'a [wgpu::Buffer; 2],
+    /// With what the last layer writes.
+    plan: &'a ChainPlan,
+    end: End,
+}
+
+impl Maker<'_> {
+    fn steps(&self, all: &Layers<'_>, fusion: Fusion) -> Result<Vec<Dispatch>> {
+        let Layers {
+            packed,
+            input,
+            features,
+            ..
+        } = *all;
+        let last = packed.len() - 1;
+        let mut steps = vec![self.layer(&packed[0], &input.first, &features[0], false)?];
+        // Where the current layer's input lies.
+        let mut at = 0;
+        let mut i = 1;
+        while i < last {
+            let (from, to) = (&features[at], &features[1 - at]);
+            let pair = fusion == Fusion::Pairs && i + 1 < last && Chain::has_skip(i + 2);
+            if pair {
+                steps.push(self.pair(&packed[i], &packed[i + 1], from, to)?);
+            } else {
+                steps.push(self.layer(&packed[i], from, to, Chain::has_skip(i + 1))?);
+            }
+            at = 1 - at;
+            i += if pair { 2 } else { 1 };
+        }
+        steps.push(self.last(&packed[last], &features[at], all)?);
+        Ok(steps)
+    }
+
+    fn layer(&self, layer: &Packed, from: &wgpu::Buffer, to: &wgpu::Buffer, skip: bool) -> Result<Dispatch> {
+        let weights = self.device.constants("weights", &layer.bytes)?;
+        let tables = self.tables(layer)?;
+        let source = self.source(layer, &weights, skip, "") + include_str!("chain_layer.wgsl");
+        let program = self.device.program("a layer", source, "layer");
+        let mut arguments = self.arguments(&weights, from, from);
+        arguments.push((4, to.as_entire_binding()));
+        arguments.extend(tables.iter().map(|t| (8, t.buffer.as_entire_binding())));
+        program.on(self.device, &arguments, self.grid())
+    }
+
+    fn pair(&self, first: &Packed, second: &Packed, from: &wgpu::Buffer, to: &wgpu::Buffer) -> Result<Dispatch> {
+        let both = [&first.bytes[..], &second.bytes].concat();
+        let weights = self.device.constants("weights", &both)?;
+        let tables = self.tables(second)?;
+        let each = first.bytes.len() / self.eight_bytes();
+        let more = format!("const EACH: u32 = {each}u;\n");
+        let source = self.source(second, &weights, true, &more) + include_str!("chain_pair.wgsl");
+        let program = self.device.program("two layers", source, "pair");
+        let mut arguments = self.arguments(&weights, from, from);
+        arguments.push((4, to.as_entire_binding()));
+        arguments.extend(tables.iter().map(|t| (8, t.buffer.as_entire_binding())));
+        let (height, width) = self.size;
+        let grid = [width.div_ceil(PAIR_INNER), height.div_ceil(PAIR_INNER), 1];
+        program.on(self.device, &arguments, grid)
+    }
+
+    fn last(&self, layer: &Packed, from: &wgpu::Buffer, all: &Layers<'_>) -> Result<Dispatch> {
+        let &Layers { input, plan, .. } = all;
+        let weights = self.device.constants("weights", &layer.bytes)?;
+        let head = match all.end {
+            End::Planes => 0,
+            End::Field(Head::AmplitudePhase, _) => 1,
+            End::Field(Head::RealImaginary, InputKind::Field | InputKind::BlurredField) => 3,
+            End::Field(Head::RealImaginary, InputKind::Seeded) => 4,
+            End::Field(Head::RealImaginary, InputKind::SplitBlurredField) => 5,
+            End::Field(Head::RealImaginary, _) => 2,
+        };
+        let more = format!(
+            "const HEAD: u32 = {head}u;\nconst SIDE: i32 = {};\nconst TANH: bool = {};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+            all.chain.side(),
+            all.chain.tanh,
+            InputKind::REMAINDER_GAIN
+        );
+        let source = self.source(layer, &weights, false, &more) + include_str!("chain_last.wgsl");
+        let program = self.device.program("the last layer", source, "last");
+        let mut arguments = self.arguments(&weights, from, &input.last);
+        arguments.push((5, plan.planes.as_entire_binding()));
+        arguments.push((6, plan.field.as_entire_binding()));
+        arguments.push((7, plan.partial.as_entire_binding()));
+        if self.numbers == Numbers::Int8 {
+            arguments.push((9, input.image.as_entire_binding()));
+        }
+        program.on(self.device, &arguments, self.grid())
+    }
+
+    fn grid(&self) -> [usize; 3] {
+        [self.size.1.div_ceil(TILE.0), self.size.0.div_ceil(TILE.1), 1]
+    }
+
+    fn arguments<'b>(
+        &'b self,
+        weights: &'b Constants,
+        features: &'b wgpu::Buffer,
+        beside: &'b wgpu::Buffer,
+    ) -> Vec<(u32, wgpu::BindingResource<'b>)> {
+        vec![
+            (0, self.frame.buffer.as_entire_binding()),
+            (1, weights.buffer.as_entire_binding()),
+            (2, features.as_entire_binding()),
+            (3, beside.as_entire_binding()),
+        ]
+    }
+
+    /// Bytes of an `Eight`.
+    fn eight_bytes(&self) -> usize {
+        match self.numbers {
+            Numbers::F16 => 16,
+            _ => 32,
+        }
+    }
+
+    /// The program's text up to its entry.
+    fn source(&self, layer: &Packed, weights: &Constants, skip: bool, more: &str) -> String {
+        let real = match self.numbers {
+            Numbers::F16 => "enable f16;\nalias Real4 = vec4<f16>;\n",
+            Numbers::F32 => "alias Real4 = vec4<f32>;\n",
+            Numbers::Int8 => "alias Real4 = vec4<u32>;\n",
+        };
+        let tables = layer.requantise.as_ref();
+        let count = weights.buffer.size() as usize / self.eight_bytes();
+        let header = format!(
+            "{real}struct Eight {{ low: Real4, high: Real4 }}
+            @group(0) @binding(1) var<{space}> weights: array<Eight, {count}>;
+            const HALF: bool = {half};
+            const SKIP: bool = {skip};
+            const ROUNDED_RELU: bool = {rounded};
+            const NEXT: bool = {next};
+            const ZERO: u32 = {zero}u;
+            const GROUPS: u32 = {groups}u;
+            const BESIDE: u32 = {beside}u;
+            const BLOCKS: u32 = {blocks}u;
+            const GROUPS_OUT: u32 = {out}u;
+            {more}",
+            space = weights.space(),
+            half = self.numbers == Numbers::F16,
+            rounded = tables.is_some_and(|t| t.relu.is_some()),
+            next = tables.is_some_and(|t| t.next.is_some()),
+            zero = layer.zero,
+            groups = layer.groups,
+            beside = layer.beside,
+            blocks = layer.outputs.div_ceil(BLOCK),
+            out = layer.outputs.div_ceil(GROUP),
+        );
+        let numbers = match self.numbers {
+            Numbers::Int8 => include_str!("chain_int8.wgsl"),
+            _ => include_str!("chain_float.wgsl"),
+        };
+        header + numbers + include_str!("chain.wgsl")
+    }
+
+    /// The tables of an int8 layer, in the order that chain_int8.wgsl gives.
+    fn tables(&self, layer: &Packed) -> Result<Option<Constants>> {
+        let Some(tables) = &layer.requantise else {
+            return Ok(None);
+        };
+        let relu = tables.relu.clone().unwrap_or(vec![0.0; 256]);
+        let next = tables.next.as_ref();
+        let next: Vec<u32> = (0..256)
+            .map(|q| next.map_or(q as u32, |next| u32::from(next[q])))
+            .collect();
+        let bytes = [
+            bytemuck::cast_slice(&tables.skip),
+            bytemuck::cast_slice(&relu),
+            bytemuck::cast_slice::<u32, u8>(&next),
+        ]
+        .concat();
+        self.device.table("roundings", &bytes).map(Some)
+    }
+}
+
+/// Groups of a layer's features and of what is concatenated with them.
+fn groups(chain: &Chain, i: usize, layer: &Layer) -> (usize, usize, usize) {
+    let last = i + 1 == chain.layers.len();
+    let beside = if last { chain.layers[0].inputs } else { 0 };
+    let features = layer.inputs - beside;
+    (features, features.div_ceil(GROUP), beside.div_ceil(GROUP))
+}
+
+/// Values of a layer's outputs; in the last layer of a halved chain those of each pixel of a square in a block of their
+/// own.
+fn by_pixel<T: Copy + Default>(chain: &Chain, i: usize, values: &[T]) -> Vec<T> {
+    if !chain.halved || i + 1 < chain.layers.len() {
+        return values.to_vec();
+    }
+    let of_pixel = values.len() / 4;
+    let padding = of_pixel / chain.outputs() * (BLOCK - chain.outputs());
+    let blocks = values.chunks_exact(of_pixel);
+    blocks
+        .flat_map(|block| [block, &vec![T::default(); padding]].concat())
+        .collect()
+}
+
+/// The channel of a layer's input that lies at place `k` of a group, if there is one.
+fn channel(features: usize, groups: usize, inputs: usize, group: usize, k: usize) -> Option<usize> {
+    match group.checked_sub(groups) {
+        None => Some(group * GROUP + k).filter(|&c| c < features),
+        Some(after) => Some(features + after * GROUP + k).filter(|&c| c < inputs),
+    }
+}
+
+fn pack_float(chain: &Chain, i: usize, layer: &Layer, numbers: Numbers) -> Result<Packed> {
+    let Weights::F32 { kernel, bias } = &layer.weights else {
+        return Err(
+            phasefront_core::runtime::error::Error::Network(format!("layer {i} is int8 in an f32 chain")).into(),
+        );
+    };
+    let (features, groups, beside) = groups(chain, i, layer);
+    let (kernel, bias) = (by_pixel(chain, i, kernel), by_pixel(chain, i, bias));
+    let outputs = bias.len();
+    let blocks = outputs.div_ceil(BLOCK);
+    let mut values = bias;
+    values.resize(blocks * BLOCK, 0.0);
+    for block in 0..blocks {
+        for kx in 0..3 {
+            for group in 0..groups + beside {
+                for ky in 0..3 {
+                    for k in 0..GROUP {
+                        let c = channel(features, groups, layer.inputs, group, k);
+                        values.extend((block * BLOCK..(block + 1) * BLOCK).map(|o| match c {
+                            Some(c) if o < outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx],
+                            _ => 0.0,
+                        }));
+                    }
+                }
+            }
+        }
+    }
+    let bytes = match numbers {
+        Numbers::F16 => {
+            let halves: Vec<u16> = values.iter().map(|&v| half::f16::from_f32(v).to_bits()).collect();
+            bytemuck::cast_slice(&halves).to_vec()
+        }
+        _ => bytemuck::cast_slice(&values).to_vec(),
+    };
+    Ok(Packed {
+        bytes,
+        groups,
+        beside,
+        outputs,
+        requantise: None,
+        zero: 0,
+    })
+}
+
+fn pack_int8(chain: &Chain) -> Result<Vec<Packed>> {
+    let whole = phasefront_core::method::network::int8_layers(chain)
+        .map_err(phasefront_core::runtime::error::Error::Network)?;
+    let last = whole.layers.len() - 1;
+    let mut all = Vec::new();
+    for (i, layer) in whole.layers.iter().enumerate() {
+        let (features, groups, beside) = groups(chain, i, &chain.layers[i]);
+        let per_filter = layer.inputs * 9;
+        let (kernel, biases) = (by_pixel(chain, i, &layer.kernel), by_pixel(chain, i, &layer.bias));
+        let outputs = biases.len();
+        let blocks = outputs.div_ceil(BLOCK);
+        let mut bias = Vec::new();
+        for (o, weights) in kernel.chunks_exact(per_filter).enumerate() {
+            let total: i64 = weights.iter().map(|&w| i64::from(w)).sum();
+            let reach: i64 = weights.iter().map(|&w| 255 * i64::from(w).abs()).sum();
+            let plain = i64::from(biases[o]) - i64::from(layer.zero_point) * total;
+            if plain.abs() + reach > LARGEST_SUM {
+                return Err(GpuError::Refused(format!(
+                    "sums of layer {i} exceed 24 bits, which f32 holds; the CPU is right"
+                )));
+            }
+            // Activations come minus 128.
+            bias.push((plain + 128 * total) as i32);
+        }
+        let mut words: Vec<u32> = bias.iter().map(|&b| b as u32).collect();
+        words.resize(blocks * BLOCK, 0);
+        words.extend(by_pixel(chain, i, &layer.multiplier).iter().map(|m| m.to_bits()));
+        words.resize(2 * blocks * BLOCK, 0);
+        for block in 0..blocks {
+            for kx in 0..3 {
+                for group in 0..groups + beside {
+                    for ky in 0..3 {
+                        words.extend((block * BLOCK..(block + 1) * BLOCK).map(|o| {
+                            u32::from_le_bytes(std::array::from_fn(|k| {
+                                match channel(features, groups, layer.inputs, group, k) {
+                                    Some(c) if o < outputs => kernel[((o * layer.inputs + c) * 3 + ky) * 3 + kx] as u8,
+                                    _ => 0,
+                                }
+                            }))
+                        }));
+                    }
+                }
+            }
+        }
+        let after = |factor: f32| -> Vec<f32> { (0..256).map(|v| v as f32 * factor).collect() };
+        let skip = layer.requantise.skip;
+        // The features of the last layer's input may be rounded again, and have its zero point.
+        let next = (i + 1 == last).then(|| {
+            let zero = whole.layers[last].zero_point;
+            let rounded = |q: u8| match layer.requantise.rescale {
+                Some(factor) => (f32::from(q) * factor).min(255.0).round_ties_even() as u8,
+                None => q,
+            };
+            (0..=255).map(|q| rounded(q).saturating_add(zero)).collect()
+        });
+        all.push(Packed {
+            bytes: bytemuck::cast_slice(&words).to_vec(),
+            groups,
+            beside,
+            outputs,
+            requantise: Some(Tables {
+                skip: after(skip.map_or(0.0, |s| s.skip)),
+                relu: skip.and_then(|s| s.relu).map(after),
+                next,
+            }),
+            zero: u32::from_le_bytes([layer.zero_point ^ 0x80; 4]),
+        });
+    }
+    Ok(all)
+}
+
+/// A network on the GPU for one frame size: the twin of [`phasefront_core::method::network::NetworkPlan`].
+pub struct GpuNetworkPlan {
+    device: Arc<Device>,
+    size: (usize, usize),
+    inputs: usize,
+    numbers: Numbers,
+    packer: Packer,
+    chain: ChainPlan,
+}
+
+impl GpuNetworkPlan {
+    /// Prepares `network` for frames of `height` × `width` pixels.
+    ///
+    /// # Errors
+    /// [`GpuError::Refused`] for numbers or a size that `device` does not have, [`GpuError::OutOfMemory`].
+    pub fn new(
+        device: &Arc<Device>,
+        network: &Network,
+        height: usize,
+        width: usize,
+        options: ChainOptions,
+    ) -> Result<Self> {
+        let size = (height, width);
+        phasefront_core::method::network::check_size(height, width, phasefront_core::method::network::MAX_PIXELS)?;
+        device.guarded(|| {
+            let chain = network.chain();
+            let numbers = Numbers::of(device, chain, options.float)?;
+            let packer = Packer::new(device, Form::Chain(chain, numbers, 1.0), size, Source::Planes, None)?;
+            let (input, fusion) = (&packer.input, options.fusion);
+            let plan = ChainPlan::new(device, chain, numbers, size, input, End::Planes, fusion)?;
+            Ok(GpuNetworkPlan {
+                device: device.clone(),
+                size,
+                inputs: chain.inputs,
+                numbers,
+                packer,
+                chain: plan,
+            })
+        })
+    }
+
+    /// What it computes in and by how many dispatches.
+    pub fn describe(&self) -> String {
+        format!(
+            "{} on {}, {} dispatches",
+            self.numbers.name(),
+            self.device.name(),
+            self.chain.dispatches()
+        )
+    }
+
+    /// Runs the network on one frame: `input` planar (C, H, W) as [`phasefront_core::method::network::NetworkPlan::run`] takes it,
+    /// `output` (6, H, W).
+    ///
+    /// # Errors
+    /// A wrong length; [`GpuError::Lost`].
+    pub fn run(&self, input: &[f32], output: &mut [f32]) -> Result<()> {
+        let area = self.size.0 * self.size.1;
+        if input.len() != self.inputs * area || output.len() != 6 * area {
+            return Err(phasefront_core::runtime::error::Error::Frame(format!(
+                "network input has {} values and output {}; {} and 6 planes of {}×{} pixels are right",
+                input.len(),
+                output.len(),
+                self.inputs,
+                self.size.1,
+                self.size.0
+            ))
+            .into());
+        }
+        let device = &self.device;
+        device.guarded(|| {
+            device
+                .queue
+                .write_buffer(&self.packer.planes, 0, bytemuck::cast_slice(input));
+            let mut encoder = device.inner.create_command_encoder(&Default::default());
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            self.packer.run(&mut pass);
+            self.chain.run(&mut pass);
+            drop(pass);
+            device.queue.submit([encoder.finish()]);
+            Ok(())
+        })?;
+        let bytes = device.read(&self.chain.planes, 4 * output.len())?;
+        output.copy_from_slice(bytemuck::cast_slice(&bytes));
+        Ok(())
+    }
+}

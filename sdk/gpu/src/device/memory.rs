@@ -1,0 +1,130 @@
+//! Memory of a GPU, and its way back.
+
+use super::{Device, one_line};
+use crate::{GpuError, Result};
+use wgpu::util::{BufferInitDescriptor, DeviceExt};
+
+/// Constants of a program and where they lie.
+pub(crate) struct Constants {
+    pub(crate) buffer: wgpu::Buffer,
+    uniform: bool,
+}
+
+impl Constants {
+    /// The address space as WGSL calls it.
+    pub(crate) fn space(&self) -> &'static str {
+        match self.uniform {
+            true => "uniform",
+            false => "storage, read",
+        }
+    }
+}
+
+impl Device {
+    /// Memory of `bytes`, zeros, for programs and copies.
+    pub(crate) fn buffer(&self, what: &str, bytes: usize) -> Result<wgpu::Buffer> {
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
+        let most = self
+            .limits
+            .max_storage_buffer_binding_size
+            .min(self.limits.max_buffer_size);
+        if bytes as u64 > most {
+            return Err(GpuError::Refused(format!(
+                "{what} of {} MB is too large for {}, which takes {} MB; smaller frames are right",
+                bytes >> 20,
+                self.name(),
+                most >> 20
+            )));
+        }
+        Ok(self.inner.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            // Bindings hold a whole value at least.
+            size: (bytes.max(16) as u64).next_multiple_of(16),
+            usage,
+            mapped_at_creation: false,
+        }))
+    }
+
+    /// Memory that the CPU reads.
+    pub(crate) fn readable(&self, what: &str, bytes: usize) -> wgpu::Buffer {
+        self.inner.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size: (bytes as u64).next_multiple_of(16),
+            usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// Constants: in uniform memory where they fit, which every GPU has the fastest way to.
+    pub(crate) fn constants(&self, what: &str, contents: &[u8]) -> Result<Constants> {
+        let uniform = contents.len() as u64 <= self.limits.max_uniform_buffer_binding_size;
+        if !uniform && contents.len() as u64 > self.limits.max_storage_buffer_binding_size {
+            return Err(GpuError::Refused(format!("{what} do not fit {}", self.name())));
+        }
+        let usage = match uniform {
+            true => wgpu::BufferUsages::UNIFORM,
+            false => wgpu::BufferUsages::STORAGE,
+        };
+        let buffer = self.inner.create_buffer_init(&BufferInitDescriptor {
+            label: Some(what),
+            contents,
+            usage: usage | wgpu::BufferUsages::COPY_DST,
+        });
+        Ok(Constants { buffer, uniform })
+    }
+
+    /// Constants that threads look up each at another place.
+    pub(crate) fn table(&self, what: &str, contents: &[u8]) -> Result<Constants> {
+        let buffer = self.buffer(what, contents.len())?;
+        self.queue.write_buffer(&buffer, 0, contents);
+        Ok(Constants { buffer, uniform: false })
+    }
+
+    /// Copies `bytes` to `at` of `to`, which is a multiple of 4. Copies take whole words, so what is missing is 0.
+    pub(crate) fn write(&self, to: &wgpu::Buffer, at: usize, bytes: &[u8]) {
+        let (words, rest) = bytes.split_at(bytes.len() / 4 * 4);
+        self.queue.write_buffer(to, at as u64, words);
+        if !rest.is_empty() {
+            let mut word = [0; 4];
+            word[..rest.len()].copy_from_slice(rest);
+            self.queue.write_buffer(to, (at + words.len()) as u64, &word);
+        }
+    }
+
+    /// Reads `buffer` back, once what was submitted is done: for tests and for looking at what is between stages.
+    pub(crate) fn read(&self, buffer: &wgpu::Buffer, bytes: usize) -> Result<Vec<u8>> {
+        let target = self.readable("read back", bytes);
+        let mut encoder = self.inner.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(buffer, 0, &target, 0, target.size());
+        let submission = self.queue.submit([encoder.finish()]);
+        let mut all = vec![0; bytes];
+        self.map(&target, &submission)?;
+        copy_mapped(&target, &mut all)?;
+        Ok(all)
+    }
+
+    /// Maps a readable buffer that `submission` writes.
+    pub(crate) fn map(&self, buffer: &wgpu::Buffer, submission: &wgpu::SubmissionIndex) -> Result<()> {
+        let (send, receive) = std::sync::mpsc::channel();
+        buffer.map_async(wgpu::MapMode::Read, .., move |mapped| {
+            // The receiver waits below, or has given up.
+            let _ = send.send(mapped);
+        });
+        self.wait(submission)?;
+        // Another thread that polls the device may be the one that says so.
+        match receive.recv_timeout(self.patience) {
+            Ok(Ok(())) => Ok(()),
+            Ok(Err(why)) => Err(GpuError::Lost(one_line(why))),
+            Err(why) => Err(GpuError::Lost(one_line(why))),
+        }
+    }
+}
+
+/// Copies a mapped buffer's first bytes.
+pub(crate) fn copy_mapped(buffer: &wgpu::Buffer, into: &mut [u8]) -> Result<()> {
+    let view = buffer
+        .get_mapped_range(..)
+        .map_err(|why| GpuError::Lost(one_line(why)))?;
+    into.copy_from_slice(&view[..into.len()]);
+    Ok(())
+}

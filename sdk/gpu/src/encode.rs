@@ -1,0 +1,310 @@
+//! From the field at the modulator to levels, as a buffer and as a texture: the filters of AA-DPM, BL-DPM and DDPM,
+//! double phase, the response. The twin of [`phasefront_core::encode`] and [`phasefront_core::display::response`].
+
+mod blur;
+mod double_phase;
+mod filter;
+mod local;
+mod mean_phase;
+mod midpoint;
+
+pub(super) use mean_phase::MeanPhase;
+
+use super::brightness::Smoother;
+use super::chain::ChainOptions;
+use super::device::Device;
+use super::{GpuError, Result};
+use double_phase::{DoublePhase, Shared};
+use filter::Filter;
+use phasefront_core::display::response::Response;
+use phasefront_core::display::target::Target;
+use phasefront_core::encode::EncoderOptions;
+use phasefront_core::encode::brightness::{Brightness, Past};
+
+/// Columns of a workgroup.
+const COLUMNS: usize = 64;
+
+/// Where a frame's levels go.
+pub(super) struct LevelsBuffers {
+    /// (H, W) words: red, green, blue, 255 from the lowest byte on.
+    pub(super) levels: wgpu::Buffer,
+    /// The same as a picture.
+    pub(super) texture: wgpu::Texture,
+}
+
+impl LevelsBuffers {
+    pub(super) fn new(device: &Device, (height, width): (usize, usize)) -> Result<Self> {
+        let most = device.limits().max_texture_dimension_2d as usize;
+        if height.max(width) > most {
+            return Err(GpuError::Refused(format!(
+                "a picture of {width}×{height} is too large for {}, which takes {most} a side",
+                device.name()
+            )));
+        }
+        Ok(LevelsBuffers {
+            levels: device.buffer("levels", 4 * height * width)?,
+            texture: device.inner.create_texture(&wgpu::TextureDescriptor {
+                label: Some("levels"),
+                size: wgpu::Extent3d {
+                    width: width as u32,
+                    height: height as u32,
+                    depth_or_array_layers: 1,
+                },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Unorm,
+                usage: wgpu::TextureUsages::STORAGE_BINDING
+                    | wgpu::TextureUsages::TEXTURE_BINDING
+                    | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            }),
+        })
+    }
+}
+
+/// What an [`Encoder`] is made for.
+pub(super) struct EncoderJob<'a> {
+    /// (3, H, W) complex f32.
+    pub(super) field: &'a wgpu::Buffer,
+    /// (H, W).
+    pub(super) size: (usize, usize),
+    pub(super) options: &'a EncoderOptions,
+    /// How a pre-filter computes.
+    pub(super) chain: ChainOptions,
+    pub(super) target: &'a Target,
+    /// That of the target, for this size.
+    pub(super) response: &'a Response,
+    /// What the field's colours are multiplied by on the way in, if anything.
+    pub(super) turn: Option<&'a wgpu::Buffer>,
+}
+
+/// The encoding of one field buffer into several buffers.
+pub(super) struct Encoder {
+    /// Of smoothed brightness.
+    smoother: Option<Smoother>,
+    filter: Filter,
+    double_phase: DoublePhase,
+    /// One u32: the bits of the largest squared amplitude, or of the squared smoothed scale.
+    pub(super) largest: wgpu::Buffer,
+    brightness: Brightness,
+}
+
+impl Encoder {
+    pub(super) fn new(device: &Device, job: &EncoderJob<'_>, buffers: &[LevelsBuffers]) -> Result<Self> {
+        let (height, width) = job.size;
+        let frame = [width, height, width * height, 0].map(|n| n as u32);
+        let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
+        let (filter, filtered) = Filter::new(device, job, &frame)?;
+        let largest = device.buffer("the largest amplitude", 4)?;
+        let smoother = match job.options.brightness {
+            Brightness::Smoothed => {
+                let len = 3 * height * width;
+                Some(Smoother::new(device, job.field, len, &largest)?)
+            }
+            _ => None,
+        };
+        Ok(Encoder {
+            smoother,
+            filter,
+            double_phase: {
+                let shared = Shared::new(device, job, &frame, &filtered, &largest)?;
+                DoublePhase::new(device, job, &shared, buffers)?
+            },
+            largest,
+            brightness: job.options.brightness,
+        })
+    }
+
+    /// Which frame the one follows that is submitted next: smoothed brightness and steps at the midpoint go on from
+    /// there.
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
+        self.double_phase.set_past(device, past);
+        if let Some(smoother) = &self.smoother {
+            smoother.set_past(device, past);
+        }
+    }
+
+    /// To be called before the pass: the largest amplitude of this frame is not known yet.
+    pub(super) fn reset(&self, encoder: &mut wgpu::CommandEncoder) {
+        if self.brightness == Brightness::FrameMax {
+            encoder.clear_buffer(&self.largest, 0, None);
+        }
+        if let Some(smoother) = &self.smoother {
+            smoother.reset(encoder);
+        }
+    }
+
+    /// Encodes into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
+        // Of the field as it comes, as on the CPU.
+        if let Some(smoother) = &self.smoother {
+            smoother.run(pass);
+        }
+        self.double_phase.keep(pass);
+        self.filter.run(pass);
+        self.double_phase.run(pass, buffers);
+    }
+
+    /// The scale that a frame had whose `largest` was read back.
+    pub(super) fn scale(&self, largest: u32) -> f32 {
+        match self.brightness {
+            Brightness::Fixed(scale) => scale,
+            _ => f32::from_bits(largest).sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::testing::{device, field, run, upload};
+    use super::*;
+    use ndarray::Array3;
+    use num_complex::Complex32;
+    use phasefront_core::display::Display;
+    use phasefront_core::display::illumination::Illumination;
+    use phasefront_core::display::response::per_pixel::{self, PerPixel};
+    use phasefront_core::encode::Encoding;
+    use phasefront_core::encode::brightness::Brightness::{Fixed, FrameMax};
+    use std::sync::Arc;
+
+    #[test]
+    #[expect(clippy::too_many_lines, reason = "a table of cases")]
+    fn levels_are_those_of_the_cpu() {
+        let device = device();
+        let lut = Response::lut(std::array::from_fn(|i| (i * 7 % 256) as u8));
+        let wide = Encoding::AntiAlias { sigma: 2.0, width: 9 };
+        let five = Encoding::AntiAlias { sigma: 1.0, width: 5 };
+        let eight = Response::Linear { bits: 8 };
+        let wide = || wide.clone();
+        let (nodes, intervals) = (per_pixel::nodes(61, 47, 16), 8);
+        let count = 3 * nodes.0 * nodes.1;
+        // Curves that differ from node to node; the steepest do not reach 2π.
+        let knots: Vec<f32> = (0..count)
+            .flat_map(|n| (0..=intervals).map(move |k| 3.0 + k as f32 * (20.0 + n as f32 * 0.35)))
+            .collect();
+        let turns: Vec<f32> = (0..count).map(|n| 6.27 - 0.01 * n as f32).collect();
+        let table = PerPixel::new(61, 47, 16, intervals, &knots, &turns).unwrap();
+        let pixels = Response::PerPixel(Arc::new(table));
+        let cases = [
+            ((61, 47), Encoding::ANTI_ALIAS, Fixed(1.0), pixels.clone()),
+            ((61, 47), Encoding::DoublePhase, FrameMax, pixels),
+            ((61, 47), Encoding::DoublePhase, FrameMax, eight.clone()),
+            ((61, 47), Encoding::ANTI_ALIAS, FrameMax, lut.clone()),
+            ((61, 47), Encoding::ANTI_ALIAS, Fixed(0.7), Response::Linear { bits: 5 }),
+            ((61, 47), five, FrameMax, eight.clone()),
+            ((61, 47), wide(), Fixed(1.1), eight.clone()),
+            ((61, 47), Encoding::BAND_LIMIT, FrameMax, lut),
+            ((1, 1), wide(), FrameMax, eight.clone()),
+            ((384, 384), Encoding::ANTI_ALIAS, FrameMax, eight.clone()),
+            ((540, 960), Encoding::ANTI_ALIAS, Fixed(1.0), eight),
+        ];
+        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
+        let laser = Illumination::new(beam.view()).unwrap();
+        let corrections = [
+            (0.0, 0, false),
+            (0.4, 0, true),
+            (0.4, 1, false),
+            (0.0, 2, true),
+            (0.4, 3, false),
+        ];
+        let all = cases
+            .iter()
+            .flat_map(|case| corrections.iter().map(move |correction| (case, correction)));
+        for ((size, encoding, brightness, response), &(dark, local_steps, lit)) in all {
+            let (size, brightness) = (*size, *brightness);
+            let options = EncoderOptions {
+                brightness,
+                dark: if matches!(encoding, Encoding::AntiAlias { width: 9, .. }) {
+                    0.0
+                } else {
+                    dark
+                },
+                local_steps,
+                ..encoding.clone().into()
+            };
+            let aperture_radius = if lit { 0.9 } else { 1.0 };
+            let display = Display::from_toml(&format!("aperture_radius = {aperture_radius:?}")).unwrap();
+            let display = display.with_size(size.0, size.1).unwrap();
+            let target = Target {
+                response: response.clone(),
+                illumination: lit.then(|| laser.clone()),
+                ..display.into()
+            };
+            let area = size.0 * size.1;
+            let turns = [(0.6, 0.8), (-1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex32::new(re, im));
+            let turn = upload(&device, &turns);
+            let mut expected = field(area);
+            let buffer = upload(&device, &expected);
+            let (encoder, buffers) = device
+                .guarded(|| {
+                    let buffers = [LevelsBuffers::new(&device, size)?, LevelsBuffers::new(&device, size)?];
+                    let job = EncoderJob {
+                        field: &buffer,
+                        size,
+                        options: &options,
+                        chain: ChainOptions::default(),
+                        target: &target,
+                        response,
+                        turn: Some(&turn),
+                    };
+                    let encoder = Encoder::new(&device, &job, &buffers)?;
+                    Ok((encoder, buffers))
+                })
+                .unwrap();
+            run(&device, |pass| encoder.run(pass, 1));
+            let words: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&buffers[1].levels, 4 * area).unwrap());
+            for (plane, turn) in expected.chunks_exact_mut(area).zip(turns) {
+                plane.iter_mut().for_each(|value| *value *= turn);
+            }
+            let mut given = expected.clone();
+            let twin = phasefront_core::encode::Encoder::new(size, &target, &options).unwrap();
+            let mut levels = vec![0; 3 * area];
+            let scale = match brightness {
+                Fixed(scale) => Some(scale),
+                _ => None,
+            };
+            let mut scratch = twin.scratch();
+            let used = twin.encode_levels(&mut expected, scale, &mut levels, &mut scratch);
+            let mut phase = vec![0.0; 3 * area];
+            twin.encode(&mut given, Some(used), &mut phase, &mut scratch);
+            let largest: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&encoder.largest, 4).unwrap());
+            let found = encoder.scale(largest[0]);
+            assert!(
+                (found - used).abs() < 1e-4 * used,
+                "{size:?} {encoding:?}: {found} {used}"
+            );
+            // A level may be its neighbour where the phase lies within rounding of the bound between them.
+            let steps = match response {
+                Response::Linear { bits } => (1 << bits) as f32,
+                _ => 256.0,
+            };
+            let pixels = matches!(response, Response::PerPixel(_));
+            let mut beside = 0;
+            for c in 0..3 {
+                for i in 0..area {
+                    let (level, expected) = ((words[i] >> (8 * c)) as u8, levels[c * area + i]);
+                    let step = phase[c * area + i] / std::f32::consts::TAU * steps;
+                    // acos is steep at full light.
+                    let near = (step - step.floor() - 0.5).abs();
+                    // Where curves say, or where a step left little of a value, another, and seldom.
+                    let other = (pixels && level.abs_diff(expected) == 1) || local_steps > 0;
+                    let same = level == expected || near < 0.1;
+                    beside += usize::from(!same && other);
+                    assert!(
+                        same || other,
+                        "{size:?} {encoding:?} {brightness:?}: {level} for {expected} at {i} of {c}, step {step}"
+                    );
+                }
+            }
+            let most = if pixels { 50 } else { 1000 };
+            assert!(
+                beside * most <= 3 * area,
+                "{beside} of {} beside, {size:?} {options:?}",
+                3 * area
+            );
+            assert!(words.iter().all(|word| word >> 24 == 255));
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What comes before double phase: the aperture of BL-DPM, the blur of AA-DPM, the network of DDPM.
+
+use super::EncoderJob;
+use super::blur::Blur;
+use crate::chain::{ChainPlan, End, Numbers};
+use crate::device::{Constants, Device, Dispatch};
+use crate::fft::{Convolution, Planes, quadrant};
+use crate::input::{Form, Packer, Source};
+use crate::{GpuError, Result};
+use phasefront_core::encode::Encoding;
+use phasefront_core::encode::anti_alias::AntiAlias;
+use phasefront_core::encode::band_limit::BandLimit;
+use phasefront_core::encode::deep;
+use phasefront_core::method::network::Network;
+
+/// Taps to one side up to which the blur is done in the same sweep as double phase.
+const FUSED_HALF: usize = 2;
+
+/// The filter of an encoding.
+pub(super) enum Filter {
+    None,
+    Blur([Dispatch; 2]),
+    Aperture(Convolution),
+    Network(Box<Prefilter>),
+}
+
+/// A field on its way to double phase, and what the sweep there still has to do to it.
+pub(super) struct Filtered<'a> {
+    pub(super) field: wgpu::Buffer,
+    /// What its colours are to be multiplied by.
+    pub(super) turn: Option<&'a wgpu::Buffer>,
+    /// A blur: the centre tap and those to one side.
+    pub(super) taps: Vec<f32>,
+    /// Whether nothing is left of the field as it came, or it is not this one.
+    pub(super) replaces: bool,
+}
+
+impl Filter {
+    pub(super) fn new<'a>(device: &Device, job: &EncoderJob<'a>, frame: &Constants) -> Result<(Self, Filtered<'a>)> {
+        let size = job.size;
+        let mut rest = Filtered {
+            field: job.field.clone(),
+            turn: job.turn,
+            taps: vec![1.0],
+            replaces: false,
+        };
+        let filter = match &job.options.encoding {
+            Encoding::DoublePhase => Filter::None,
+            Encoding::AntiAlias { sigma, width } => {
+                let blur = AntiAlias::new(*sigma, *width)?;
+                if blur.taps().len() - 1 <= FUSED_HALF {
+                    rest.taps = blur.taps().to_vec();
+                    Filter::None
+                } else {
+                    if job.options.dark > 0.0 {
+                        return Err(GpuError::Refused(format!(
+                            "a blur over {width} pixels with dark; up to {} pixels, dark 0, or the CPU are right",
+                            2 * FUSED_HALF + 1
+                        )));
+                    }
+                    rest.replaces = true;
+                    let blur = Blur {
+                        device,
+                        frame,
+                        taps: blur.taps(),
+                        size,
+                    };
+                    Filter::Blur(blur.steps(job.field, rest.turn.take())?)
+                }
+            }
+            Encoding::BandLimit { k } => {
+                rest.replaces = true;
+                let limit = BandLimit::new(size.0, size.1, *k)?;
+                let kept = quadrant(size, |kx, ky| f32::from(u8::from(limit.keeps(kx, ky))));
+                let planes = Planes {
+                    field: job.field,
+                    size,
+                    padded: size,
+                    factors: &[&kept],
+                    turn: rest.turn.take(),
+                };
+                Filter::Aperture(Convolution::new(device, &planes)?)
+            }
+            Encoding::Deep(network) => {
+                let made = Prefilter::new(device, network, job, frame)?;
+                rest.replaces = true;
+                rest.field = made.chain.field.clone();
+                Filter::Network(Box::new(made))
+            }
+            _ => return Err(GpuError::Refused("this encoding runs on the CPU only".into())),
+        };
+        Ok((filter, rest))
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        match self {
+            Filter::None => {}
+            Filter::Blur(steps) => steps.iter().for_each(|step| step.run(pass)),
+            Filter::Aperture(convolution) => convolution.run(pass),
+            Filter::Network(prefilter) => prefilter.run(pass),
+        }
+    }
+}
+
+/// DDPM's network on a field.
+pub(super) struct Prefilter {
+    /// Where the network asks for it.
+    blur: Option<[Dispatch; 2]>,
+    packer: Packer,
+    chain: ChainPlan,
+}
+
+impl Prefilter {
+    fn new(device: &Device, network: &Network, job: &EncoderJob<'_>, frame: &Constants) -> Result<Self> {
+        let (size, kind) = (job.size, network.input());
+        if !kind.is_field() {
+            let why = format!("a pre-filter takes 'field', this network '{kind}'");
+            return Err(phasefront_core::runtime::error::Error::Network(why).into());
+        }
+        let blur = if kind.is_blurred() {
+            let blur = deep::blur()?;
+            let blur = Blur {
+                device,
+                frame,
+                taps: blur.taps(),
+                size,
+            };
+            Some(blur.steps(job.field, None)?)
+        } else {
+            None
+        };
+        let chain = network.chain();
+        let numbers = Numbers::of(device, chain, job.chain.float)?;
+        let (form, source) = (Form::Chain(chain, numbers, 1.0), Source::Field(job.field, kind));
+        let packer = Packer::new(device, form, size, source, None)?;
+        let end = End::Field(network.head(), kind);
+        let (input, fusion) = (&packer.input, job.chain.fusion);
+        let chain = ChainPlan::new(device, chain, numbers, size, input, end, fusion)?;
+        Ok(Prefilter { blur, packer, chain })
+    }
+
+    fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.blur.iter().flatten().for_each(|step| step.run(pass));
+        self.packer.run(pass);
+        self.chain.run(pass);
+    }
+}

@@ -1,0 +1,126 @@
+//! Correction: one dispatch for the start, one for each local step, and steps at the midpoint behind them. The last
+//! writes levels. The twin of [`phasefront_core::encode::local`].
+
+use super::double_phase::Shared;
+use super::midpoint::Midpoint;
+use super::{COLUMNS, EncoderJob, LevelsBuffers};
+use crate::Result;
+use crate::device::{Device, Dispatch};
+use phasefront_core::encode::brightness::Past;
+use phasefront_core::encode::local::LocalFilter;
+
+/// Pixels along each side that a workgroup corrects.
+const SIDE: usize = 16;
+
+/// The correction of one field, into several buffers.
+pub(super) struct Local {
+    /// Where a filter leaves nothing of the field that is wanted.
+    keep: Option<Dispatch>,
+    /// The start, and all local steps but the last of all.
+    begin: Vec<Dispatch>,
+    last: Last,
+}
+
+/// What leaves levels.
+enum Last {
+    /// A local step, for each of the buffers.
+    Local(Vec<Dispatch>),
+    Midpoint(Box<Midpoint>),
+}
+
+impl Local {
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        shared: &Shared<'_>,
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
+        let (height, width) = job.size;
+        let bytes = 24 * height * width;
+        // A field that is kept is turned on the way, another where it is read.
+        let replaces = shared.filtered.replaces;
+        let source = format!(
+            "const KEEP_TURN: bool = {};\nconst GOAL_TURN: bool = {};\n{}{}",
+            job.turn.is_some(),
+            !replaces && job.turn.is_some(),
+            shared.source,
+            include_str!("local.wgsl")
+        );
+        let by_rows = [width.div_ceil(COLUMNS), height, 3];
+        let (keep, wanted) = if replaces {
+            let wanted = device.buffer("the wanted field", bytes)?;
+            let program = device.program("the wanted field", source.clone(), "keep");
+            let arguments = [
+                (0, shared.frame.buffer.as_entire_binding()),
+                (2, job.field.as_entire_binding()),
+                (3, job.turn.unwrap_or(job.field).as_entire_binding()),
+                (12, wanted.as_entire_binding()),
+            ];
+            (Some(program.on(device, &arguments, by_rows)?), wanted)
+        } else {
+            (None, job.field.clone())
+        };
+        let rooms = [
+            device.buffer("what is missing", bytes)?,
+            device.buffer("what is missing after a step", bytes)?,
+        ];
+        let taps = LocalFilter::of_aperture(job.target.display.aperture_radius());
+        let taps = device.constants("the aperture's taps", bytemuck::cast_slice(taps.taps()))?;
+
+        let program = device.program("the start", source.clone(), "begin");
+        let mut arguments = shared.arguments(&[0, 1, 2, 3, 5, 9]);
+        arguments.push((10, wanted.as_entire_binding()));
+        arguments.push((12, rooms[0].as_entire_binding()));
+        let mut begin = vec![program.on(device, &arguments, by_rows)?];
+
+        let of_step = |step: usize, bindings: &[u32]| {
+            let mut arguments = shared.arguments(bindings);
+            arguments.push((10, wanted.as_entire_binding()));
+            arguments.push((11, rooms[step % 2].as_entire_binding()));
+            arguments.push((13, taps.buffer.as_entire_binding()));
+            arguments
+        };
+        let grid = [width.div_ceil(SIDE), height.div_ceil(SIDE)];
+        let (steps, to_midpoint) = (job.options.local_steps, job.options.midpoint_steps > 0);
+        let program = device.program("a local step", source.clone(), "step_on");
+        let before = if to_midpoint { steps } else { steps - 1 };
+        for step in 0..before {
+            let mut arguments = of_step(step, &[0, 1, 3, 5, 9]);
+            arguments.push((12, rooms[(step + 1) % 2].as_entire_binding()));
+            begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
+        }
+        let last = if to_midpoint {
+            let rooms = [&wanted, &rooms[before % 2]];
+            let midpoint = Midpoint::new(device, job, shared, &source, rooms, buffers)?;
+            Last::Midpoint(Box::new(midpoint))
+        } else {
+            let program = device.program("the last local step", source, "finish");
+            let arguments = of_step(before, &[0, 1, 3, 5, 8]);
+            Last::Local(shared.levels_program(device, &program, &arguments, [grid[0], grid[1], 1], buffers)?)
+        };
+        Ok(Local { keep, begin, last })
+    }
+
+    /// Which frame the one follows that is submitted next.
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
+        if let Last::Midpoint(midpoint) = &self.last {
+            midpoint.set_past(device, past);
+        }
+    }
+
+    /// To be called before the field is filtered.
+    pub(super) fn keep(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(keep) = &self.keep {
+            keep.run(pass);
+        }
+    }
+
+    /// Corrects into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
+        self.begin.iter().for_each(|step| step.run(pass));
+        match &self.last {
+            Last::Local(finish) => finish[buffers].run(pass),
+            Last::Midpoint(midpoint) => midpoint.run(pass, buffers),
+        }
+    }
+}

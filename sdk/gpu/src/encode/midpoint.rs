@@ -1,0 +1,228 @@
+//! Steps at the midpoint: two convolutions a step, each with a dispatch behind it. The twin of
+//! [`phasefront_core::encode::midpoint`].
+
+use super::double_phase::Shared;
+use super::{COLUMNS, EncoderJob, LevelsBuffers};
+use crate::Result;
+use crate::device::{Constants, Device, Dispatch};
+use crate::fft::{Convolution, Planes};
+use num_complex::Complex32;
+use phasefront_core::encode::brightness::Past;
+use phasefront_core::encode::midpoint::{GAIN, MidpointSteps, STILL, WAVE};
+
+/// The steps of one field, into several buffers.
+pub(super) struct Midpoint {
+    steps: usize,
+    bound: Constants,
+    depart: Dispatch,
+    /// To the midpoint: what is wanted, and what is shown, through the aperture.
+    aim: Convolution,
+    back: Convolution,
+    ask: Dispatch,
+    forth: Convolution,
+    follow: Dispatch,
+    /// For each of the buffers.
+    arrive: Vec<Dispatch>,
+}
+
+impl Midpoint {
+    /// After what `source` makes: it leaves g − L·e in `missing`, of the g in `wanted`.
+    pub(super) fn new(
+        device: &Device,
+        job: &EncoderJob<'_>,
+        shared: &Shared<'_>,
+        source: &str,
+        [wanted, missing]: [&wgpu::Buffer; 2],
+        buffers: &[LevelsBuffers],
+    ) -> Result<Self> {
+        let (height, width) = job.size;
+        let room = |what| device.buffer(what, 24 * height * width);
+        let aim = room("the wave at the midpoint")?;
+        let (phasors, kept) = (room("what is shown")?, room("the wanted field of the frame before")?);
+        let bound = device.constants("what stands still", bytemuck::cast_slice(&[-1.0f32; 4]))?;
+        let source = format!(
+            "const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n{source}{}",
+            include_str!("midpoint.wgsl")
+        );
+        let by_rows = [width.div_ceil(COLUMNS), height, 3];
+        let dispatch = |what: &str, entry: &'static str, bindings: &[u32], own: &[(u32, &wgpu::Buffer)]| {
+            let mut arguments = shared.arguments(bindings);
+            arguments.extend(own.iter().map(|(at, buffer)| (*at, buffer.as_entire_binding())));
+            device
+                .program(what, source.clone(), entry)
+                .on(device, &arguments, by_rows)
+        };
+        let ways = MidpointSteps::new(job.size, job.target, job.options.midpoint_steps)?;
+        let convolution = |field: &wgpu::Buffer, factors: &[&[Complex32]], padded| {
+            let planes = Planes {
+                field,
+                size: job.size,
+                padded,
+                factors,
+                turn: None,
+            };
+            Convolution::new(device, &planes)
+        };
+        let radius = job.target.display.aperture_radius();
+        let [back, forth] = [ways.back(), ways.forth()];
+        let free: Vec<_> = back.iter().map(|way| way.transfer().factors()).collect();
+        let stopped = [back, forth].map(|ways| {
+            let through = ways.iter().map(|way| way.transfer().factors_through(radius));
+            through.collect::<Vec<_>>()
+        });
+        let [there, here] = (stopped.each_ref()).map(|ways| ways.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let arrive = device.program("levels after the midpoint", source.clone(), "arrive");
+        let mut arguments = shared.arguments(&[0, 8]);
+        arguments.push((16, phasors.as_entire_binding()));
+        Ok(Midpoint {
+            steps: job.options.midpoint_steps,
+            depart: dispatch(
+                "the way to the midpoint",
+                "depart",
+                &[0, 1, 3, 5],
+                &[
+                    (10, wanted),
+                    (14, &aim),
+                    (15, missing),
+                    (16, &phasors),
+                    (17, &kept),
+                    (18, &bound.buffer),
+                ],
+            )?,
+            aim: convolution(&aim, &free, back[0].padded_shape())?,
+            back: convolution(missing, &there, back[0].padded_shape())?,
+            ask: dispatch(
+                "what is missing at the midpoint",
+                "ask",
+                &[0],
+                &[(14, &aim), (15, missing)],
+            )?,
+            forth: convolution(missing, &here, forth[0].padded_shape())?,
+            follow: dispatch(
+                "a step at the midpoint",
+                "follow",
+                &[0, 1, 5, 9],
+                &[(15, missing), (16, &phasors)],
+            )?,
+            arrive: shared.levels_program(device, &arrive, &arguments, [by_rows[0], height, 1], buffers)?,
+            bound,
+        })
+    }
+
+    /// Which frame the one follows that is submitted next.
+    pub(super) fn set_past(&self, device: &Device, past: Option<Past>) {
+        let bound = past.map_or(-1.0, |past| (STILL * past.scale).powi(2));
+        (device.queue).write_buffer(&self.bound.buffer, 0, bytemuck::cast_slice(&[bound; 4]));
+    }
+
+    /// Corrects into the buffers of that index.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
+        self.depart.run(pass);
+        self.aim.run(pass);
+        for _ in 0..self.steps {
+            self.back.run(pass);
+            self.ask.run(pass);
+            self.forth.run(pass);
+            self.follow.run(pass);
+        }
+        self.arrive[buffers].run(pass);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::super::device::testing::{device, field, run, upload};
+    use super::super::{Encoder, EncoderJob, LevelsBuffers};
+    use crate::chain::ChainOptions;
+    use ndarray::Array3;
+    use num_complex::Complex32;
+    use phasefront_core::display::Display;
+    use phasefront_core::display::illumination::Illumination;
+    use phasefront_core::display::response::Response;
+    use phasefront_core::display::target::Target;
+    use phasefront_core::encode::EncoderOptions;
+    use phasefront_core::encode::brightness::{Brightness, Past};
+    use phasefront_core::optics::zernike::Aberration;
+    use phasefront_core::pipeline::display_plan::Modulator;
+
+    #[test]
+    fn steps_are_those_of_the_cpu() {
+        let device = device();
+        let beam = Array3::from_shape_fn((3, 4, 7), |(c, y, x)| 1.0 / (1.0 + (c + y + x) as f32 / 20.0));
+        let laser = Illumination::new(beam.view()).unwrap();
+        let lens = Aberration::new([[0.0, 0.0, 1.5, 0.0, 0.0]; 3]).unwrap();
+        let cases = [
+            ((61, 47), 0.0, 1.0, (1, 1), false, None),
+            ((61, 47), 2e-3, 0.9, (0, 2), true, None),
+            ((40, 66), -1e-3, 1.0, (2, 3), false, None),
+            ((48, 70), 1e-3, 1.0, (1, 2), true, Some(lens)),
+            ((1, 1), 0.0, 1.0, (0, 1), false, None),
+        ];
+        for (size, offset_m, radius, (local_steps, midpoint_steps), lit, correction) in cases {
+            let display = Display::from_toml(&format!("aperture_radius = {radius:?}")).unwrap();
+            let display = display.with_size(size.0, size.1).unwrap();
+            let target = Target {
+                illumination: lit.then(|| laser.clone()),
+                correction,
+                ..display.with_offset_m(offset_m).unwrap().into()
+            };
+            let options = EncoderOptions {
+                brightness: Brightness::Fixed(1.2),
+                local_steps,
+                midpoint_steps,
+                ..Default::default()
+            };
+            let area = size.0 * size.1;
+            let mut values = field(area);
+            let buffer = upload(&device, &values);
+            let (encoder, buffers) = device
+                .guarded(|| {
+                    let buffers = [LevelsBuffers::new(&device, size)?];
+                    let job = EncoderJob {
+                        field: &buffer,
+                        size,
+                        options: &options,
+                        chain: ChainOptions::default(),
+                        target: &target,
+                        response: &Response::Linear { bits: 8 },
+                        turn: None,
+                    };
+                    Ok((Encoder::new(&device, &job, &buffers)?, buffers))
+                })
+                .unwrap();
+            let twin = Modulator::new(size, &target, &options).unwrap();
+            let mut scratch = twin.scratch();
+            let past = Past { scale: 1.2, share: 1.0 };
+            // A frame by itself, and one that follows: of it a part stands still.
+            for past in [None, Some(past)] {
+                if past.is_some() {
+                    values
+                        .iter_mut()
+                        .step_by(3)
+                        .for_each(|value| *value *= Complex32::new(0.3, 0.6));
+                }
+                device.queue.write_buffer(&buffer, 0, bytemuck::cast_slice(&values));
+                encoder.set_past(&device, past);
+                run(&device, |pass| encoder.run(pass, 0));
+                let words = device.read(&buffers[0].levels, 4 * area).unwrap();
+                let words: Vec<u32> = bytemuck::pod_collect_to_vec(&words);
+                let mut levels = vec![0; 3 * area];
+                twin.modulate_after(past, &mut values.clone(), &mut levels, &mut scratch);
+                let apart = levels.iter().enumerate().map(|(at, level)| {
+                    let other = (words[at % area] >> (8 * (at / area))) as u8;
+                    level.wrapping_sub(other).min(other.wrapping_sub(*level))
+                });
+                let apart: Vec<u8> = apart.collect();
+                // Another level where rounding says so, and more only where little was left of a value.
+                let beside = apart.iter().filter(|d| **d > 0).count();
+                let beyond = apart.iter().filter(|d| **d > 1).count();
+                assert!(
+                    beside * 50 <= apart.len() && beyond * 1000 <= apart.len(),
+                    "{beside} and {beyond} of {} beside, {size:?} at {offset_m}, {past:?}",
+                    apart.len()
+                );
+            }
+        }
+    }
+}

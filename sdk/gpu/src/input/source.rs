@@ -1,0 +1,157 @@
+//! Where the input stage reads, and how its program does.
+
+use super::camera::Camera;
+use super::frame::{Colour, ColourData, Depth, DepthData, Frame};
+use crate::Result;
+use crate::device::Device;
+use phasefront_core::frame::ColourPlan;
+use phasefront_core::method::network::InputKind;
+
+/// Where a [`super::Packer`] reads.
+#[derive(Clone, Copy)]
+pub(crate) enum Source<'a> {
+    /// The network's input planes themselves, f32, of any number, in its own buffer.
+    Planes,
+    /// A complex field on the GPU, and how a pre-filter takes it.
+    Field(&'a wgpu::Buffer, InputKind),
+    /// A frame's surfaces on the GPU, and the sweep's field of it.
+    Seeded(&'a wgpu::Buffer, &'a wgpu::Buffer),
+    /// A frame, in its own buffers.
+    Frame(Colour, Depth),
+}
+
+/// How a [`Source`] is read.
+pub(super) struct Reader {
+    /// What is constant in the program.
+    pub(super) header: String,
+    /// The program's part that knows where values come from.
+    pub(super) text: String,
+    /// Planes, a field, surfaces, or colour.
+    pub(super) first: wgpu::Buffer,
+    /// A sweep's field, or depth.
+    pub(super) second: Option<wgpu::Buffer>,
+    pub(super) frames: Option<Frames>,
+}
+
+/// What frames come as, where they do.
+pub(super) struct Frames {
+    pub(super) formats: (Colour, Depth),
+    pub(super) camera: Option<Camera>,
+    size: (usize, usize),
+    colour: wgpu::Buffer,
+    depth: wgpu::Buffer,
+}
+
+impl Reader {
+    /// For pixels of so many `channels`.
+    pub(super) fn new(device: &Device, source: Source<'_>, channels: usize, size: (usize, usize)) -> Result<Self> {
+        let reader = |text: &str, first| Reader {
+            header: String::new(),
+            text: text.to_owned(),
+            first,
+            second: None,
+            frames: None,
+        };
+        Ok(match source {
+            Source::Planes => {
+                let bytes = 4 * channels * size.0 * size.1;
+                let planes = device.buffer("the network's input", bytes)?;
+                reader(include_str!("planes.wgsl"), planes)
+            }
+            Source::Field(field, kind) => Reader {
+                header: format!(
+                    "const SPLIT: bool = {};\nconst SPLIT_STEP: f32 = {:?};\nconst REMAINDER_GAIN: f32 = {:?};\n",
+                    kind == InputKind::SplitBlurredField,
+                    InputKind::SPLIT_STEP,
+                    InputKind::REMAINDER_GAIN
+                ),
+                ..reader(include_str!("field.wgsl"), field.clone())
+            },
+            Source::Seeded(surfaces, seed) => Reader {
+                second: Some(seed.clone()),
+                ..reader(include_str!("seeded.wgsl"), surfaces.clone())
+            },
+            Source::Frame(colour, depth) => Reader::of_frames(device, colour, depth, size)?,
+        })
+    }
+
+    fn of_frames(device: &Device, colour: Colour, depth: Depth, size: (usize, usize)) -> Result<Self> {
+        let (height, width) = size;
+        let area = height * width;
+        let mut header = format!("const WORDS: bool = {};\n", depth == Depth::U16);
+        let (bytes, text, camera) = match colour {
+            Colour::Planar => (12 * area, include_str!("planar.wgsl"), None),
+            Colour::Camera {
+                format,
+                height: rows,
+                width: columns,
+                orientation,
+            } => {
+                let sensor = (rows, columns);
+                let plan = ColourPlan::for_format(format, sensor, orientation, height, width)?;
+                let (camera, bytes, constants) = Camera::new(device, plan, format, sensor)?;
+                header += &constants;
+                (bytes, include_str!("camera.wgsl"), Some(camera))
+            }
+        };
+        let depth_bytes = match depth {
+            Depth::F32 => 4 * area,
+            Depth::U16 => 2 * area,
+        };
+        let frames = Frames {
+            formats: (colour, depth),
+            camera,
+            size,
+            colour: device.buffer("colour", bytes)?,
+            depth: device.buffer("depth", depth_bytes)?,
+        };
+        Ok(Reader {
+            header,
+            text: text.to_owned() + include_str!("frame.wgsl"),
+            first: frames.colour.clone(),
+            second: Some(frames.depth.clone()),
+            frames: Some(frames),
+        })
+    }
+}
+
+impl Frames {
+    pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
+        let area = self.size.0 * self.size.1;
+        let length = |what: &str, is: usize, right: usize| match is == right {
+            true => Ok(()),
+            false => Err(phasefront_core::runtime::error::Error::Frame(format!(
+                "{what} has {is} values; {right} are right"
+            ))),
+        };
+        let other = |what: &str| {
+            phasefront_core::runtime::error::Error::Frame(format!("{what} comes in another form than was planned"))
+        };
+        let (colour, depth) = self.formats;
+        match (frame.colour, colour, &self.camera) {
+            (ColourData::Planar(values), Colour::Planar, _) => {
+                length("colour", values.len(), 3 * area)?;
+                device.write(&self.colour, 0, bytemuck::cast_slice(values));
+            }
+            (ColourData::Camera(image), Colour::Camera { orientation, .. }, Some(camera)) => {
+                if !camera.fits(&image, orientation) {
+                    return Err(other("colour").into());
+                }
+                camera.upload(device, &self.colour, &image)?;
+            }
+            _ => return Err(other("colour").into()),
+        }
+        match (frame.depth, depth) {
+            (DepthData::F32(values), Depth::F32) => {
+                length("depth", values.len(), area)?;
+                device.write(&self.depth, 0, bytemuck::cast_slice(values));
+            }
+            (DepthData::U16(words), Depth::U16) => {
+                length("depth", words.len(), area)?;
+                device.write(&self.depth, 0, bytemuck::cast_slice(words));
+            }
+            _ => return Err(other("depth").into()),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,209 @@
+//! From a frame as it comes to the hologram's field, on the GPU: the twin of [`phasefront_core::method`].
+
+use super::chain::{ChainOptions, ChainPlan, End, Numbers};
+use super::device::Device;
+use super::input::{Colour, Depth, Form, Frame, Packer, Source};
+use super::sweep::Sweeper;
+use super::{GpuError, Result};
+use phasefront_core::display::Display;
+use phasefront_core::method::network::Network;
+use phasefront_core::method::seeded::seed;
+use phasefront_core::method::sweep::SweepPlan;
+use phasefront_core::method::{Method, sweep_plan};
+use std::sync::Arc;
+
+/// A method for one frame size.
+pub(super) struct MethodPlan {
+    size: (usize, usize),
+    /// From the frame to what the network or the sweep reads.
+    packer: Packer,
+    way: Way,
+}
+
+enum Way {
+    Network(Trained),
+    Sweep(Sweeper),
+    /// The sweep, from it and the frame to the network's input, and the network.
+    Seeded(Sweeper, Box<Packer>, Trained),
+}
+
+/// A network in its numbers.
+struct Trained {
+    network: Arc<Network>,
+    numbers: Numbers,
+    depth_scale: f32,
+    chain: ChainPlan,
+}
+
+impl Trained {
+    /// Plans `network`, in numbers and with its depth stretched, on what `packer` writes.
+    fn new(
+        device: &Device,
+        network: &Arc<Network>,
+        (numbers, depth_scale): (Numbers, f32),
+        size: (usize, usize),
+        packer: &Packer,
+        options: ChainOptions,
+    ) -> Result<Self> {
+        let (chain, fusion) = (network.chain(), options.fusion);
+        let end = End::Field(network.head(), network.input());
+        Ok(Trained {
+            network: network.clone(),
+            numbers,
+            depth_scale,
+            chain: ChainPlan::new(device, chain, numbers, size, &packer.input, end, fusion)?,
+        })
+    }
+}
+
+impl MethodPlan {
+    /// Plans `method` for frames of `size` (height, width) that come in `formats`.
+    pub(super) fn new(
+        device: &Device,
+        method: &Method,
+        size: (usize, usize),
+        display: &Display,
+        formats: (Colour, Depth),
+        options: ChainOptions,
+    ) -> Result<Self> {
+        let source = Source::Frame(formats.0, formats.1);
+        let how = |network: &Network| {
+            let numbers = Numbers::of(device, network.chain(), options.float)?;
+            Ok::<_, GpuError>((numbers, network.depth_scale(display)?))
+        };
+        let swept = |plan: SweepPlan| {
+            let packer = Packer::new(device, Form::Surfaces, size, source, None)?;
+            let sweep = Sweeper::new(device, &plan, display, &packer.input.first)?;
+            Ok::<_, GpuError>((packer, sweep))
+        };
+        let (height, width) = size;
+        let (packer, way) = match method {
+            Method::Network(network) => {
+                let how = how(network)?;
+                let form = Form::Chain(network.chain(), how.0, how.1);
+                let packer = Packer::new(device, form, size, source, None)?;
+                let trained = Trained::new(device, network, how, size, &packer, options)?;
+                (packer, Way::Network(trained))
+            }
+            Method::Sweep(sweep) => {
+                let (packer, sweep) = swept(sweep_plan(height, width, *sweep, display)?)?;
+                (packer, Way::Sweep(sweep))
+            }
+            Method::Seeded(network) => {
+                let sweep = seed(network, display);
+                let plan = SweepPlan::new(height, width, display, sweep, 0.0)?;
+                let (packer, sweep) = swept(plan)?;
+                let how = how(network)?;
+                let form = Form::Chain(network.chain(), how.0, how.1);
+                let source = Source::Seeded(&packer.input.first, &sweep.field);
+                let seeded = Packer::new(device, form, size, source, None)?;
+                let trained = Trained::new(device, network, how, size, &seeded, options)?;
+                (packer, Way::Seeded(sweep, Box::new(seeded), trained))
+            }
+            Method::Auto(..) => {
+                return Err(GpuError::Refused(
+                    "the sharpness of depth, which chooses between sweep and network, is measured on the CPU only; one of them alone is right"
+                        .into(),
+                ));
+            }
+            _ => return Err(GpuError::Refused("this method runs on the CPU only".into())),
+        };
+        Ok(MethodPlan { size, packer, way })
+    }
+
+    /// Frames come in `formats` from now on.
+    pub(super) fn expect(&mut self, device: &Device, formats: (Colour, Depth)) -> Result<()> {
+        if self.packer.formats() == Some(formats) {
+            return Ok(());
+        }
+        let form = match &self.way {
+            Way::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
+            Way::Sweep(_) | Way::Seeded(..) => Form::Surfaces,
+        };
+        let source = Source::Frame(formats.0, formats.1);
+        let input = Some(self.packer.input.clone());
+        self.packer = device.guarded(|| Packer::new(device, form, self.size, source, input))?;
+        Ok(())
+    }
+
+    /// Sends a frame on its way; it is there when what is submitted next begins.
+    pub(super) fn upload(&self, device: &Device, frame: &Frame<'_>) -> Result<()> {
+        self.packer.upload(device, frame)
+    }
+
+    /// Reads the frame.
+    pub(super) fn read(&self, pass: &mut wgpu::ComputePass<'_>) {
+        self.packer.run(pass);
+    }
+
+    /// Makes the field of what was read.
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        match &self.way {
+            Way::Network(trained) => trained.chain.run(pass),
+            Way::Sweep(sweep) => sweep.run(pass),
+            Way::Seeded(sweep, seeded, trained) => {
+                sweep.run(pass);
+                seeded.run(pass);
+                trained.chain.run(pass);
+            }
+        }
+    }
+
+    /// (3, H, W) complex f32.
+    pub(super) fn field(&self) -> &wgpu::Buffer {
+        match &self.way {
+            Way::Network(trained) | Way::Seeded(_, _, trained) => &trained.chain.field,
+            Way::Sweep(sweep) => &sweep.field,
+        }
+    }
+
+    /// Its sums: three complex f32 for each of so many workgroups.
+    pub(super) fn sums(&self) -> (&wgpu::Buffer, usize) {
+        match &self.way {
+            Way::Network(trained) | Way::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
+            Way::Sweep(sweep) => (&sweep.partial, sweep.parts),
+        }
+    }
+
+    /// Where the hologram stands, metres from the midpoint toward the viewer.
+    pub(super) fn z_m(&self) -> f64 {
+        match &self.way {
+            Way::Network(_) | Way::Seeded(..) => 0.0,
+            Way::Sweep(sweep) => sweep.z_m,
+        }
+    }
+
+    /// What it is computed in.
+    pub(super) fn numbers(&self) -> Numbers {
+        match &self.way {
+            Way::Network(trained) | Way::Seeded(_, _, trained) => trained.numbers,
+            Way::Sweep(_) => Numbers::F32,
+        }
+    }
+
+    /// What the device does in a frame, in words.
+    pub(super) fn describe(&self) -> String {
+        let swept = |sweep: &Sweeper| {
+            let (planes, dispatches) = (sweep.together, sweep.dispatches());
+            format!("the sweep, planes by {planes}, in {dispatches} dispatches")
+        };
+        let trained = |trained: &Trained| {
+            let (fusion, dispatches) = (trained.chain.fusion, trained.chain.dispatches());
+            format!("{fusion:?} in {dispatches} dispatches")
+        };
+        match &self.way {
+            Way::Network(network) => trained(network),
+            Way::Sweep(sweep) => swept(sweep),
+            Way::Seeded(sweep, _, network) => format!("{}, {}", swept(sweep), trained(network)),
+        }
+    }
+
+    /// Bytes that the field's dispatches read and write in a frame, each value once.
+    pub(super) fn bytes(&self) -> usize {
+        match &self.way {
+            Way::Network(trained) => trained.chain.bytes,
+            Way::Sweep(sweep) => sweep.bytes,
+            Way::Seeded(sweep, _, trained) => sweep.bytes + trained.chain.bytes,
+        }
+    }
+}

@@ -1,0 +1,117 @@
+//! Trust, then use: a small frame on the device beside the same on the CPU.
+
+use super::device::Device;
+use super::input::Frame;
+use super::pipeline::{GpuPipeline, Job};
+use super::{GpuError, Result};
+use ndarray::{Array2, Array3};
+use num_complex::Complex32;
+use phasefront_core::display::response::Response;
+use phasefront_core::display::target::Target;
+use phasefront_core::frame::RgbdFrame;
+use std::sync::Arc;
+
+/// Rows and columns of the frame: odd, and more than one tile of every program.
+const SIZE: (usize, usize) = (37, 43);
+
+/// Runs a small frame of `job` on `device` and on the CPU and compares their phases.
+///
+/// # Errors
+/// [`GpuError::Wrong`] where they differ by more than the numbers' rounding, [`GpuError::Lost`] where no answer comes,
+/// and what [`GpuPipeline::new`] refuses.
+pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
+    let job = Job {
+        shape: SIZE,
+        target: Target {
+            // A table for each pixel is for one size.
+            response: match &job.target.response {
+                Response::PerPixel(_) => Response::Linear { bits: 8 },
+                other => other.clone(),
+            },
+            ..job.target.clone()
+        },
+        colour: super::Colour::Planar,
+        depth: super::Depth::F32,
+        ..job.clone()
+    };
+    // What it refuses is known before the CPU works.
+    let mut gpu = GpuPipeline::new(device, &job)?;
+    let size = 3 * SIZE.0 * SIZE.1;
+    let frame = frame()?;
+    let cpu = job.on_cpu()?;
+    let mut scratch = cpu.scratch();
+    let mut field = vec![Complex32::ZERO; size];
+    let mut expected = vec![0; size];
+    cpu.process(&frame, &mut field, &mut expected, &mut scratch)?;
+    let mut levels = vec![0; size];
+    // Twice: what one frame leaves behind must not reach the next.
+    for _ in 0..2 {
+        gpu.process(&Frame::of(&frame), &mut levels)?;
+        let apart = apart(&levels, &expected, &job.target.response);
+        let most = if gpu.numbers() == "f16" { 0.1 } else { 0.01 };
+        if apart > most {
+            return Err(GpuError::Wrong(format!(
+                "{}: phases of a small frame differ from the CPU's by {apart:.3} on average, {most} are right",
+                gpu.describe()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+pub(super) fn apart(levels: &[u8], others: &[u8], response: &Response) -> f32 {
+    let shown: [Complex32; 256] = std::array::from_fn(|l| Complex32::from_polar(1.0, response.phase(l as u8, 0)));
+    let sum: f32 = levels
+        .iter()
+        .zip(others)
+        .map(|(&a, &b)| (shown[usize::from(a)] - shown[usize::from(b)]).norm())
+        .sum();
+    sum / levels.len() as f32
+}
+
+/// Waves of several lengths in colour, steps and a ramp in depth.
+fn frame() -> Result<RgbdFrame> {
+    let (height, width) = SIZE;
+    let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+        let phase = (c + 1) as f32 * 0.13 * x as f32 + 0.21 * y as f32;
+        0.5 + 0.45 * phase.sin()
+    });
+    let depth = Array2::from_shape_fn((height, width), |(y, x)| match y < height / 2 {
+        true => (x / 9) as f32 / 5.0,
+        false => x as f32 / width as f32,
+    });
+    Ok(RgbdFrame::new(rgb, depth)?)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::DeviceOptions;
+    use super::super::device::testing::{opened, software};
+    use super::super::renderer::Renderer;
+    use super::*;
+    use phasefront_core::display::Display;
+    use phasefront_core::method::Method;
+    use phasefront_core::method::network::Network;
+
+    /// A driver that compiles one program wrongly is found out.
+    #[test]
+    fn a_device_that_answers_wrongly_is_not_used() {
+        let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
+        let method = Method::Network(Arc::new(network.unwrap()));
+        let job = Job::new((21, 34), method, Display::default());
+        let source = include_str!("encode/mean_phase.wgsl");
+        let forged = source.replace("turn[c] = select(", "turn[c] = vec2f(0, 1) + 0.0 * select(");
+        assert_ne!(forged, source);
+        let open = || Device::open(&software()).map(Arc::new);
+        let device = opened(open());
+        probe(&device, &job).unwrap();
+        let device = open().unwrap();
+        device.forge("find", source, &forged);
+        let wrong = probe(&device, &job).unwrap_err();
+        assert!(matches!(&wrong, GpuError::Wrong(why) if !why.contains('\n')), "{wrong}");
+        let refused = Renderer::new(Some(device), DeviceOptions::default(), job);
+        assert_eq!(refused.err(), Some(wrong));
+    }
+}

@@ -1,0 +1,321 @@
+//! Frames on a GPU that was found to be right. A device that is lost is opened again; what becomes of a frame where
+//! none serves is the session's to say.
+
+use super::device::{Device, DeviceOptions};
+use super::input::{Colour, Depth, Frame};
+use super::pipeline::{Deliver, GpuPipeline, GpuReport, Job, Ticket};
+use super::probe::probe;
+use super::watch::watched;
+use super::{GpuError, Result};
+use phasefront_core::encode::brightness::Past;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How often in a row a lost device is opened again before it counts as of no use.
+const ATTEMPTS: usize = 3;
+/// How long opening may take, and compiling programs and trying them out: drivers in software compile slowly.
+const OPENING: Duration = Duration::from_secs(30);
+const TRYING: Duration = Duration::from_secs(60);
+const TRYING_SOFTWARE: Duration = Duration::from_secs(600);
+
+/// Frames of one [`Job`].
+pub struct Renderer {
+    job: Job,
+    options: DeviceOptions,
+    /// None where a device was lost: the next frame opens another.
+    pipeline: Option<Box<GpuPipeline>>,
+    /// Why a device was lost.
+    reason: Option<GpuError>,
+    /// How often a device was opened: a frame of an earlier one is lost.
+    epoch: usize,
+    /// Losses since the last frame that came through.
+    losses: usize,
+}
+
+/// A frame on its way.
+#[derive(Debug)]
+pub struct InFlight {
+    epoch: usize,
+    ticket: Ticket,
+}
+
+impl Renderer {
+    /// Plans `job` on `device`, or on one that is opened as `options` say, and tries it out by [`probe`].
+    ///
+    /// # Errors
+    /// What the CPU refuses too, and what only the GPU does.
+    pub fn new(device: Option<Arc<Device>>, options: DeviceOptions, job: Job) -> Result<Self> {
+        let mut renderer = Renderer {
+            job,
+            options,
+            pipeline: None,
+            reason: None,
+            epoch: 0,
+            losses: 0,
+        };
+        renderer.open(device.filter(|device| device.check().is_ok()))?;
+        Ok(renderer)
+    }
+
+    /// Why a device was lost, if one was.
+    pub fn reason(&self) -> Option<&GpuError> {
+        self.reason.as_ref()
+    }
+
+    /// The GPU's plan; none where its device was lost.
+    pub fn pipeline(&self) -> Option<&GpuPipeline> {
+        self.pipeline.as_deref()
+    }
+
+    /// How often a device was opened.
+    pub fn openings(&self) -> usize {
+        self.epoch
+    }
+
+    /// Gives the device's memory back, and what is on it up; the next frame opens one again.
+    pub fn release(&mut self) {
+        self.pipeline = None;
+    }
+
+    /// Opens a device unless one is given.
+    fn open(&mut self, device: Option<Arc<Device>>) -> Result<&mut GpuPipeline> {
+        self.epoch += 1;
+        let opened = match (self.losses < ATTEMPTS, &self.reason) {
+            (true, _) => trusted(device, &self.options, &self.job),
+            (false, Some(last)) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row: {last}"))),
+            (false, None) => Err(GpuError::Lost(format!("{ATTEMPTS} times in a row"))),
+        };
+        match opened {
+            Ok(pipeline) => Ok(self.pipeline.insert(Box::new(pipeline))),
+            Err(why @ GpuError::Core(_)) => Err(why),
+            Err(why) => {
+                self.reason = Some(why.clone());
+                Err(why)
+            }
+        }
+    }
+
+    /// Frames come so from now on, as [`GpuPipeline::expect`].
+    ///
+    /// # Errors
+    /// As that.
+    pub fn expect(&mut self, colour: Colour, depth: Depth) -> Result<()> {
+        if let Some(pipeline) = &mut self.pipeline {
+            match pipeline.expect(colour, depth) {
+                // The next frame finds out, and opens another device for these formats.
+                Ok(()) | Err(GpuError::Lost(_)) => {}
+                Err(why) => return Err(why),
+            }
+        }
+        (self.job.colour, self.job.depth) = (colour, depth);
+        Ok(())
+    }
+
+    /// Hands a frame in, in the formats of the job, whose smoothed brightness comes from `past`. [`super::FLIGHTS`] may
+    /// be on their way.
+    ///
+    /// # Errors
+    /// Bytes of another length than planned, or what [`Renderer::new`] refuses where a device was lost before.
+    pub fn submit(&mut self, past: Option<Past>, frame: &Frame<'_>) -> Result<InFlight> {
+        loop {
+            let submitted = match &mut self.pipeline {
+                Some(pipeline) => pipeline.submit_after(past, frame, Deliver::Levels),
+                None => self.open(None)?.submit_after(past, frame, Deliver::Levels),
+            };
+            match submitted {
+                Ok(ticket) => {
+                    let epoch = self.epoch;
+                    return Ok(InFlight { epoch, ticket });
+                }
+                Err(why) => self.note(why)?,
+            }
+        }
+    }
+
+    /// Waits for a frame and copies its levels, (3, H, W).
+    ///
+    /// # Errors
+    /// [`GpuError::Lost`] for a frame that went with its device; the next one goes on.
+    ///
+    /// # Panics
+    /// If `levels` has not 3·H·W values.
+    pub fn collect(&mut self, frame: InFlight, levels: &mut [u8]) -> Result<GpuReport> {
+        let pipeline = self.pipeline.as_mut().filter(|_| frame.epoch == self.epoch);
+        let Some(pipeline) = pipeline else {
+            return Err(GpuError::Lost("with the device that it was on".into()));
+        };
+        match pipeline.collect(frame.ticket, levels) {
+            Ok(report) => {
+                self.losses = 0;
+                Ok(report)
+            }
+            Err(why) => {
+                self.note(why.clone())?;
+                Err(why)
+            }
+        }
+    }
+
+    /// Keeps the reason of a loss, after which the next frame opens another device; gives back other errors.
+    fn note(&mut self, why: GpuError) -> Result<()> {
+        match why {
+            GpuError::Core(_) => Err(why),
+            why => {
+                self.pipeline = None;
+                self.reason = Some(why);
+                self.losses += 1;
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Plans `job` on `device`, or on one that is opened, if it answers, and as the CPU does.
+fn trusted(device: Option<Arc<Device>>, options: &DeviceOptions, job: &Job) -> Result<GpuPipeline> {
+    let device = match device {
+        Some(device) => device,
+        None => {
+            let options = options.clone();
+            let open = move || Device::open(&options).map(Arc::new);
+            watched("while it was opened", OPENING, open)?
+        }
+    };
+    let patience = match device.is_software() {
+        true => TRYING_SOFTWARE,
+        false => TRYING,
+    };
+    let job = job.clone();
+    watched("while it was tried out", patience, move || {
+        probe(&device, &job)?;
+        GpuPipeline::new(&device, &job)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::Allowed;
+    use super::super::device::testing::{opened, software};
+    use super::super::{ChainOptions, Float};
+    use super::*;
+    use ndarray::{Array2, Array3};
+    use phasefront_core::display::Display;
+    use phasefront_core::encode::brightness::Brightness;
+    use phasefront_core::frame::RgbdFrame;
+    use phasefront_core::method::Method;
+    use phasefront_core::method::network::Network;
+
+    const SIZE: (usize, usize) = (21, 34);
+
+    fn network() -> Arc<Network> {
+        let bytes = include_bytes!("../../../models/rgbd-8-int8.onnx");
+        Arc::new(Network::from_onnx(bytes).unwrap())
+    }
+
+    fn job(network: &Arc<Network>) -> Job {
+        let mut job = Job::new(SIZE, Method::Network(network.clone()), Display::default());
+        job.encoder.brightness = Brightness::Fixed(1.0);
+        job
+    }
+
+    fn frame() -> RgbdFrame {
+        let rgb = Array3::from_shape_fn((3, SIZE.0, SIZE.1), |(c, y, x)| {
+            ((c * 5 + y * 3 + x) % 17) as f32 / 16.0
+        });
+        RgbdFrame::new(rgb, Array2::from_elem(SIZE, 0.3)).unwrap()
+    }
+
+    /// Takes the device away, as drivers do.
+    fn lose(renderer: &Renderer) {
+        renderer.pipeline().unwrap().device().wgpu().0.destroy();
+    }
+
+    #[test]
+    fn a_lost_device_costs_the_frames_in_flight_and_no_more() {
+        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
+        assert!(renderer.reason().is_none() && renderer.pipeline().is_some());
+        let frame = frame();
+        let bytes = Frame::of(&frame);
+        let mut before = vec![0; 3 * SIZE.0 * SIZE.1];
+        let first = renderer.submit(None, &bytes).unwrap();
+        renderer.collect(first, &mut before).unwrap();
+
+        let flying = [
+            renderer.submit(None, &bytes).unwrap(),
+            renderer.submit(None, &bytes).unwrap(),
+        ];
+        lose(&renderer);
+        let mut levels = vec![0; before.len()];
+        for frame in flying {
+            let lost = renderer.collect(frame, &mut levels).unwrap_err();
+            assert!(matches!(lost, GpuError::Lost(_)), "{lost}");
+        }
+        let next = renderer.submit(None, &bytes).unwrap();
+        renderer.collect(next, &mut levels).unwrap();
+        assert_eq!(levels, before);
+        assert!(matches!(renderer.reason(), Some(GpuError::Lost(_))));
+
+        // Lost with nothing in flight: the next frame finds out, and goes on.
+        lose(&renderer);
+        let next = renderer.submit(None, &bytes).unwrap();
+        renderer.collect(next, &mut levels).unwrap();
+        assert_eq!(levels, before);
+    }
+
+    #[test]
+    fn a_gpu_that_is_not_there_is_told() {
+        let none = DeviceOptions {
+            name: Some("no such card".into()),
+            programs: None,
+        };
+        let refused = Renderer::new(None, none, job(&network())).err().unwrap();
+        assert!(matches!(refused, GpuError::None(_)), "{refused}");
+    }
+
+    #[test]
+    fn a_device_that_is_lost_again_and_again_is_of_no_use() {
+        let mut renderer = opened(Renderer::new(None, software(), job(&network())));
+        renderer.losses = ATTEMPTS;
+        renderer.reason = Some(GpuError::Lost("pulled out".into()));
+        renderer.release();
+        let frame = frame();
+        let refused = renderer.submit(None, &Frame::of(&frame)).unwrap_err();
+        assert!(
+            (refused.to_string()).contains("in a row: the GPU was lost: pulled out"),
+            "{refused}"
+        );
+    }
+
+    #[test]
+    fn what_a_gpu_lacks_is_told() {
+        let little = Allowed {
+            features: wgpu::Features::empty(),
+            limits: |limits| wgpu::Limits {
+                max_storage_buffer_binding_size: 1 << 24,
+                ..limits
+            },
+            ..Default::default()
+        };
+        let device = opened(Device::open_with(&software(), &little));
+        let device = Arc::new(device);
+        let bytes = include_bytes!("../../../models/rgbd-8.onnx");
+        let network = Arc::new(Network::from_onnx(bytes).unwrap());
+        let wanted = Job {
+            chain: ChainOptions {
+                float: Float::F16,
+                ..Default::default()
+            },
+            ..job(&network)
+        };
+        let refused = GpuPipeline::new(&device, &wanted).err().unwrap();
+        assert!(refused.to_string().contains("shader-f16"), "{refused}");
+        let plan = GpuPipeline::new(&device, &job(&network)).unwrap();
+        assert_eq!(plan.numbers(), "f32");
+        let wide = Job {
+            shape: (600, 40_000),
+            ..job(&network)
+        };
+        let refused = GpuPipeline::new(&device, &wide).err().unwrap();
+        assert!(matches!(refused, GpuError::Refused(_)), "{refused}");
+    }
+}

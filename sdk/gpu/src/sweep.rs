@@ -1,0 +1,481 @@
+//! The plane sweep on the GPU, several planes a dispatch: the twin of [`phasefront_core::method::sweep`], whose filters it has.
+//!
+//! What it reads and writes stays on the device: red, green, blue and depth of each pixel in, the hologram's field out.
+//! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged
+//! steps, only the tiles are passed over here in which there is neither light nor a point yet.
+
+use super::chain::time;
+use super::device::{Device, Dispatch};
+use super::hidden::Search;
+use super::{GpuError, Result};
+use phasefront_core::display::Display;
+use phasefront_core::method::sweep::{self, MARGIN, SweepPlan};
+
+/// Columns and rows of a tile with its halo: complex f32 that fit the workgroup memory of every GPU, 16 KiB.
+const TILE: (usize, usize) = (48, 40);
+/// Rows of a thread in sweep.wgsl.
+const EACH: usize = 8;
+/// Pixels of a workgroup of the other programs.
+const COLUMNS: usize = 64;
+const HOME_ROWS: usize = 4;
+
+/// A sweep for one frame size, ready to run.
+pub(super) struct Sweeper {
+    /// None without hidden layers.
+    search: Option<Search>,
+    /// Which planes hold each pixel's points, then all planes.
+    steps: Vec<Dispatch>,
+    home: [Dispatch; 2],
+    /// How many planes a dispatch does.
+    pub(super) together: usize,
+    /// Where the field stands, metres from the midpoint toward the viewer.
+    pub(super) z_m: f64,
+    /// (3, H, W) complex f32.
+    pub(super) field: wgpu::Buffer,
+    /// Sums of the field: three complex f32 for each of `parts` workgroups.
+    pub(super) partial: wgpu::Buffer,
+    pub(super) parts: usize,
+    /// What the dispatches read and write, each value once.
+    pub(super) bytes: usize,
+}
+
+impl Sweeper {
+    /// The twin of `plan`, which is for `display`, of a frame's `surfaces`: (H, W) of red, green, blue and depth, f32.
+    pub(super) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
+        Self::planned(device, plan, display, surfaces, !device.is_software())
+    }
+
+    /// With as many planes a dispatch as are measured to be faster, or as there is room for.
+    fn planned(
+        device: &Device,
+        plan: &SweepPlan,
+        display: &Display,
+        surfaces: &wgpu::Buffer,
+        measured: bool,
+    ) -> Result<Self> {
+        let radius = plan.sweep().taps / 2;
+        let most = most_together(radius).ok_or_else(|| {
+            GpuError::Refused(format!(
+                "steps of {} taps do not fit the workgroup memory that every GPU has; {} taps at most, or more planes with fewer, are right",
+                plan.sweep().taps,
+                2 * MOST_RADIUS + 1
+            ))
+        })?;
+        let search = match plan.sweep().hidden_layers {
+            0 => None,
+            _ => {
+                let reach = sweep::hidden_reach(display);
+                Some(Search::new(device, surfaces, plan.shape(), reach)?)
+            }
+        };
+        let (height, width) = plan.shape();
+        let area = height * width;
+        let border = border(plan, display)?;
+        let tiles = (width.div_ceil(COLUMNS), height.div_ceil(HOME_ROWS));
+        let maker = Maker {
+            device,
+            plan,
+            surfaces,
+            // Without hidden layers nobody reads their sources.
+            sources: search.as_ref().map_or(surfaces, |search| &search.sources),
+            points: &device.buffer("points", 4 * area)?,
+            border,
+            padded: (height + 2 * border, width + 2 * border),
+        };
+        let swept = 24 * maker.padded.0 * maker.padded.1;
+        let fields = [
+            device.buffer("the swept field", swept)?,
+            device.buffer("the swept field", swept)?,
+        ];
+        let (steps, together) = match measured && most > 1 {
+            true => maker.faster(most, &fields)?,
+            false => (maker.steps(most, &fields)?, most),
+        };
+        let crossings = plan.sweep().planes.div_ceil(together);
+        let (last, other) = (&fields[crossings % 2], &fields[(crossings + 1) % 2]);
+        let field = device.buffer("the field", 24 * area)?;
+        let partial = device.buffer("sums", 24 * tiles.0 * tiles.1)?;
+        let home = maker.home([last, other, &field], &partial)?;
+        let searched = match search {
+            // Each side reads depth; what it finds is written once.
+            Some(_) => (4 * 16 + 8) * area,
+            None => 0,
+        };
+        let half_home = 24 * maker.padded.0 * width;
+        Ok(Sweeper {
+            search,
+            home,
+            together,
+            z_m: plan.z_m(),
+            field,
+            partial,
+            parts: tiles.0 * tiles.1,
+            bytes: searched + (16 + 4) * area + crossings * (2 * swept + 4 * area) + swept + 2 * half_home + 24 * area,
+            steps,
+        })
+    }
+
+    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+        if let Some(search) = &self.search {
+            search.run(pass);
+        }
+        let way = self.steps.iter().chain(&self.home);
+        way.for_each(|step| step.run(pass));
+    }
+
+    /// Dispatches a frame.
+    pub(super) fn dispatches(&self) -> usize {
+        self.search.as_ref().map_or(0, Search::dispatches) + self.steps.len() + self.home.len()
+    }
+}
+
+/// What the dispatches of a sweep share while they are made.
+struct Maker<'a> {
+    device: &'a Device,
+    plan: &'a SweepPlan,
+    surfaces: &'a wgpu::Buffer,
+    sources: &'a wgpu::Buffer,
+    points: &'a wgpu::Buffer,
+    border: usize,
+    /// (H, W) with the border.
+    padded: (usize, usize),
+}
+
+impl Maker<'_> {
+    fn header(&self) -> String {
+        let sweep = self.plan.sweep();
+        format!(
+            "const COUNT: u32 = {}u;\nconst HIDDEN: u32 = {}u;\n",
+            sweep.planes, sweep.hidden_layers
+        )
+    }
+
+    /// Which planes hold each pixel's points.
+    fn points(&self) -> Result<Dispatch> {
+        let (height, width) = self.plan.shape();
+        let frame = [width, height, height * width, 0].map(|n| n as u32);
+        let frame = (self.device).constants("frame", bytemuck::cast_slice(&frame))?;
+        let source = self.header() + include_str!("sweep_points.wgsl");
+        let arguments = [
+            (0, frame.buffer.as_entire_binding()),
+            (1, self.surfaces.as_entire_binding()),
+            (2, self.sources.as_entire_binding()),
+            (3, self.points.as_entire_binding()),
+        ];
+        let program = self.device.program("points", source, "find");
+        program.on(self.device, &arguments, [width.div_ceil(COLUMNS), height, 1])
+    }
+
+    /// The faster of one plane and `most` planes a dispatch, on a frame that is lit everywhere from its last plane on:
+    /// white rows there, one in each tile at least.
+    fn faster(&self, most: usize, fields: &[wgpu::Buffer; 2]) -> Result<(Vec<Dispatch>, usize)> {
+        let (height, width) = self.plan.shape();
+        let row = vec![[1.0f32; 4]; width];
+        for y in (0..height).step_by(TILE.1 / 2) {
+            let at = (16 * y * width) as u64;
+            (self.device.queue).write_buffer(self.surfaces, at, bytemuck::cast_slice(&row));
+        }
+        let (single, several) = (self.steps(1, fields)?, self.steps(most, fields)?);
+        Ok(match time(self.device, &single)? < time(self.device, &several)? {
+            true => (single, 1),
+            false => (several, most),
+        })
+    }
+
+    /// Each pixel's points, then all planes, so many `together`, from the first field to the second and back. The first
+    /// dispatch begins behind the last plane where they do not divide.
+    fn steps(&self, together: usize, fields: &[wgpu::Buffer; 2]) -> Result<Vec<Dispatch>> {
+        let (device, sweep) = (self.device, self.plan.sweep());
+        let radius = sweep.taps / 2;
+        let taps = (self.plan.filters().iter()).map(|f| (f.carry, &f.step[..]));
+        let taps = device.constants("steps", &packed(taps, radius))?;
+        let (columns, rows) = TILE;
+        let source = self.header()
+            + &format!(
+                "const RADIUS: u32 = {radius}u;
+                const PLANES: u32 = {together}u;
+                const COLUMNS: u32 = {columns}u;
+                const ROWS: u32 = {rows}u;
+                const EACH: u32 = {EACH}u;
+                const CARRY: bool = {};
+                ",
+                sweep.between_planes
+            )
+            + include_str!("sweep.wgsl");
+        let program = device.program("planes", source, "cross_planes");
+        let halo = 2 * radius * together;
+        let (high, wide) = self.padded;
+        let grid = [wide.div_ceil(columns - halo), high.div_ceil(rows - halo), 3];
+        let count = sweep.planes.div_ceil(together);
+        let (height, width) = self.plan.shape();
+        let crossings = (0..count).map(|step| {
+            let first = (count - step) * together - 1;
+            let frame = [width, height, self.border, first].map(|n| n as u32);
+            let frame = device.constants("frame", bytemuck::cast_slice(&frame))?;
+            let arguments = [
+                (0, frame.buffer.as_entire_binding()),
+                (1, taps.buffer.as_entire_binding()),
+                (2, self.surfaces.as_entire_binding()),
+                (3, self.sources.as_entire_binding()),
+                (4, self.points.as_entire_binding()),
+                (5, fields[step % 2].as_entire_binding()),
+                (6, fields[(step + 1) % 2].as_entire_binding()),
+            ];
+            program.on(device, &arguments, grid)
+        });
+        std::iter::once(self.points()).chain(crossings).collect()
+    }
+
+    /// The way home: rows from the first of `fields` to the second, columns from there to the third, whose sums go to
+    /// `partial`.
+    fn home(&self, fields: [&wgpu::Buffer; 3], partial: &wgpu::Buffer) -> Result<[Dispatch; 2]> {
+        let device = self.device;
+        let filters = self.plan.filters();
+        let lengths = filters.iter().map(|f| f.home.len());
+        let radius = lengths.max().unwrap_or(1) - 1;
+        let taps = filters.iter().map(|f| (0.0, &f.home[..]));
+        let taps = device.constants("the way home", &packed(taps, radius))?;
+        let ((height, width), (high, wide)) = (self.plan.shape(), self.padded);
+        let go = |down: bool, written: usize, read: usize, from, to: &wgpu::Buffer| {
+            let tiles = [width.div_ceil(COLUMNS), written.div_ceil(HOME_ROWS), 3];
+            let way = [width, written, read, high, self.border, tiles[0], 0, 0];
+            let way = way.map(|n| n as u32);
+            let way = device.constants("the way home", bytemuck::cast_slice(&way))?;
+            let header = format!("const RADIUS: u32 = {radius}u;\nconst DOWN: bool = {down};\n");
+            let source = header + include_str!("sweep_home.wgsl");
+            let arguments = [
+                (0, way.buffer.as_entire_binding()),
+                (1, taps.buffer.as_entire_binding()),
+                (2, wgpu::Buffer::as_entire_binding(from)),
+                (3, to.as_entire_binding()),
+                (4, partial.as_entire_binding()),
+            ];
+            let program = device.program("the way home", source, "go_home");
+            program.on(device, &arguments, tiles)
+        };
+        Ok([
+            go(false, high, wide, fields[0], fields[1])?,
+            go(true, height, width, fields[1], fields[2])?,
+        ])
+    }
+}
+
+/// The longest radius of a step that leaves enough of a tile.
+const MOST_RADIUS: usize = TILE.1 / 4;
+
+/// The most planes of a dispatch: each costs a halo more, and saves that the field is read and written. As many as
+/// leave a quarter of the tile; None where one leaves less.
+fn most_together(radius: usize) -> Option<usize> {
+    let left = |planes: usize| {
+        let halo = 2 * radius * planes;
+        TILE.0.saturating_sub(halo) * TILE.1.saturating_sub(halo)
+    };
+    (1..).take_while(|&planes| 4 * left(planes) >= TILE.0 * TILE.1).last()
+}
+
+/// Pixels of black around the frame. Light that has left it at plane k has come from no farther than it spreads from
+/// the last plane, and must come back on the way to plane 0 and from there to the hologram to matter.
+fn border(plan: &SweepPlan, display: &Display) -> Result<usize> {
+    let sweep = plan.sweep();
+    let optics = sweep::optics(display, &sweep, plan.z_m())?;
+    let most = |colour: &sweep::Optics| {
+        let left = |k: usize| colour.reach((sweep.planes - 1 - k) as f64 * colour.step_m);
+        let back = |k: usize| colour.reach(colour.home_m.abs() + k as f64 * colour.step_m);
+        (0..sweep.planes).map(|k| left(k).min(back(k))).max()
+    };
+    let widest = optics.iter().filter_map(most).max();
+    Ok(widest.unwrap_or(0) + MARGIN)
+}
+
+/// Filters of three colours as programs read them, up to `radius`: four f32 a tap, what points carry in the first one's
+/// third.
+fn packed<'a>(colours: impl Iterator<Item = (f32, &'a [[f32; 2]])>, radius: usize) -> Vec<u8> {
+    let all: Vec<[f32; 4]> = colours
+        .flat_map(|(carry, taps)| {
+            (0..=radius).map(move |j| {
+                let [re, im] = taps.get(j).copied().unwrap_or_default();
+                [re, im, if j == 0 { carry } else { 0.0 }, 0.0]
+            })
+        })
+        .collect();
+    bytemuck::cast_slice(&all).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::super::device::testing::{apart, device, read, run};
+    use super::*;
+    use ndarray::{Array2, Array3};
+    use num_complex::Complex32;
+    use phasefront_core::frame::RgbdFrame;
+    use phasefront_core::method::sweep::{Sweep, reference};
+
+    /// A small volume, so that the naive oracle has little black to carry around.
+    fn small() -> Display {
+        Display::from_toml("volume_depth_mm = 1.5").unwrap()
+    }
+
+    fn sweep() -> Sweep {
+        Sweep {
+            planes: 9,
+            taps: 9,
+            hidden_layers: 2,
+            between_planes: true,
+            tile: 16,
+        }
+    }
+
+    /// Fine colour, and depth as `depth` gives it.
+    fn frame((height, width): (usize, usize), depth: fn(usize, usize) -> f32) -> RgbdFrame {
+        let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+            ((c * 5 + y * 3 + x * x + y * x) % 11) as f32 / 10.0
+        });
+        let depth = Array2::from_shape_fn((height, width), |(y, x)| depth(y, x));
+        RgbdFrame::new(rgb, depth).unwrap()
+    }
+
+    /// Surfaces with sharp edges, one of them slanted, on the bounds between planes too.
+    fn scene(y: usize, x: usize) -> f32 {
+        match (y / 13 + 2 * (x / 17)) % 5 {
+            0 => 0.1,
+            1 => 0.35 + 0.004 * (y % 60) as f32,
+            2 => 0.6,
+            3 => 0.7,
+            _ => 0.93,
+        }
+    }
+
+    /// Another depth at each pixel.
+    fn noise(y: usize, x: usize) -> f32 {
+        let mixed = (y as u32 * 7919 + x as u32 * 104_729).wrapping_mul(2_654_435_761);
+        (mixed >> 8) as f32 / (1 << 24) as f32
+    }
+
+    fn on_gpu(frame: &RgbdFrame, plan: &SweepPlan, display: &Display, measured: bool) -> Vec<Complex32> {
+        let device = device();
+        let (height, width) = frame.shape();
+        let (rgb, depth) = (frame.rgb(), frame.depth());
+        let values: Vec<[f32; 4]> = depth
+            .indexed_iter()
+            .map(|((y, x), &d)| [rgb[(0, y, x)], rgb[(1, y, x)], rgb[(2, y, x)], d])
+            .collect();
+        let surfaces = device.buffer("surfaces", 16 * values.len()).unwrap();
+        let sweeper = device
+            .guarded(|| Sweeper::planned(&device, plan, display, &surfaces, measured))
+            .unwrap();
+        (device.queue).write_buffer(&surfaces, 0, bytemuck::cast_slice(&values));
+        // Twice: what one frame leaves behind must not reach the next.
+        run(&device, |pass| {
+            sweeper.run(pass);
+            sweeper.run(pass);
+        });
+        let field = read(&device, &sweeper.field, 3 * height * width);
+        let sums = read(&device, &sweeper.partial, 3 * sweeper.parts);
+        for (c, plane) in field.chunks_exact(height * width).enumerate() {
+            let sum: Complex32 = sums.iter().skip(c).step_by(3).sum();
+            let expected: Complex32 = plane.iter().sum();
+            let most = 1e-4 * plane.iter().map(|v| v.norm()).sum::<f32>();
+            assert!((sum - expected).norm() <= most, "{sum} {expected}");
+        }
+        field
+    }
+
+    /// Against the definition.
+    #[test]
+    fn the_sweep_is_its_oracle() {
+        let depths: [fn(usize, usize) -> f32; 6] = [
+            scene,
+            noise,
+            |_, _| 0.0,
+            |_, _| 1.0,
+            |_, _| 0.5,
+            |y, x| ((y + x) % 2) as f32,
+        ];
+        let sweeps = [
+            sweep(),
+            Sweep {
+                hidden_layers: 1,
+                ..sweep()
+            },
+            Sweep {
+                hidden_layers: 0,
+                ..sweep()
+            },
+            Sweep {
+                between_planes: false,
+                ..sweep()
+            },
+            Sweep {
+                taps: 13,
+                planes: 7,
+                ..sweep()
+            },
+            Sweep { planes: 1, ..sweep() },
+            Sweep {
+                taps: 5,
+                planes: 24,
+                ..sweep()
+            },
+        ];
+        let mut cases = Vec::new();
+        cases.extend(depths.map(|depth| ((34, 38), depth, sweep(), 0.0)));
+        cases.extend(sweeps.map(|sweep| ((41, 29), depths[0], sweep, 0.0)));
+        cases.push(((29, 31), depths[1], sweep(), -1e-3));
+        for size in [(61, 47), (50, 7), (7, 50), (1, 29), (30, 1), (1, 1)] {
+            cases.push((size, depths[0], sweep(), 2e-3));
+        }
+        for (case, (size, depth, sweep, z_m)) in cases.into_iter().enumerate() {
+            let frame = frame(size, depth);
+            let plan = SweepPlan::new(size.0, size.1, &small(), sweep, z_m).unwrap();
+            let field = on_gpu(&frame, &plan, &small(), case % 2 == 1);
+            let expected = reference::field(&frame, &small(), sweep, z_m).unwrap();
+            let worst = apart(&field, &expected);
+            println!("{size:?} {sweep:?} {z_m}: {worst}");
+            assert!(worst < 1e-4, "{size:?} {sweep:?} {z_m}: {worst}");
+        }
+    }
+
+    /// Against the CPU, at the usual volume and on other displays.
+    #[test]
+    fn whole_frames_are_those_of_the_cpu() {
+        let usual = Display::default();
+        let fine = Display::from_toml("pitch_um = 3.74\nvolume_depth_mm = 2").unwrap();
+        for (size, depth, display, z_m) in [
+            ((61, 47), scene as fn(usize, usize) -> f32, &usual, 0.0),
+            ((61, 47), noise, &usual, 0.0),
+            ((90, 7), scene, &usual, 0.0),
+            ((61, 47), scene, &usual, 3e-3),
+            ((61, 47), scene, &usual, -3e-3),
+            ((61, 47), scene, &fine, 0.0),
+            ((384, 384), scene, &usual, 0.0),
+        ] {
+            let frame = frame(size, depth);
+            let sweep = Sweep::for_display(display);
+            let plan = SweepPlan::new(size.0, size.1, display, sweep, z_m).unwrap();
+            let field = on_gpu(&frame, &plan, display, false);
+            let mut expected = vec![Complex32::ZERO; field.len()];
+            plan.field(&frame, &mut expected, &mut plan.scratch()).unwrap();
+            let worst = apart(&field, &expected);
+            println!("{size:?} {sweep:?} {z_m}: {worst}");
+            assert!(worst < 1e-4, "{size:?} {sweep:?} {z_m}: {worst}");
+        }
+    }
+
+    #[test]
+    fn steps_that_do_not_fit_are_refused() {
+        assert_eq!(most_together(2), Some(5));
+        assert_eq!(most_together(5), Some(2));
+        assert_eq!(most_together(MOST_RADIUS), Some(1));
+        assert_eq!(most_together(MOST_RADIUS + 1), None);
+        let device = device();
+        let wide = Sweep {
+            taps: 2 * MOST_RADIUS + 3,
+            ..sweep()
+        };
+        let plan = SweepPlan::new(9, 9, &small(), wide, 0.0).unwrap();
+        let surfaces = device.buffer("surfaces", 16 * 81).unwrap();
+        let refused = device.guarded(|| Sweeper::new(&device, &plan, &small(), &surfaces));
+        assert!(refused.err().unwrap().to_string().contains("23 taps"));
+    }
+}

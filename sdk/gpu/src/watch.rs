@@ -1,0 +1,61 @@
+//! Calls into drivers that may never come back, opening and compiling, made on a thread that can be left behind.
+
+use super::device::one_line;
+use super::{GpuError, Result};
+use phasefront_core::runtime::caught::caught;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// What `work` gives on a thread of its own, and [`GpuError::Lost`] where that takes over `patience` or panics.
+pub(super) fn watched<T: Send + 'static>(
+    what: &str,
+    patience: Duration,
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> Result<T> {
+    // A pool of one, so that the CPU's twins that are run for comparison do not wake all cores.
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .thread_name(|_| "phasefront gpu".into())
+        .build()
+        .map_err(|why| GpuError::Lost(format!("no thread to open it on: {}", one_line(why))))?;
+    let (send, receive) = channel();
+    pool.spawn(move || {
+        let done = caught(work).unwrap_or_else(|_| Err(GpuError::Lost("its driver's interface panicked".into())));
+        // Nobody waits any more where it took too long.
+        let _ = send.send(done);
+    });
+    match receive.recv_timeout(patience) {
+        Ok(done) => done,
+        Err(RecvTimeoutError::Timeout) => Err(GpuError::Lost(format!("no answer for {patience:?} {what}"))),
+        Err(RecvTimeoutError::Disconnected) => Err(GpuError::Lost(format!("its thread died {what}"))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use std::sync::{Arc, Barrier};
+
+    #[test]
+    fn work_that_never_ends_is_left_behind() {
+        let long = Duration::from_secs(60);
+        assert_eq!(watched("adding", long, || Ok(1 + 1)), Ok(2));
+        let own = GpuError::Wrong("by far".into());
+        let given = own.clone();
+        assert_eq!(watched("adding", long, || Err::<(), _>(given)), Err(own));
+        let panicked = watched("adding", long, || -> Result<()> {
+            std::panic::resume_unwind(Box::new("no"))
+        });
+        assert!(matches!(panicked, Err(GpuError::Lost(_))), "{panicked:?}");
+        let end = Arc::new(Barrier::new(2));
+        let stuck = end.clone();
+        let left = watched("while it was tried out", Duration::from_millis(1), move || {
+            stuck.wait();
+            Ok(())
+        });
+        let message = left.unwrap_err().to_string();
+        assert!(message.contains("no answer for 1ms while"), "{message}");
+        end.wait();
+    }
+}

@@ -1,0 +1,835 @@
+//! What runs on the GPU against its twin on the CPU, on whatever device there is: Mesa's driver in software will do.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../tests/driver.rs"]
+mod driver;
+#[path = "../../../tests/network_models.rs"]
+mod network_models;
+#[path = "../../../tests/skip.rs"]
+mod skip;
+
+use ndarray::{Array2, Array3};
+use network_models::{Model, frame};
+use num_complex::Complex32;
+use phasefront_core::display::Display;
+use phasefront_core::display::target::{Aberration, Illumination, Response};
+use phasefront_core::encode::brightness::Brightness;
+use phasefront_core::encode::{EncoderOptions, Encoding};
+use phasefront_core::frame::RgbdFrame;
+use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane, Rotation, YuvEncoding, YuvMatrix};
+use phasefront_core::method::Method;
+use phasefront_core::method::network::Network;
+use phasefront_core::method::network::{Isa, reference};
+use phasefront_core::method::sweep::Sweep;
+use phasefront_gpu::{
+    self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Float, Frame, Fusion,
+    GpuNetworkPlan, GpuPipeline, Job,
+};
+use std::sync::{Arc, OnceLock};
+
+/// The device of all tests.
+fn device() -> Arc<Device> {
+    static DEVICE: OnceLock<Result<Arc<Device>, phasefront_gpu::GpuError>> = OnceLock::new();
+    let opened = DEVICE.get_or_init(|| {
+        let software = DeviceOptions {
+            name: Some("llvmpipe".into()),
+            ..Default::default()
+        };
+        let opened = Device::open(&DeviceOptions::default()).or_else(|_| Device::open(&software));
+        opened.map(Arc::new)
+    });
+    driver::opened(opened.as_ref()).clone()
+}
+
+fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
+    assert_eq!(a.len(), b.len());
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |worst, d| if d > worst || d.is_nan() { d } else { worst })
+}
+
+fn run(network: &Network, options: ChainOptions, (h, w): (usize, usize), input: &[f32]) -> Vec<f32> {
+    let device = device();
+    let plan = GpuNetworkPlan::new(&device, network, h, w, options).unwrap();
+    let mut output = vec![f32::NAN; 6 * h * w];
+    plan.run(input, &mut output).unwrap();
+    output
+}
+
+const SIZES: [(usize, usize); 3] = [(1, 1), (7, 33), (47, 61)];
+
+#[test]
+fn chains_in_f32_and_f16_agree_with_the_definition() {
+    let device = device();
+    let models = [
+        Model::new(2, 8),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(5, 24)
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(4, 8)
+        },
+        Model {
+            inputs: 20,
+            input: "ldi5",
+            ..Model::new(8, 16)
+        },
+        // Filters that fill no block of eight, and a width that fills no group.
+        Model::new(7, 12),
+        Model::new(6, 5),
+        Model::new(4, 16).halved(),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::new(5, 8).halved()
+        },
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in SIZES {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let expected = reference::run(network.chain(), &input, size.0, size.1);
+            let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+            let mut fused = Vec::new();
+            for (float, fusion, tolerance) in [
+                (Float::F32, Fusion::Layers, 1e-4),
+                (Float::F32, Fusion::Pairs, 1e-4),
+                (Float::F16, Fusion::Layers, 0.02),
+                (Float::F16, Fusion::Pairs, 0.02),
+            ] {
+                if float == Float::F16 && !device.has_half() {
+                    skip::or_fail("16-bit floats", format!("{device:?} has none"));
+                    continue;
+                }
+                let options = ChainOptions { float, fusion };
+                let output = run(&network, options, size, &input);
+                let worst = largest_difference(&output, &expected) / largest;
+                assert!(
+                    worst < tolerance,
+                    "{} layers, {size:?}, {options:?}: {worst}",
+                    model.layers
+                );
+                fused.push(output);
+            }
+            for both in fused.chunks_exact(2) {
+                assert!(both[0] == both[1], "{size:?}: fusion changes bits");
+            }
+        }
+    }
+}
+
+/// The sizes of phones' frames, against the kernels of the CPU.
+#[test]
+fn chains_of_whole_frames_agree_with_the_cpu() {
+    let device = device();
+    for (model, float, tolerance) in [
+        (Model::new(5, 8), Float::F32, 1e-4),
+        (Model::new(5, 8), Float::F16, 0.02),
+        (Model::int8(5, 8), Float::F32, 0.0),
+        (Model::int8(5, 16).halved(), Float::F32, 0.0),
+    ] {
+        if float == Float::F16 && !device.has_half() {
+            skip::or_fail("16-bit floats", format!("{device:?} has none"));
+            continue;
+        }
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in [(61, 47), (384, 384), (540, 960)] {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let plan = network.plan(size.0, size.1).unwrap();
+            let mut expected = vec![0.0; 6 * size.0 * size.1];
+            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
+            let largest = expected.iter().fold(1.0f32, |most, v| most.max(v.abs()));
+            for fusion in [Fusion::Layers, Fusion::Pairs] {
+                let output = run(&network, ChainOptions { float, fusion }, size, &input);
+                let worst = largest_difference(&output, &expected) / largest;
+                assert!(worst <= tolerance, "{size:?} {float:?} {fusion:?}: {worst}");
+            }
+        }
+    }
+}
+
+#[test]
+fn chains_in_int8_have_the_bits_of_the_cpu() {
+    let models = [
+        Model::int8(2, 8),
+        Model::int8(3, 24),
+        Model::int8(4, 16),
+        Model {
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inner_roundings: false,
+            ..Model::int8(8, 8)
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            tanh: true,
+            head: "amplitude-phase",
+            ..Model::int8(6, 8)
+        },
+        Model::int8(8, 24),
+        Model::int8(4, 48).halved(),
+        Model {
+            inner_roundings: false,
+            ..Model::int8(5, 8).halved()
+        },
+    ];
+    for model in models {
+        let network = Network::from_onnx(&model.bytes()).unwrap();
+        for size in SIZES {
+            let input = frame(model.inputs, size.0, size.1, 7);
+            let plan = network.plan_on(Isa::Portable, size.0, size.1).unwrap();
+            let mut expected = vec![0.0; 6 * size.0 * size.1];
+            plan.run(&input, &mut expected, &mut plan.scratch()).unwrap();
+            for fusion in [Fusion::Layers, Fusion::Pairs] {
+                let options = ChainOptions {
+                    float: Float::F32,
+                    fusion,
+                };
+                let output = run(&network, options, size, &input);
+                let what = format!("{} layers, {size:?}, {fusion:?}", model.layers);
+                if model.tanh {
+                    assert!(largest_difference(&output, &expected) < 1e-5, "{what}");
+                } else {
+                    assert!(output == expected, "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// A frame with detail everywhere, of values that 8 bits and 16 bits hold.
+fn rgbd(height: usize, width: usize) -> RgbdFrame {
+    let byte = |c: usize, y: usize, x: usize| ((c * 70 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    RgbdFrame::new(
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| byte(c, y, x)),
+        Array2::from_shape_fn((height, width), |(y, x)| {
+            ((x / 8 * 4099 + y / 8 * 257) % 65536) as f32 / 65535.0
+        }),
+    )
+    .unwrap()
+}
+
+fn int8_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../../models/rgbd-8-int8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
+}
+
+fn f32_network() -> Arc<Network> {
+    let bytes = include_bytes!("../../../models/rgbd-8.onnx");
+    Arc::new(Network::from_onnx(bytes).unwrap())
+}
+
+/// The mean of |exp(iφ) − exp(iφ')| of two frames' levels.
+fn apart(a: &[u8], b: &[u8], response: &Response) -> f32 {
+    let shown = |level: u8| Complex32::from_polar(1.0, response.phase(level, 0));
+    let sum: f32 = a.iter().zip(b).map(|(&a, &b)| (shown(a) - shown(b)).norm()).sum();
+    sum / a.len() as f32
+}
+
+fn planned(
+    shape: (usize, usize),
+    method: Method,
+    display: &Display,
+    encoding: Encoding,
+    brightness: Brightness,
+) -> Job {
+    Job {
+        encoder: EncoderOptions {
+            brightness,
+            ..encoding.into()
+        },
+        ..Job::new(shape, method, display)
+    }
+}
+
+/// The CPU's levels and scale of a job.
+fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
+    let (h, w) = job.shape;
+    let plan = job.on_cpu().unwrap();
+    let mut levels = vec![0; 3 * h * w];
+    let mut field = vec![Complex32::ZERO; 3 * h * w];
+    let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
+    (levels, report.unwrap().scale)
+}
+
+#[test]
+#[expect(clippy::too_many_lines, reason = "a table of cases")]
+fn whole_frames_are_those_of_the_cpu() {
+    let device = device();
+    let (int8, f32) = (int8_network(), f32_network());
+    let lut = Response::lut(std::array::from_fn(|i| (i / 2) as u8 + 30));
+    let linear = Response::linear(8).unwrap();
+    let half = if device.has_half() { Float::F16 } else { Float::F32 };
+    let cases = [
+        (
+            &int8,
+            (61, 47),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Brightness::FrameMax,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (61, 47),
+            6e-3,
+            Encoding::BAND_LIMIT,
+            Brightness::FrameMax,
+            &lut,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            -3e-3,
+            Encoding::DoublePhase,
+            Brightness::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
+        (
+            &f32,
+            (61, 47),
+            2e-3,
+            Encoding::ANTI_ALIAS,
+            Brightness::Fixed(0.8),
+            &lut,
+            half,
+        ),
+        (
+            &f32,
+            (384, 384),
+            4e-3,
+            Encoding::ANTI_ALIAS,
+            Brightness::FrameMax,
+            &linear,
+            Float::F32,
+        ),
+        (
+            &int8,
+            (540, 960),
+            0.0,
+            Encoding::ANTI_ALIAS,
+            Brightness::Fixed(1.0),
+            &linear,
+            Float::F32,
+        ),
+    ];
+    for (network, (h, w), offset_m, encoding, scale, response, float) in cases {
+        // Off the midpoint on a display that the network was not trained for.
+        let volume_mm = if offset_m > 0.0 { 4.0 } else { 6.0 };
+        let display = Display::from_toml(&format!("volume_depth_mm = {volume_mm:?}")).unwrap();
+        let display = display.with_offset_m(offset_m).unwrap();
+        let method = Method::Network(network.clone());
+        let encoded = format!("{encoding:?} {scale:?}");
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.target.response = response.clone();
+        job.chain.float = float;
+        let frame = rgbd(h, w);
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let tolerance = if float == Float::F16 { 0.05 } else { 0.002 };
+        let what = format!("{} {h}×{w} {encoded}", plan.describe());
+        let apart = apart(&levels, &expected, response);
+        println!("{what}: {apart} {report:?}");
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
+    }
+}
+
+/// Swept to the midpoint and propagated, and swept on to the modulator; seeded networks in all numbers.
+#[test]
+fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
+    let device = device();
+    let display = Display::from_toml("volume_depth_mm = 5").unwrap();
+    let usual = Sweep::for_display(&display);
+    let plain = Sweep {
+        planes: 24,
+        taps: 11,
+        hidden_layers: 0,
+        between_planes: false,
+        ..usual
+    };
+    let model = Model {
+        inputs: 10,
+        input: "seeded",
+        ..Model::new(5, 8)
+    };
+    let (float, int8) = (model.bytes(), Model { int8: true, ..model }.bytes());
+    let seeded = |bytes: &[u8]| Method::Seeded(Arc::new(Network::from_onnx(bytes).unwrap()));
+    let half = match device.has_half() {
+        true => Float::F16,
+        false => Float::F32,
+    };
+    let f32 = Float::F32;
+    for (method, (h, w), offset_m, encoding, float, tolerance) in [
+        (Method::Sweep(usual), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.002),
+        (Method::Sweep(usual), (47, 61), 3e-3, Encoding::BAND_LIMIT, f32, 0.002),
+        (Method::Sweep(plain), (61, 47), 20e-3, Encoding::DoublePhase, f32, 0.002),
+        (seeded(&float), (61, 47), 2e-3, Encoding::ANTI_ALIAS, f32, 0.002),
+        (seeded(&float), (61, 47), 0.0, Encoding::ANTI_ALIAS, half, 0.05),
+        // A step of 8 bits to the other side is worth more than rounding.
+        (seeded(&int8), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.02),
+    ] {
+        let display = display.clone().with_offset_m(offset_m).unwrap();
+        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
+        job.chain.float = float;
+        let frame = rgbd(h, w);
+        let (expected, expected_scale) = on_cpu(&job, &frame);
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let what = format!("{} {h}×{w} {offset_m}", plan.describe());
+        let apart = apart(&levels, &expected, &job.target.response);
+        println!("{what}: {apart} {report:?}");
+        assert!(apart < tolerance, "{what}: {apart}");
+        let scales = (report.scale - expected_scale).abs() / expected_scale;
+        assert!(scales < tolerance, "{what}: {} {expected_scale}", report.scale);
+        // In another form from then on; the sweep asks for the last bit of each depth.
+        let words: Vec<u16> = (frame.depth().iter()).map(|d| (d * 65535.0).round() as u16).collect();
+        let frame = Frame {
+            depth: DepthData::U16(&words),
+            ..Frame::of(&frame)
+        };
+        plan.expect(Colour::Planar, Depth::U16).unwrap();
+        let mut again = vec![0; levels.len()];
+        plan.process(&frame, &mut again).unwrap();
+        assert!(again == levels, "{what}");
+        phasefront_gpu::probe(&device, &job).unwrap();
+    }
+}
+
+/// Bytes of camera planes for an odd-sided sensor, with strides as cameras have them.
+struct Sensor {
+    format: ColourFormat,
+    planes: Vec<(Vec<u8>, usize, usize)>,
+}
+
+impl Sensor {
+    fn all((h, w): (usize, usize)) -> Vec<Sensor> {
+        let plane = |rows: usize, columns: usize, step: usize, pad: usize, seed: usize| {
+            let row = columns * step + pad;
+            let smooth = |i: usize| 127.0 + 100.0 * ((i % row) as f32 * 0.13 + seed as f32).sin();
+            let bytes = (0..rows * row).map(|i| (smooth(i) + (i / row % 23) as f32) as u8);
+            (bytes.collect(), row, step)
+        };
+        let (half_h, half_w) = (h.div_ceil(2), w.div_ceil(2));
+        let video = YuvEncoding {
+            matrix: YuvMatrix::Bt709,
+            video_range: true,
+        };
+        let full = YuvEncoding::default();
+        vec![
+            Sensor {
+                format: ColourFormat::Rgba,
+                planes: vec![plane(h, w, 4, 0, 1)],
+            },
+            Sensor {
+                format: ColourFormat::Bgra,
+                planes: vec![plane(h, w, 4, 12, 2)],
+            },
+            Sensor {
+                format: ColourFormat::Rgb,
+                planes: vec![plane(h, w, 3, 1, 3)],
+            },
+            Sensor {
+                format: ColourFormat::Nv12(video),
+                planes: vec![plane(h, w, 1, 7, 4), plane(half_h, half_w, 2, 6, 5)],
+            },
+            Sensor {
+                format: ColourFormat::Yuv420(full),
+                planes: vec![
+                    plane(h, w, 1, 3, 6),
+                    plane(half_h, half_w, 2, 1, 7),
+                    // A stride beyond what there is room for.
+                    plane(half_h, half_w, 9, 900, 8),
+                ],
+            },
+        ]
+    }
+
+    fn image(&self, (h, w): (usize, usize)) -> ColourImage<'_> {
+        let planes: Vec<Plane<'_>> = self
+            .planes
+            .iter()
+            .map(|(bytes, row, step)| Plane::new(bytes, *row, *step))
+            .collect();
+        ColourImage::new(self.format, w, h, &planes).unwrap()
+    }
+}
+
+#[test]
+fn images_of_cameras_are_read_as_on_the_cpu() {
+    let device = device();
+    let network = int8_network();
+    // Odd, so that rows of 16-bit depth do not begin at words.
+    let (h, w) = (33, 45);
+    let words: Vec<u16> = (0..h * w).map(|i| (i * 4099 % 65536) as u16).collect();
+    let display = Display::default();
+    let method = Method::Network(network);
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let planar = planned((h, w), method, &display, encoding, scale);
+    let turned = Orientation {
+        rotation: Rotation::Clockwise90,
+        mirrored: true,
+    };
+    for (sensor, orientation) in [((33, 45), Orientation::default()), ((75, 49), turned)] {
+        for camera in Sensor::all(sensor) {
+            let image = camera.image(sensor);
+            let job = Job {
+                colour: Colour::Camera {
+                    format: camera.format,
+                    height: sensor.0,
+                    width: sensor.1,
+                    orientation,
+                },
+                depth: Depth::U16,
+                ..planar.clone()
+            };
+            let frame = Frame {
+                colour: ColourData::Camera(image),
+                depth: DepthData::U16(&words),
+            };
+            let (expected, _) = on_cpu(&job, &frame.read(orientation, h, w).unwrap());
+            let mut levels = vec![0; 3 * h * w];
+            let mut plan = GpuPipeline::new(&device, &job).unwrap();
+            plan.process(&frame, &mut levels).unwrap();
+            let apart = apart(&levels, &expected, &planar.target.response);
+            assert!(apart < 0.003, "{:?} {sensor:?}: {apart}", camera.format);
+            for other in [
+                Frame {
+                    depth: DepthData::U16(&words[1..]),
+                    ..frame
+                },
+                Frame {
+                    depth: DepthData::F32(&[0.0; 33 * 45]),
+                    ..frame
+                },
+                Frame {
+                    colour: ColourData::Planar(&[0.0; 3 * 33 * 45]),
+                    ..frame
+                },
+            ] {
+                assert!(plan.submit(&other, Deliver::Levels).is_err());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pre_filter_network_filters_as_on_the_cpu() {
+    let device = device();
+    let tanh = Model {
+        inputs: 6,
+        input: "field",
+        tanh: true,
+        head: "amplitude-phase",
+        ..Model::new(4, 8)
+    };
+    let models = [
+        tanh.clone(),
+        Model {
+            int8: true,
+            ..tanh.clone()
+        },
+        Model {
+            tanh: false,
+            head: "real-imaginary",
+            ..tanh
+        },
+        Model {
+            inputs: 6,
+            input: "field",
+            ..Model::int8(5, 8)
+        },
+        Model {
+            inputs: 6,
+            input: "blurred-field",
+            ..Model::new(4, 8)
+        },
+        Model {
+            inputs: 12,
+            input: "split-blurred-field",
+            ..Model::int8(4, 8)
+        },
+    ];
+    for model in models {
+        let prefilter = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let (h, w) = (47, 61);
+        let display = Display::default();
+        let method = Method::Network(f32_network());
+        let encoding = Encoding::Deep(prefilter);
+        let mut job = planned((h, w), method, &display, encoding, Brightness::FrameMax);
+        job.chain.float = Float::F32;
+        let frame = rgbd(h, w);
+        let (expected, scale) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        let report = plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        // A step of 8 bits to the other side is worth more than rounding.
+        let tolerance = if model.int8 { 0.02 } else { 0.003 };
+        assert!(apart < tolerance, "{} {}: {apart}", model.head, model.int8);
+        assert!((report.scale - scale).abs() < tolerance * scale, "{report:?} {scale}");
+    }
+}
+
+#[test]
+fn several_frames_fly_and_each_has_its_own_levels() {
+    let device = device();
+    let network = int8_network();
+    let (h, w) = (33, 45);
+    let display = Display::default();
+    let method = Method::Network(network.clone());
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let job = planned((h, w), method, &display, encoding, scale);
+    let frames: Vec<RgbdFrame> = (0..3)
+        .map(|i| {
+            let frame = rgbd(h, w);
+            let rgb = frame.rgb().mapv(|v| (v * (1.0 - 0.3 * i as f32)).clamp(0.0, 1.0));
+            RgbdFrame::new(rgb, frame.depth().to_owned()).unwrap()
+        })
+        .collect();
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
+    let tickets: Vec<_> = frames
+        .iter()
+        .map(|frame| plan.submit(&Frame::of(frame), Deliver::Levels).unwrap())
+        .collect();
+    let full = plan.submit(&Frame::of(&frames[0]), Deliver::Levels);
+    assert!(full.unwrap_err().to_string().contains("in flight"));
+    let mut scales = Vec::new();
+    // Collected in another order than submitted.
+    for (ticket, frame) in tickets.into_iter().zip(&frames).rev() {
+        let (expected, scale) = on_cpu(&job, frame);
+        let mut levels = vec![0; 3 * h * w];
+        let report = plan.collect(ticket, &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        assert!(apart < 0.002, "{apart}");
+        assert!((report.scale - scale).abs() < 1e-3, "{report:?} {scale}");
+        scales.push(report.scale);
+    }
+    assert!(scales[0] < scales[1] && scales[1] < scales[2]);
+    // One that is shown, and its picture.
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
+    let texture = plan.texture(&ticket);
+    assert_eq!((texture.width(), texture.height()), (w as u32, h as u32));
+    plan.finish(ticket).unwrap();
+    let ticket = plan.submit(&Frame::of(&frames[0]), Deliver::Shown).unwrap();
+    let refused = plan.collect(ticket, &mut vec![0; 3 * h * w]).unwrap_err();
+    assert!(refused.to_string().contains("shown"), "{refused}");
+}
+
+/// An app draws the levels from the texture that they were written to, on the device that computed them.
+#[test]
+#[expect(clippy::too_many_lines, reason = "what an app does, from its shader to its picture")]
+fn an_app_shows_the_texture_itself() {
+    let device = device();
+    let (h, w) = (33, 45);
+    let display = Display::default();
+    let method = Method::Network(int8_network());
+    let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+    let job = planned((h, w), method, &display, encoding, scale);
+    let mut plan = GpuPipeline::new(&device, &job).unwrap();
+    let frame = rgbd(h, w);
+    let mut expected = vec![0; 3 * h * w];
+    plan.process(&Frame::of(&frame), &mut expected).unwrap();
+    let ticket = plan.submit(&Frame::of(&frame), Deliver::Shown).unwrap();
+    let (inner, queue) = device.wgpu();
+    let module = inner.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: None,
+        source: wgpu::ShaderSource::Wgsl(
+            "@group(0) @binding(0) var hologram: texture_2d<f32>;
+            @vertex fn corner(@builtin(vertex_index) i: u32) -> @builtin(position) vec4f {
+                return vec4f(f32(i / 2u) * 4.0 - 1.0, f32(i % 2u) * 4.0 - 1.0, 0.0, 1.0);
+            }
+            @fragment fn show(@builtin(position) at: vec4f) -> @location(0) vec4f {
+                return textureLoad(hologram, vec2u(at.xy), 0);
+            }"
+            .into(),
+        ),
+    });
+    let format = wgpu::TextureFormat::Rgba8Unorm;
+    let pipeline = inner.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: None,
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            buffers: &[],
+        },
+        primitive: Default::default(),
+        depth_stencil: None,
+        multisample: Default::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: None,
+            compilation_options: Default::default(),
+            targets: &[Some(format.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    });
+    let view = plan.texture(&ticket).create_view(&Default::default());
+    let bound = inner.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &[wgpu::BindGroupEntry {
+            binding: 0,
+            resource: wgpu::BindingResource::TextureView(&view),
+        }],
+    });
+    // What stands for the app's screen.
+    let size = plan.texture(&ticket).size();
+    let screen = inner.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size,
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
+    let mut encoder = inner.create_command_encoder(&Default::default());
+    {
+        let view = screen.create_view(&Default::default());
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: Default::default(),
+            })],
+            ..Default::default()
+        });
+        pass.set_pipeline(&pipeline);
+        pass.set_bind_group(0, &bound, &[]);
+        pass.draw(0..3, 0..1);
+    }
+    let buffer = inner.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: 256 * h as u64,
+        usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    let to = wgpu::TexelCopyBufferInfo {
+        buffer: &buffer,
+        layout: wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(256),
+            rows_per_image: None,
+        },
+    };
+    encoder.copy_texture_to_buffer(screen.as_image_copy(), to, size);
+    queue.submit([encoder.finish()]);
+    buffer.map_async(wgpu::MapMode::Read, .., |mapped| mapped.unwrap());
+    inner
+        .poll(wgpu::PollType::Wait {
+            submission_index: None,
+            timeout: None,
+        })
+        .unwrap();
+    let shown = buffer.get_mapped_range(..).unwrap();
+    for (i, level) in expected.iter().enumerate() {
+        let (c, y, x) = (i / (h * w), i / w % h, i % w);
+        assert_eq!(shown[256 * y + 4 * x + c], *level, "{c} {x} {y}");
+    }
+    plan.finish(ticket).unwrap();
+}
+
+#[test]
+fn networks_that_read_the_place_or_squares_of_pixels_are_those_of_the_cpu() {
+    let device = device();
+    let of_place = Model {
+        inputs: 6,
+        input: "rgbdxy",
+        ..Model::new(5, 8)
+    };
+    for model in [of_place, Model::new(5, 8).halved(), Model::int8(4, 8).halved()] {
+        let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
+        let (h, w) = (21, 35);
+        let display = Display::default();
+        let method = Method::Network(network);
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.chain.float = Float::F32;
+        let frame = rgbd(h, w);
+        let (expected, _) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        assert!(apart < 0.003, "{apart}");
+    }
+}
+
+#[test]
+fn a_calibrated_display_gets_the_levels_of_the_cpu() {
+    let device = device();
+    let (h, w) = (47, 61);
+    let network = int8_network();
+    let beam = Array3::from_shape_fn((3, 5, 7), |(c, y, x)| {
+        1.0 - 0.03 * (c as f32 + 1.0) * ((y as f32 - 2.0).powi(2) + (x as f32 - 3.0).powi(2)) / 4.0
+    });
+    let beam = Illumination::new(beam.view()).unwrap();
+    let bent = Aberration::new([[0.4, -0.3, 0.2, 0.1, -0.2]; 3]).unwrap();
+    let frame = rgbd(h, w);
+    for (offset_m, illumination, correction) in [
+        (0.0, Some(beam.clone()), None),
+        (2e-3, Some(beam), Some(bent.clone())),
+        (0.0, None, Some(bent)),
+    ] {
+        // A modulator that is wider than the frame, and lower.
+        let display = Display::default().with_size(h - 3, w + 9).unwrap();
+        let display = display.with_offset_m(offset_m).unwrap();
+        let method = Method::Network(network.clone());
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let mut job = planned((h, w), method, &display, encoding, scale);
+        job.target.illumination = illumination;
+        job.target.correction = correction;
+        let (expected, _) = on_cpu(&job, &frame);
+        let mut levels = vec![0; 3 * h * w];
+        let mut plan = GpuPipeline::new(&device, &job).unwrap();
+        plan.process(&Frame::of(&frame), &mut levels).unwrap();
+        let apart = apart(&levels, &expected, &job.target.response);
+        assert!(apart < 0.002, "{offset_m}: {apart}");
+        let plain = Job {
+            target: display.into(),
+            ..job
+        };
+        assert!(on_cpu(&plain, &frame).0 != expected);
+    }
+}
+
+#[test]
+fn a_device_is_tried_out_before_it_is_used() {
+    let device = device();
+    let (int8, f32) = (int8_network(), f32_network());
+    for network in [&int8, &f32] {
+        let display = Display::default().with_offset_m(5e-3).unwrap();
+        let method = Method::Network(network.clone());
+        let (encoding, scale) = (Encoding::ANTI_ALIAS, Brightness::FrameMax);
+        let job = planned((1080, 1920), method, &display, encoding, scale);
+        phasefront_gpu::probe(&device, &job).unwrap();
+    }
+}

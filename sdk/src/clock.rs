@@ -1,6 +1,0 @@
-//! The clock that stages are timed by: the system's, or a browser's, which the standard library does not know.
-
-#[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
-pub(crate) use std::time::Instant;
-#[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
-pub(crate) use web_time::Instant;
