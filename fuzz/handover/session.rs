@@ -61,8 +61,8 @@ impl Work for Fake {
         self.broken = false;
     }
 
-    fn cancel(&self) -> crate::cancel::Cancel {
-        crate::cancel::Cancel::default()
+    fn cancel(&self) -> phasefront_core::runtime::cancel::Cancel {
+        phasefront_core::runtime::cancel::Cancel::default()
     }
 }
 

@@ -11,10 +11,10 @@ use on_gpu::on_gpu;
 use phasefront::input::{CameraFrame, DepthFormat, Orientation, Rotation};
 use phasefront::session::{Backend, DropReason, Event, Quality};
 use phasefront::target::Response;
-use phasefront_gpu::{ChainOptions, Float};
 use phasefront::{
     Brightness, Display, Error, ImageSession, LiveSession, Method, Network, SessionOptions, Sweep, VideoSession,
 };
+use phasefront_gpu::{ChainOptions, Float};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::time::Duration;

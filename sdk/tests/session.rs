@@ -11,12 +11,12 @@ use phasefront::input::{
 use phasefront::output::{Layout, Output, Placement};
 use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, QualityLevel, Submission, Thermal};
 use phasefront::target::{Aberration, Response};
-use phasefront_core::view::refocus::Refocus;
-use phasefront_core::optics::aperture::Opening;
 use phasefront::{
     Brightness, Display, EncoderOptions, Error, ImageSession, LiveSession, Method, SessionOptions, Sweep, Target,
     VideoSession,
 };
+use phasefront_core::optics::aperture::Opening;
+use phasefront_core::view::refocus::Refocus;
 use std::sync::mpsc;
 
 const W: usize = 64;

@@ -8,7 +8,7 @@
 //! here:
 //!
 //! ```no_run
-//! use phasefront::unstable::gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
+//! use phasefront_gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
 //! use phasefront::{Method, Network, RgbdFrame, Target};
 //! use std::sync::Arc;
 //!

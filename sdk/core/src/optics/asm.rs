@@ -256,7 +256,7 @@ fn band_limit(
 ///
 /// ```
 /// use num_complex::Complex32;
-/// use phasefront::unstable::wave::asm::{Padding, Propagator};
+/// use phasefront_core::optics::asm::{Padding, Propagator};
 ///
 /// let plan = Propagator::new(64, 48, 8e-6, 520e-9, 3e-3, Padding::Reach)?;
 /// let mut scratch = plan.scratch();
