@@ -204,7 +204,7 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
     let mut field = vec![Complex32::ZERO; values];
     let mut levels = vec![0; values];
     let mut times = Times::default();
-    pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
+    pipeline.process(&frame, &mut levels, &mut scratch)?;
     let start = Instant::now();
     while times.totals.len() < 5 || start.elapsed() < budget {
         let ms = |time: Duration| time.as_secs_f64() * 1e3;

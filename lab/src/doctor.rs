@@ -298,10 +298,9 @@ fn frame() -> Result<Check> {
     let frame = RgbdFrame::new(rgb.clone(), Array2::from_elem(SIZE, 0.5))?;
     let method = Method::Network(coming_along(Precision::Int8)?);
     let pipeline = Pipeline::new(SIZE, method, &target, &EncoderOptions::default())?;
-    let mut field = vec![Complex32::ZERO; 3 * height * width];
     let mut levels = Array3::zeros((3, height, width));
     let bytes = levels.as_slice_mut().expect("standard layout");
-    let report = pipeline.process(&frame, &mut field, bytes, &mut pipeline.scratch())?;
+    let report = pipeline.process(&frame, bytes, &mut pipeline.scratch())?;
     let info = HologramInfo {
         display: target.display,
         encoder: None,

@@ -3,7 +3,6 @@
 #![allow(unsafe_code)]
 
 use ndarray::{Array2, Array3};
-use num_complex::Complex32;
 use phasefront::{EncoderOptions, Error, Method, Network, Pipeline, RgbdFrame, Target};
 
 /// Makes `levels`, (3, `height`, `width`), of a frame, by the network of an ONNX file; 0 if that went well.
@@ -51,7 +50,6 @@ fn make(
     let method = Method::trained(network.into());
     let options = EncoderOptions::default();
     let pipeline = Pipeline::new((height, width), method, &Target::default(), &options)?;
-    let mut field = vec![Complex32::ZERO; levels.len()];
-    pipeline.process(&frame, &mut field, levels, &mut pipeline.scratch())?;
+    pipeline.process(&frame, levels, &mut pipeline.scratch())?;
     Ok(())
 }

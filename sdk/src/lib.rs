@@ -5,8 +5,7 @@
 //! normalized depth goes through a [`Pipeline`]:
 //!
 //! ```
-//! use ndarray::{Array2, Array3};
-//! use num_complex::Complex32;
+//! use phasefront::ndarray::{Array2, Array3};
 //! use phasefront::{Display, EncoderOptions, Method, Pipeline, RgbdFrame, Sweep, Target};
 //!
 //! let display = Display::from_toml("width = 64\nheight = 48\noffset_mm = 3.0")?;
@@ -20,11 +19,8 @@
 //! let depth = Array2::from_shape_fn((48, 64), |(y, x)| if inside(y, x) { 0.1 } else { 0.8 });
 //! let frame = RgbdFrame::new(rgb, depth)?;
 //!
-//! let mut scratch = pipeline.scratch();
-//! let mut field = vec![Complex32::ZERO; 3 * 48 * 64];
-//! let mut levels = vec![0; 3 * 48 * 64];
-//! let report = pipeline.process(&frame, &mut field, &mut levels, &mut scratch)?;
-//! println!("{:?}, full light stands for {}", report.times, report.scale);
+//! // (3, 48, 64) levels, red first.
+//! let levels = pipeline.levels(&frame)?;
 //! # assert!(levels.iter().any(|&level| level != levels[0]));
 //! # Ok::<(), phasefront::Error>(())
 //! ```
@@ -70,6 +66,8 @@
 //! the display has one laser, which shows a picture's luminance ([`RgbdFrame::for_display`]).
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
+
+pub use {ndarray, num_complex};
 
 pub mod device {
     //! Modulators that can be bought, as data.

@@ -51,6 +51,7 @@ impl EncoderOptions {
 
     /// # Errors
     /// A number out of its range.
+    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
         if !(0.0..=1.0).contains(&self.dark) {

@@ -95,6 +95,7 @@ impl RgbdFrame {
     }
 
     /// A black frame of `colours` at the far end of the volume.
+    #[doc(hidden)]
     pub fn black(colours: usize, (height, width): (usize, usize)) -> Self {
         RgbdFrame {
             rgb: Array3::zeros((colours, height, width)),
@@ -103,6 +104,7 @@ impl RgbdFrame {
     }
 
     /// Colour and depth to write into; what is written must be in \[0, 1].
+    #[doc(hidden)]
     pub fn planes_mut(&mut self) -> (&mut [f32], &mut [f32]) {
         let planes = self.rgb.as_slice_mut().zip(self.depth.as_slice_mut());
         planes.expect("both are made in standard layout")
@@ -129,6 +131,7 @@ impl RgbdFrame {
     }
 
     /// The amplitudes and the normalized depth as they lie in memory.
+    #[doc(hidden)]
     pub fn values(&self) -> (&[f32], &[f32]) {
         let contiguous = "standard layout";
         (
@@ -139,6 +142,7 @@ impl RgbdFrame {
 
     /// # Errors
     /// Another shape than a plan's, or other colours.
+    #[doc(hidden)]
     pub fn check(&self, plan: (usize, usize), colours: usize) -> Result<()> {
         let (height, width) = self.shape();
         if (height, width) != plan {

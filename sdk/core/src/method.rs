@@ -40,6 +40,7 @@ impl Method {
     }
 
     /// Whether it suits `display`.
+    #[doc(hidden)]
     pub fn check(&self, display: &Display) -> Result<()> {
         let (network, input) = match self {
             Method::Sweep(_) => return Ok(()),

@@ -25,6 +25,8 @@ pub struct Pipeline {
 pub struct PipelineScratch {
     method: MethodScratch,
     modulator: ModulatorScratch,
+    /// [`Pipeline::process`]'s own field; empty before its first call.
+    field: Vec<Complex32>,
 }
 
 /// How long each stage of a frame took.
@@ -58,6 +60,7 @@ pub struct FrameReport {
 
 impl PipelineScratch {
     /// Has frames end where `cancel` is requested.
+    #[doc(hidden)]
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.method.set_cancel(cancel);
         self.modulator.set_cancel(cancel);
@@ -88,6 +91,7 @@ impl Pipeline {
     }
 
     /// The plan of the method.
+    #[doc(hidden)]
     pub fn method(&self) -> &MethodPlan {
         &self.method
     }
@@ -97,6 +101,7 @@ impl Pipeline {
         PipelineScratch {
             method: self.method.scratch(),
             modulator: self.modulator.scratch(),
+            field: Vec::new(),
         }
     }
 
@@ -105,6 +110,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// A frame of another shape.
+    #[doc(hidden)]
     pub fn field(
         &self,
         frame: &RgbdFrame,
@@ -115,6 +121,7 @@ impl Pipeline {
     }
 
     /// [`Self::field`] of a frame that `follows` the one before.
+    #[doc(hidden)]
     pub fn field_after(
         &self,
         follows: bool,
@@ -138,11 +145,13 @@ impl Pipeline {
     ///
     /// # Panics
     /// If `field` or `levels` has not C·H·W values.
+    #[doc(hidden)]
     pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut PipelineScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
     /// [`Modulator::modulate_after`].
+    #[doc(hidden)]
     pub fn modulate_after(
         &self,
         past: Option<Past>,
@@ -155,6 +164,7 @@ impl Pipeline {
     }
 
     /// [`Modulator::modulate_words_after`].
+    #[doc(hidden)]
     pub fn modulate_words_after(
         &self,
         past: Option<Past>,
@@ -170,6 +180,7 @@ impl Pipeline {
     ///
     /// # Panics
     /// If `field`, `phases` or `words` has not C·H·W values.
+    #[doc(hidden)]
     pub fn modulate_words(
         &self,
         field: &mut [Complex32],
@@ -180,18 +191,27 @@ impl Pipeline {
         (self.modulator).modulate_words(field, phases, words, &mut scratch.modulator)
     }
 
-    /// One frame: its field into `field` and its levels into `levels`, both (C, H, W). `field` is worked
-    /// on: what it holds afterwards means nothing.
+    /// Writes the levels of `frame` into `levels`, (C, H, W). The first call with a scratch allocates the field in it,
+    /// later ones allocate nothing.
     ///
     /// # Errors
     /// A frame of another shape.
     ///
     /// # Panics
     /// If `levels` has not C·H·W values.
-    pub fn process(
+    pub fn process(&self, frame: &RgbdFrame, levels: &mut [u8], scratch: &mut PipelineScratch) -> Result<FrameReport> {
+        let mut field = std::mem::take(&mut scratch.field);
+        let (height, width) = self.shape();
+        field.resize(self.colours() * height * width, Complex32::ZERO);
+        let report = self.process_in(&mut field, frame, levels, scratch);
+        scratch.field = field;
+        report
+    }
+
+    fn process_in(
         &self,
-        frame: &RgbdFrame,
         field: &mut [Complex32],
+        frame: &RgbdFrame,
         levels: &mut [u8],
         scratch: &mut PipelineScratch,
     ) -> Result<FrameReport> {
@@ -206,6 +226,17 @@ impl Pipeline {
                 encode: modulation.encode,
             },
         })
+    }
+
+    /// The levels of `frame`, (C, H, W), in new memory. For frame after frame, [`Self::process`] is faster.
+    ///
+    /// # Errors
+    /// A frame of another shape.
+    pub fn levels(&self, frame: &RgbdFrame) -> Result<Vec<u8>> {
+        let (height, width) = self.shape();
+        let mut levels = vec![0; self.colours() * height * width];
+        self.process(frame, &mut levels, &mut self.scratch())?;
+        Ok(levels)
     }
 }
 
@@ -257,7 +288,7 @@ mod tests {
             let untouched = Complex32::new(1.5, -2.5);
             let run = |scratch: &mut PipelineScratch| {
                 let (mut field, mut levels) = (vec![untouched; values], vec![77; values]);
-                pipeline.process(&frame, &mut field, &mut levels, scratch).unwrap();
+                pipeline.process_in(&mut field, &frame, &mut levels, scratch).unwrap();
                 (field, levels)
             };
             let whole = run(&mut pipeline.scratch());

@@ -40,9 +40,8 @@ pub fn probe(device: &Arc<Device>, job: &Job) -> Result<()> {
     let frame = frame()?;
     let cpu = job.on_cpu()?;
     let mut scratch = cpu.scratch();
-    let mut field = vec![Complex32::ZERO; size];
     let mut expected = vec![0; size];
-    cpu.process(&frame, &mut field, &mut expected, &mut scratch)?;
+    cpu.process(&frame, &mut expected, &mut scratch)?;
     let mut levels = vec![0; size];
     // Twice: what one frame leaves behind must not reach the next.
     for _ in 0..2 {

@@ -262,8 +262,7 @@ fn on_cpu(job: &Job, frame: &RgbdFrame) -> (Vec<u8>, f32) {
     let (h, w) = job.shape;
     let plan = job.on_cpu().unwrap();
     let mut levels = vec![0; 3 * h * w];
-    let mut field = vec![Complex32::ZERO; 3 * h * w];
-    let report = plan.process(frame, &mut field, &mut levels, &mut plan.scratch());
+    let report = plan.process(frame, &mut levels, &mut plan.scratch());
     (levels, report.unwrap().scale)
 }
 

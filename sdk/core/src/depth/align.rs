@@ -68,6 +68,7 @@ impl Cameras {
     ///
     /// # Panics
     /// If the lengths are not h·w.
+    #[doc(hidden)]
     pub fn reproject(
         &self,
         (height, width): (usize, usize),

@@ -46,6 +46,7 @@ impl DepthFormat {
 
     /// The reading in `pixel`, [`Self::pixel_bytes`] of them, and its confidence: metres, or normalized depth where
     /// the format is; NaN where there is none.
+    #[doc(hidden)]
     pub fn reading(self, pixel: &[u8]) -> (f32, f32) {
         let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
         let f16_at = || f16::from_le_bytes([pixel[0], pixel[1]]).to_f32();
@@ -85,6 +86,7 @@ pub enum ConfidenceFormat {
 
 impl ConfidenceFormat {
     /// The confidence that `byte` stands for, in 0..=1.
+    #[doc(hidden)]
     pub fn confidence(self, byte: u8) -> f32 {
         match self {
             ConfidenceFormat::LowMediumHigh => f32::from(byte.min(2)) / 2.0,

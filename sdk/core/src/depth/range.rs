@@ -21,6 +21,7 @@ pub enum DepthRange {
 impl DepthRange {
     /// # Errors
     /// Fixed metres that are no range.
+    #[doc(hidden)]
     pub fn check(self) -> Result<()> {
         match self {
             DepthRange::Fixed { near_m, far_m } if !(near_m >= 0.0 && near_m < far_m && far_m.is_finite()) => {

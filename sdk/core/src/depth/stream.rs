@@ -33,6 +33,7 @@ impl Default for DepthOptions {
 impl DepthOptions {
     /// # Errors
     /// A range that is none, or a confidence outside 0..=1.
+    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         if !(0.0..=1.0).contains(&self.least_confidence) {
             return Err(Error::Plan(format!(

@@ -59,11 +59,13 @@ impl Illumination {
     }
 
     /// (Gh, Gw).
+    #[doc(hidden)]
     pub fn nodes(&self) -> (usize, usize) {
         self.nodes
     }
 
     /// One over the amplitude of each node, (C, Gh, Gw), at least 1, at most [`MAX_GAIN`].
+    #[doc(hidden)]
     pub fn gains(&self) -> &[f32] {
         &self.gain
     }
@@ -73,6 +75,7 @@ impl Illumination {
     ///
     /// # Panics
     /// If it has no such colour or the pixel is outside.
+    #[doc(hidden)]
     pub fn gain(&self, colour: usize, y: usize, x: usize, (height, width): (usize, usize)) -> f32 {
         assert!(y < height && x < width);
         let (i, fy) = split(y, height, self.nodes.0);
@@ -94,6 +97,7 @@ impl Illumination {
     ///
     /// # Panics
     /// If `field` has not C·H·W values.
+    #[doc(hidden)]
     pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value *= gain);
     }
@@ -103,11 +107,13 @@ impl Illumination {
     ///
     /// # Panics
     /// If `field` has not C·H·W values.
+    #[doc(hidden)]
     pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value /= gain);
     }
 
     /// [`Self::divide`] for row `row` of a stack of planes of `height` rows.
+    #[doc(hidden)]
     pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: (usize, usize)) {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }

@@ -78,6 +78,7 @@ impl Flatness {
     }
 
     /// (1 or 3, H, W), in turns of 2π/65536.
+    #[doc(hidden)]
     pub fn maps(&self) -> &[u16] {
         &self.maps
     }
@@ -85,11 +86,13 @@ impl Flatness {
 
 impl Panel {
     /// Whether it adds nothing, so that the response alone makes levels of phases.
+    #[doc(hidden)]
     pub fn is_plain(&self) -> bool {
         !self.adds() && !self.goes_on()
     }
 
     /// Whether it adds phases.
+    #[doc(hidden)]
     pub fn adds(&self) -> bool {
         self.carrier_rad != [0.0; 2] || self.lens_m.is_some() || self.flatness.is_some()
     }
@@ -104,6 +107,7 @@ impl Panel {
     /// # Errors
     /// A map for another modulator or other colours; a carrier and a lens that turn the phase by over half a turn from
     /// pixel to pixel.
+    #[doc(hidden)]
     pub fn check(&self, display: &Display) -> Result<()> {
         let (height, width) = (display.height(), display.width());
         if let Some(flatness) = &self.flatness

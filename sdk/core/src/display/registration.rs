@@ -23,12 +23,14 @@ const REACH: usize = 4;
 
 impl Registration {
     /// Whether any colour is moved.
+    #[doc(hidden)]
     pub fn moves(&self) -> bool {
         self.shift_px.iter().any(|shift| *shift != [0.0; 2]) || self.scale.iter().any(|scale| *scale != 1.0)
     }
 
     /// # Errors
     /// Another number of colours, a shift of over 1000 pixels, or a scale outside 0.8 to 1.25.
+    #[doc(hidden)]
     pub fn check(&self, colours: usize) -> Result<()> {
         for (what, count) in [("shift_px", self.shift_px.len()), ("scale", self.scale.len())] {
             if count > 0 {

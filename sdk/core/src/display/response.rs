@@ -107,6 +107,7 @@ impl Response {
     ///
     /// # Errors
     /// A table for fewer pixels.
+    #[doc(hidden)]
     pub fn centred(self, height: usize, width: usize) -> Result<Self> {
         match self {
             Response::PerPixel(table) if table.shape() != (height, width) => {
@@ -117,6 +118,7 @@ impl Response {
     }
 
     /// The shape that the response is made for, (H, W); None where it suits any.
+    #[doc(hidden)]
     pub fn shape(&self) -> Option<(usize, usize)> {
         match self {
             Response::PerPixel(table) => Some(table.shape()),
@@ -128,6 +130,7 @@ impl Response {
     ///
     /// # Panics
     /// If `at` is outside the shape that the response is made for.
+    #[doc(hidden)]
     pub fn level(&self, phase: f32, at: usize) -> u8 {
         match self {
             Response::Linear { bits } => step(phase, 1 << bits) as u8,
@@ -140,6 +143,7 @@ impl Response {
     ///
     /// # Panics
     /// As [`Self::level`].
+    #[doc(hidden)]
     pub fn phase(&self, level: u8, at: usize) -> f32 {
         match self {
             Response::Linear { bits } => {
@@ -157,6 +161,7 @@ impl Response {
     /// # Panics
     /// If the lengths differ, or the response is made for a shape whose row ends before.
     #[inline(always)]
+    #[doc(hidden)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         match self {

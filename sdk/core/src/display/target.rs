@@ -70,6 +70,7 @@ impl Default for Target {
 impl Target {
     /// # Errors
     /// A table or a map for another modulator or another number of lasers, or a table for a display of over 8 bits.
+    #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         let colours = self.display.colours();
         if let Response::PerPixel(table) = &self.response {
@@ -110,6 +111,7 @@ impl Target {
     ///
     /// # Errors
     /// A distance or correction that moves light farther than can be padded.
+    #[doc(hidden)]
     pub fn propagators(
         &self,
         (height, width): (usize, usize),

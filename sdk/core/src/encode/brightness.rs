@@ -20,6 +20,7 @@ pub enum Brightness {
 impl Brightness {
     /// # Errors
     /// A fixed scale that is not positive.
+    #[doc(hidden)]
     pub fn check(self) -> Result<()> {
         match self {
             Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(format!(
@@ -30,6 +31,7 @@ impl Brightness {
     }
 
     /// The scale of `field`, which a smoothed one comes to from `past`; None for the field's largest amplitude.
+    #[doc(hidden)]
     pub fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
         match self {
             Brightness::FrameMax => None,

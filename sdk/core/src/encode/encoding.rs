@@ -60,6 +60,7 @@ impl Encoding {
     ];
 
     /// Whether it was trained on the phase that a network's field has.
+    #[doc(hidden)]
     pub fn keeps_phase(&self) -> bool {
         matches!(self, Encoding::Deep(_))
     }

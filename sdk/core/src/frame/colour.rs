@@ -57,6 +57,7 @@ impl ColourFormat {
     }
 
     /// The names of the planes in errors, the bytes of a pixel in each, and how many pixels share one.
+    #[doc(hidden)]
     pub fn layout(self) -> &'static [(&'static str, usize, usize)] {
         match self {
             ColourFormat::Rgba => &[("RGBA colour", 4, 1)],

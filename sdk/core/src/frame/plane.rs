@@ -105,6 +105,7 @@ impl Orientation {
     }
 
     /// Whether the upright picture runs against the sensor along x and along y.
+    #[doc(hidden)]
     pub fn flips(self) -> (bool, bool) {
         let (x, y) = match self.rotation {
             Rotation::Upright => (false, false),
@@ -116,6 +117,7 @@ impl Orientation {
     }
 
     /// The sensor's pixel (x, y) that upright pixel (`x`, `y`) shows, for a sensor of (`height`, `width`).
+    #[doc(hidden)]
     pub fn sensor_pixel(self, x: usize, y: usize, (height, width): (usize, usize)) -> (usize, usize) {
         let (_, upright_width) = self.upright_shape(height, width);
         let x = if self.mirrored { upright_width - 1 - x } else { x };
@@ -128,6 +130,7 @@ impl Orientation {
     }
 
     /// The upright picture of `plane`, which holds a sensor's (`height`, `width`).
+    #[doc(hidden)]
     pub fn view(self, plane: &Plane<'_>, (height, width): (usize, usize)) -> View {
         let at = |(x, y): (usize, usize)| (y * plane.row_stride + x * plane.pixel_stride) as isize;
         let (upright_height, upright_width) = self.upright_shape(height, width);

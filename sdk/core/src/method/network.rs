@@ -155,6 +155,7 @@ impl Network {
     }
 
     /// The chain itself: layers, filters, weights, quantisation.
+    #[doc(hidden)]
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
@@ -170,16 +171,19 @@ impl Network {
     }
 
     /// The numbers that the file's layers compute in.
+    #[doc(hidden)]
     pub fn precision(&self) -> Precision {
         self.chain.precision
     }
 
     /// What the input planes are.
+    #[doc(hidden)]
     pub fn input(&self) -> InputKind {
         self.input
     }
 
     /// What the output planes are.
+    #[doc(hidden)]
     pub fn head(&self) -> Head {
         self.head
     }
@@ -195,6 +199,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Network`] for a display of a larger λ·V/p², or one whose lasers differ by over 5 % from one stretch.
+    #[doc(hidden)]
     pub fn depth_scale(&self, display: &Display) -> Result<f32> {
         Ok(depth_scale(self.display.serve(display)?))
     }
@@ -204,6 +209,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Self::depth_scale`].
+    #[doc(hidden)]
     pub fn colour(&self, display: &Display) -> Result<Option<usize>> {
         Ok(self.display.serve(display)?.colour)
     }
@@ -220,6 +226,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Self::depth_scale`], or an offset that differs by over 20 µm at the pitch it was trained for.
+    #[doc(hidden)]
     pub fn check_prefilter(&self, display: &Display) -> Result<()> {
         self.display.check_offset(display)
     }
@@ -234,6 +241,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Self::plan`] and [`Self::depth_scale`].
+    #[doc(hidden)]
     pub fn plan_for(&self, height: usize, width: usize, display: &Display) -> Result<NetworkPlan> {
         let served = self.display.serve(display)?;
         Ok(NetworkPlan {
@@ -248,6 +256,7 @@ impl Network {
     ///
     /// # Errors
     /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
+    #[doc(hidden)]
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         match FusedChain::new(&self.chain, None) {
             Ok(chain) => self.fused_plan(height, width, chain),
@@ -268,6 +277,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Network::plan`]; [`Error::Plan`] where this processor or those kernels cannot.
+    #[doc(hidden)]
     pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
         let chain = FusedChain::new(&self.chain, Some(isa));
         self.fused_plan(
@@ -298,6 +308,7 @@ impl Network {
     /// # Errors
     /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
     /// empty field or one too large.
+    #[doc(hidden)]
     pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
         if !self.input.is_field() {
             return Err(Error::Network(format!(
@@ -323,6 +334,7 @@ impl Network {
     ///
     /// # Errors
     /// As [`Self::filter_plan`] and [`Self::depth_scale`].
+    #[doc(hidden)]
     pub fn filter_plan_for(&self, height: usize, width: usize, display: &Display) -> Result<FilterPlan> {
         Ok(FilterPlan {
             colour: self.colour(display)?,

@@ -140,6 +140,7 @@ impl Device {
     ///
     /// # Errors
     /// An unknown key, or what cannot be.
+    #[doc(hidden)]
     pub fn from_table(mut table: toml::Table) -> Result<Self> {
         keys::check(&table, &[&keys::DISPLAY[..], &keys::DEVICE].concat())?;
         let own: toml::Table = (keys::DEVICE.iter())

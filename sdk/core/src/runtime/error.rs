@@ -45,6 +45,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     /// The same of one part of what was given, which `part` names.
+    #[doc(hidden)]
     pub fn of(self, part: &str) -> Self {
         let named = |why: String| format!("{part}: {why}");
         match self {

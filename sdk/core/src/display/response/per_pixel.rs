@@ -223,26 +223,31 @@ impl PerPixel {
     }
 
     /// The first row and column of the modulator that its stacks cover.
+    #[doc(hidden)]
     pub fn corner(&self) -> (usize, usize) {
         self.corner
     }
 
     /// Pixels from node to node.
+    #[doc(hidden)]
     pub fn spacing(&self) -> usize {
         self.spacing
     }
 
     /// Intervals of phase, K.
+    #[doc(hidden)]
     pub fn intervals(&self) -> usize {
         self.intervals
     }
 
     /// The knots of all nodes, (C, Gh, Gw, K+1), in levels.
+    #[doc(hidden)]
     pub fn knots(&self) -> &[f32] {
         &self.levels
     }
 
     /// The phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest one.
+    #[doc(hidden)]
     pub fn turns(&self) -> &[f32] {
         &self.turn
     }
@@ -252,6 +257,7 @@ impl PerPixel {
     ///
     /// # Panics
     /// If `at` is outside the stack.
+    #[doc(hidden)]
     pub fn level(&self, phase: f32, at: usize) -> u8 {
         let turn = self.interpolate(at, |node| self.turn[node]);
         let phase = if phase >= turn { 0.0 } else { phase };
@@ -302,6 +308,7 @@ impl PerPixel {
     /// # Panics
     /// If the lengths differ or the row ends before them.
     #[inline(always)]
+    #[doc(hidden)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
         assert_eq!(phases.len(), levels.len());
         let (colour, y, x) = self.place(first);
@@ -354,6 +361,7 @@ impl PerPixel {
     }
 
     /// The phase that `level` shows at value `at` of a stack: the smallest whose curve reaches it, in \[0, 2π).
+    #[doc(hidden)]
     pub fn phase(&self, level: u8, at: usize) -> f32 {
         let knots = self.intervals + 1;
         let value = |k: usize| self.interpolate(at, |node| self.levels[node * knots + k]);
