@@ -35,11 +35,10 @@
 //! | [`target`] | what it is made for: display, modulator's response, lasers' light, correction of the optics |
 //! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
 //! | [`Pipeline`] | one frame through all stages, by hand |
-//! | [`output`] | levels to the images that a modulator takes, and back |
-//! | [`device`] | modulators that can be bought, as data |
+//! | [`output`] | levels to the images that a modulator takes, and back; modulators that can be bought |
 //! | [`unstable`] | what the laboratory and the tests need; it changes without notice |
 //!
-//! The networks that come along are in the crate `phasefront-models`.
+//! The bundled networks are in the crate `phasefront-models`.
 //!
 //! # Features
 //!
@@ -69,19 +68,33 @@
 
 pub use {ndarray, num_complex};
 
+#[cfg(feature = "gpu")]
+#[cfg_attr(docsrs, doc(cfg(feature = "gpu")))]
+pub mod gpu {
+    //! Which GPU a session computes on, and how.
+    pub use crate::session::GpuOptions;
+    pub use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
+}
+#[doc(hidden)]
 pub mod device {
-    //! Modulators that can be bought, as data.
-    pub use phasefront_core::output::modulator::*;
+    pub use phasefront_core::output::modulator::{ModulatorSpec as Device, Packing};
 }
 pub mod input;
 pub mod output {
-    //! Levels to the images that a modulator takes, and back.
+    //! Levels to the images that a modulator takes, and back; modulators that can be bought, as data.
+    pub use phasefront_core::output::modulator::{ModulatorSpec, Packing};
     pub use phasefront_core::output::{BitPlanes, Cells, Layout, Levels, Output, Placement, Split};
 }
 pub mod session;
 pub mod target {
-    //! What a hologram is made for: a display, its modulator's response, its lasers' light, its correction.
-    pub use phasefront_core::display::target::*;
+    //! What a hologram is made for beside its [`Display`](crate::Display): the modulator's response, the lasers' light, the
+    //! correction of the optics.
+    pub use phasefront_core::display::illumination::Illumination;
+    pub use phasefront_core::display::panel::{Flatness, Panel};
+    pub use phasefront_core::display::registration::Registration;
+    pub use phasefront_core::display::response::Response;
+    pub use phasefront_core::display::response::per_pixel::PerPixel;
+    pub use phasefront_core::optics::zernike::{Aberration, Coefficients};
 }
 #[cfg_attr(surface, doc(hidden))]
 pub mod unstable;

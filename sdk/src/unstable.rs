@@ -10,7 +10,11 @@ pub use phasefront_core::method::network;
 pub use phasefront_core::method::seeded;
 pub use phasefront_core::method::sweep;
 pub use phasefront_core::optics as wave;
-pub use phasefront_core::pipeline::display_plan as modulator;
+pub mod modulator {
+    pub use phasefront_core::pipeline::display_plan::DisplayPlan as Modulator;
+    pub use phasefront_core::pipeline::display_plan::*;
+}
+
 pub use phasefront_core::runtime::file;
 pub use phasefront_core::runtime::keys;
 pub use phasefront_core::view::preview;

@@ -9,7 +9,7 @@ use phasefront_core::encode::Encoding;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_core::output::BitPlanes;
-use phasefront_core::output::modulator::{Device, Packing};
+use phasefront_core::output::modulator::{ModulatorSpec, Packing};
 
 const SIZE: (usize, usize) = (540, 960);
 
@@ -55,7 +55,7 @@ fn remove_mean_phase(bencher: Bencher<'_, '_>) {
 /// 24 maps of 16 levels into a frame of 1920×1080 cells.
 #[divan::bench(args = [1, 2])]
 fn pack_24_maps(bencher: Bencher<'_, '_>, threads: usize) {
-    let device = Device::shipped("ti-plm-p47").unwrap();
+    let device = ModulatorSpec::shipped("ti-plm-p47").unwrap();
     let Packing::BitPlanes(cells) = &device.packing else {
         unreachable!("it has cells")
     };

@@ -8,7 +8,7 @@ use crate::encode::EncoderOptions;
 use crate::encode::brightness::Past;
 use crate::frame::RgbdFrame;
 use crate::method::{Method, MethodPlan, MethodScratch};
-use crate::pipeline::display_plan::{Modulation, Modulator, ModulatorScratch, remove_mean_phase};
+use crate::pipeline::display_plan::{DisplayPlan, DisplayScratch, Modulation, remove_mean_phase};
 use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use crate::runtime::stage::stage;
@@ -18,13 +18,13 @@ use std::time::Duration;
 /// A plan for one frame shape, method and target. Immutable; shared between threads.
 pub struct Pipeline {
     method: MethodPlan,
-    modulator: Modulator,
+    display: DisplayPlan,
 }
 
 /// Working memory of a [`Pipeline`] for one frame at a time.
 pub struct PipelineScratch {
     method: MethodScratch,
-    modulator: ModulatorScratch,
+    display: DisplayScratch,
     /// [`Pipeline::process`]'s own field; empty before its first call.
     field: Vec<Complex32>,
 }
@@ -63,7 +63,7 @@ impl PipelineScratch {
     #[doc(hidden)]
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.method.set_cancel(cancel);
-        self.modulator.set_cancel(cancel);
+        self.display.set_cancel(cancel);
     }
 }
 
@@ -76,13 +76,13 @@ impl Pipeline {
     pub fn new(shape: (usize, usize), method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
         let method = MethodPlan::new(shape.0, shape.1, method, &target.display)?;
         // The modulator does the rest of the way.
-        let modulator = Modulator::from_z(shape, method.z_m(), target, options)?;
-        Ok(Pipeline { method, modulator })
+        let display = DisplayPlan::from_z(shape, method.z_m(), target, options)?;
+        Ok(Pipeline { method, display })
     }
 
     /// How many colours its frames, fields and levels have, C: as many as the display has lasers.
     pub fn colours(&self) -> usize {
-        self.modulator.colours()
+        self.display.colours()
     }
 
     /// (H, W).
@@ -100,7 +100,7 @@ impl Pipeline {
     pub fn scratch(&self) -> PipelineScratch {
         PipelineScratch {
             method: self.method.scratch(),
-            modulator: self.modulator.scratch(),
+            display: self.display.scratch(),
             field: Vec::new(),
         }
     }
@@ -132,16 +132,16 @@ impl Pipeline {
         let stage = stage!("method");
         let of_method = &mut scratch.method;
         self.method.field_after(follows, frame, field, of_method)?;
-        if !self.modulator.keeps_phase() {
-            remove_mean_phase(field, self.modulator.colours());
+        if !self.display.keeps_phase() {
+            remove_mean_phase(field, self.display.colours());
         }
         let method = stage.end();
         let stage = stage!("propagate");
-        self.modulator.propagate(field, &mut scratch.modulator);
+        self.display.propagate(field, &mut scratch.display);
         Ok((method, stage.end()))
     }
 
-    /// Encodes a field at the modulator, (C, H, W), into `levels`, as [`Modulator::modulate`].
+    /// Encodes a field at the modulator, (C, H, W), into `levels`, as [`DisplayPlan::modulate`].
     ///
     /// # Panics
     /// If `field` or `levels` has not C·H·W values.
@@ -150,7 +150,7 @@ impl Pipeline {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Modulator::modulate_after`].
+    /// [`DisplayPlan::modulate_after`].
     #[doc(hidden)]
     pub fn modulate_after(
         &self,
@@ -159,11 +159,10 @@ impl Pipeline {
         levels: &mut [u8],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        self.modulator
-            .modulate_after(past, field, levels, &mut scratch.modulator)
+        self.display.modulate_after(past, field, levels, &mut scratch.display)
     }
 
-    /// [`Modulator::modulate_words_after`].
+    /// [`DisplayPlan::modulate_words_after`].
     #[doc(hidden)]
     pub fn modulate_words_after(
         &self,
@@ -173,10 +172,10 @@ impl Pipeline {
         words: &mut [u16],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        (self.modulator).modulate_words_after(past, field, phases, words, &mut scratch.modulator)
+        (self.display).modulate_words_after(past, field, phases, words, &mut scratch.display)
     }
 
-    /// [`Modulator::modulate_words`].
+    /// [`DisplayPlan::modulate_words`].
     ///
     /// # Panics
     /// If `field`, `phases` or `words` has not C·H·W values.
@@ -188,7 +187,7 @@ impl Pipeline {
         words: &mut [u16],
         scratch: &mut PipelineScratch,
     ) -> Modulation {
-        (self.modulator).modulate_words(field, phases, words, &mut scratch.modulator)
+        (self.display).modulate_words(field, phases, words, &mut scratch.display)
     }
 
     /// Writes the levels of `frame` into `levels`, (C, H, W). The first call with a scratch allocates the field in it,

@@ -12,9 +12,14 @@ use network_models::Model;
 use num_complex::Complex32;
 use phasefront_core::depth::refine::Refiner;
 use phasefront_core::display::Display;
+use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::panel::Flatness;
+use phasefront_core::display::panel::Panel;
+use phasefront_core::display::registration::Registration;
+use phasefront_core::display::response::Response;
 use phasefront_core::display::response::per_pixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::display::target::Target;
-use phasefront_core::display::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
 use phasefront_core::encode::Encoding;
 use phasefront_core::frame::RgbdFrame;
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
@@ -25,8 +30,9 @@ use phasefront_core::method::network::Network;
 use phasefront_core::method::sweep::Sweep;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::optics::zernike::Aberration;
 use phasefront_core::pipeline::Pipeline;
-use phasefront_core::pipeline::display_plan::Modulator;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::preview::Preview;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -154,7 +160,7 @@ fn hot_calls_allocate_nothing() {
                 Encoding::BAND_LIMIT,
                 Encoding::Deep(prefilter.clone()),
             ] {
-                let plan = Modulator::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
+                let plan = DisplayPlan::new((h, w), &(&display).into(), &encoding.clone().into()).unwrap();
                 let mut scratch = plan.scratch();
                 let frame = || {
                     plan.propagate(&mut field, &mut scratch);
@@ -163,7 +169,7 @@ fn hot_calls_allocate_nothing() {
                 assert_eq!(count(frame), 0, "{encoding:?}");
             }
             let target = calibrated(&display, (h, w));
-            let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
+            let plan = DisplayPlan::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
             let mut scratch = plan.scratch();
             let frame = || {
                 plan.propagate(&mut field, &mut scratch);

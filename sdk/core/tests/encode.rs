@@ -6,8 +6,9 @@ mod reference;
 
 use ndarray::{Array2, Array3};
 use phasefront_core::display::Display;
+use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
-use phasefront_core::display::target::{Illumination, Response};
 use phasefront_core::encode::Encoder;
 use phasefront_core::encode::band_limit::BandLimit;
 use phasefront_core::encode::brightness::Brightness;
@@ -16,7 +17,7 @@ use phasefront_core::encode::midpoint::{self, MidpointSteps};
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::optics::asm::{Padding, Propagator};
-use phasefront_core::pipeline::display_plan::Modulator;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use reference::test_plane;
 use rustfft::num_complex::{Complex32, Complex64};
 
@@ -314,7 +315,7 @@ fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
             brightness: Brightness::Fixed(1.2),
             ..Default::default()
         };
-        let plan = Modulator::new(shape, &target, &options).unwrap();
+        let plan = DisplayPlan::new(shape, &target, &options).unwrap();
         let mut levels = vec![0; 3 * h * w];
         plan.modulate(&mut field.clone(), &mut levels, &mut plan.scratch());
         levels

@@ -9,9 +9,13 @@ mod reference;
 use ndarray::{Array2, Array3};
 use network_models::Model;
 use phasefront_core::display::Display;
+use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::panel::Flatness;
+use phasefront_core::display::panel::Panel;
+use phasefront_core::display::response::Response;
 use phasefront_core::display::response::per_pixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::display::target::Target;
-use phasefront_core::display::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Response};
 use phasefront_core::encode::anti_alias::AntiAlias;
 use phasefront_core::encode::brightness::Brightness;
 use phasefront_core::encode::{Encoder, double_phase};
@@ -22,8 +26,9 @@ use phasefront_core::method::network::Network;
 use phasefront_core::optics;
 use phasefront_core::optics::aperture::{Aperture, Opening};
 use phasefront_core::optics::asm::{self, Padding, Propagator};
+use phasefront_core::optics::zernike::Aberration;
 use phasefront_core::pipeline::Pipeline;
-use phasefront_core::pipeline::display_plan::Modulator;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use reference::{relative_error, test_plane, widen};
 use rustfft::num_complex::{Complex32, Complex64};
@@ -306,7 +311,7 @@ fn deep_encoding(input: &'static str) {
     let (h, w) = (40, 33);
     let plan = |display: &Display, network: &Arc<Network>| {
         let options = largest(Encoding::Deep(network.clone()));
-        Modulator::new((h, w), &display.into(), &options)
+        DisplayPlan::new((h, w), &display.into(), &options)
     };
     let modulator = plan(&display, &network).unwrap();
     assert!(modulator.keeps_phase());
@@ -351,7 +356,7 @@ fn a_correction_is_part_of_the_offset() {
             correction: Some(a.clone()),
             ..Target::from(&display)
         };
-        let plan = Modulator::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
+        let plan = DisplayPlan::new((h, w), &target, &Encoding::DoublePhase.into()).unwrap();
         let mut field: Vec<_> = (0..3).flat_map(|c| test_plane(shape, 50 + c)).collect();
         let given = field.clone();
         plan.propagate(&mut field, &mut plan.scratch());
@@ -399,7 +404,7 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
         brightness: Brightness::Fixed(2.5),
         ..EncoderOptions::plain(Encoding::ANTI_ALIAS)
     };
-    let plan = Modulator::new((h, w), &target, &options).unwrap();
+    let plan = DisplayPlan::new((h, w), &target, &options).unwrap();
     let mut field: Vec<_> = (0..3).flat_map(|c| test_plane((h, w), 60 + c)).collect();
     let mut filtered = field.clone();
     let mut levels = vec![0; 3 * h * w];
@@ -438,7 +443,7 @@ fn a_panel_adds_its_phases_after_the_encoder() {
             ..Encoding::ANTI_ALIAS.into()
         };
         let [before, after] = [&plain, &added].map(|target| {
-            let plan = Modulator::new((h, w), target, &options).unwrap();
+            let plan = DisplayPlan::new((h, w), target, &options).unwrap();
             let (mut field, mut scratch) = (field.clone(), plan.scratch());
             let mut words = vec![0; 3 * h * w];
             if bits > 8 {

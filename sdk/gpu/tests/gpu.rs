@@ -12,7 +12,8 @@ use ndarray::{Array2, Array3};
 use network_models::{Model, frame};
 use num_complex::Complex32;
 use phasefront_core::display::Display;
-use phasefront_core::display::target::{Aberration, Illumination, Response};
+use phasefront_core::display::illumination::Illumination;
+use phasefront_core::display::response::Response;
 use phasefront_core::encode::brightness::Brightness;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::frame::RgbdFrame;
@@ -21,6 +22,7 @@ use phasefront_core::method::Method;
 use phasefront_core::method::network::Network;
 use phasefront_core::method::network::{Isa, reference};
 use phasefront_core::method::sweep::Sweep;
+use phasefront_core::optics::zernike::Aberration;
 use phasefront_gpu::{
     self, ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, DeviceOptions, Float, Frame, Fusion,
     GpuNetworkPlan, GpuPipeline, Job,

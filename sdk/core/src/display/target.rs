@@ -11,14 +11,13 @@
 
 mod file;
 
-pub use crate::display::illumination::Illumination;
-pub use crate::display::panel::{Flatness, Panel};
-pub use crate::display::registration::Registration;
-pub use crate::display::response::Response;
-pub use crate::display::response::per_pixel::PerPixel;
+use crate::display::illumination::Illumination;
+use crate::display::panel::Panel;
+use crate::display::registration::Registration;
+use crate::display::response::Response;
 use crate::display::{Display, check_colours};
 use crate::optics::asm::{Padding, Propagator};
-pub use crate::optics::zernike::Aberration;
+use crate::optics::zernike::Aberration;
 use crate::runtime::error::{Error, Result};
 
 /// A display, and what a calibration found of it. A hologram smaller than the modulator stands in its middle.

@@ -189,6 +189,7 @@ impl Network {
     }
 
     /// The display it was trained for; another needs another network.
+    #[doc(hidden)]
     pub fn display(&self) -> &TrainedDisplay {
         &self.display
     }

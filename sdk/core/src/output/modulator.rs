@@ -2,15 +2,17 @@
 //! frame. Each is a TOML file, those in `sdk/core/devices` come along, and users have their own beside them.
 //!
 //! ```
-//! use phasefront::device::Device;
+//! use phasefront::output::ModulatorSpec;
 //!
-//! let device = Device::shipped("ti-plm-p47")?;
+//! let device = ModulatorSpec::shipped("ti-plm-p47")?;
 //! assert_eq!((device.display.width(), device.display.bits()), (960, 4));
 //! # Ok::<(), phasefront::Error>(())
 //! ```
 
 use crate::display::Display;
-use crate::display::target::{Panel, Response, Target};
+use crate::display::panel::Panel;
+use crate::display::response::Response;
+use crate::display::target::Target;
 use crate::output::{Cells, Layout, Split};
 use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
@@ -19,7 +21,7 @@ use std::collections::BTreeMap;
 
 /// A modulator as its file describes it.
 #[derive(Debug, Clone)]
-pub struct Device {
+pub struct ModulatorSpec {
     /// What it is called.
     pub name: String,
     /// The physics; what the file leaves out has the value of [`Display::default`].
@@ -53,7 +55,7 @@ pub enum Packing {
 /// The file's keys beside those of [`Display`].
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct DeviceToml {
+struct ModulatorToml {
     #[serde(default)]
     name: String,
     packing: Option<PackingToml>,
@@ -109,7 +111,7 @@ fn refuse(what: impl std::fmt::Display) -> Error {
     Error::Display(what.to_string())
 }
 
-impl Device {
+impl ModulatorSpec {
     /// The names of the devices that come along.
     pub fn names() -> impl Iterator<Item = &'static str> {
         SHIPPED.iter().map(|(name, _)| *name)
@@ -147,7 +149,7 @@ impl Device {
             .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
             .collect();
         let display = Display::deserialize(table).map_err(|e| refuse(keys::message(&e)))?;
-        let own = DeviceToml::deserialize(own).map_err(|e| match keys::message(&e) {
+        let own = ModulatorToml::deserialize(own).map_err(|e| match keys::message(&e) {
             message if message.contains("untagged") => refuse(format!(
                 "packing must be {}, or say which bits red, green and blue hold, or memory and layout of cells",
                 NAMED.map(|(name, _)| name).join(", ")
@@ -167,7 +169,7 @@ impl Device {
                 "rate_hz is {rate}; it must lie above 0 and up to 1000000"
             )));
         }
-        Ok(Device {
+        Ok(ModulatorSpec {
             name: own.name,
             display,
             packing,
@@ -201,7 +203,7 @@ impl Device {
 }
 
 /// The phase of each level in turns, where they are not even over one turn.
-fn levels(of: &DeviceToml, display: &Display) -> Result<Option<Vec<f64>>> {
+fn levels(of: &ModulatorToml, display: &Display) -> Result<Option<Vec<f64>>> {
     let count = 1usize << display.bits();
     let turns = match (&of.levels_turns, of.range_turns) {
         (None, None | Some(1.0)) => return Ok(None),
@@ -242,10 +244,10 @@ impl PackingToml {
     }
 }
 
-impl From<Display> for Device {
+impl From<Display> for ModulatorSpec {
     /// One whose input takes all colours in one image, or one grey image of one laser's levels.
     fn from(display: Display) -> Self {
-        Device {
+        ModulatorSpec {
             name: String::new(),
             packing: Packing::usual(&display),
             display,
@@ -307,7 +309,7 @@ mod tests {
     #[test]
     fn every_shipped_device_says_where_its_figures_are_from() {
         for (name, text) in SHIPPED {
-            let device = Device::shipped(name).unwrap();
+            let device = ModulatorSpec::shipped(name).unwrap();
             assert!(!device.name.is_empty() && device.target().is_ok(), "{name}");
             let table: toml::Table = toml::from_str(text).unwrap();
             for key in [
@@ -333,11 +335,11 @@ mod tests {
             ("ti-plm-p47", include_str!("modulator/p47_levels.txt")),
             ("ti-plm-p67", include_str!("modulator/p67_levels.txt")),
         ] {
-            let response = Device::shipped(name).unwrap().target().unwrap().response;
+            let response = ModulatorSpec::shipped(name).unwrap().target().unwrap().response;
             let Response::Lut { level, .. } = response else {
                 panic!("{name} has levels of its own")
             };
-            let turns = Device::shipped(name).unwrap().levels_turns.unwrap();
+            let turns = ModulatorSpec::shipped(name).unwrap().levels_turns.unwrap();
             for (step, (level, golden)) in level.iter().zip(digits(golden.trim())).enumerate() {
                 // Half-way between two levels the package's rounding decides: at step 111 of p47.
                 let apart = |level: u8| (turns[usize::from(level)] - step as f64 / 256.0).abs();
@@ -356,7 +358,7 @@ mod tests {
         let p47 = "0000001000101010 1101101100011000 0101010111111111 1101100011011000";
         let p67 = "0000010001000101 1011100011010001 1010111110101111 1011101100010001";
         for (name, golden) in [("ti-plm-p47", p47), ("ti-plm-p67", p67)] {
-            let device = Device::shipped(name).unwrap();
+            let device = ModulatorSpec::shipped(name).unwrap();
             let Packing::BitPlanes(cells) = &device.packing else {
                 panic!("{name} has cells")
             };
@@ -393,11 +395,11 @@ mod tests {
             ("bits = 10\nrange_turns = 2\npacking = \"grey-16\"", "8 bits"),
             ("rate_hz = -1", "rate_hz"),
         ] {
-            let message = Device::from_toml(text).unwrap_err().to_string();
+            let message = ModulatorSpec::from_toml(text).unwrap_err().to_string();
             assert!(message.contains(word), "{text}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
-        let message = Device::shipped("pluto").unwrap_err().to_string();
+        let message = ModulatorSpec::shipped("pluto").unwrap_err().to_string();
         assert!(message.contains("holoeye-pluto"), "{message}");
     }
 }

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::time::Duration;
 
 /// A plan for one shape, target and encoding. Immutable; shared between threads.
-pub struct Modulator {
+pub struct DisplayPlan {
     colours: usize,
     height: usize,
     width: usize,
@@ -36,8 +36,8 @@ pub struct Modulator {
     brightness: Brightness,
 }
 
-/// Working memory of a [`Modulator`] for one call at a time.
-pub struct ModulatorScratch {
+/// Working memory of a [`DisplayPlan`] for one call at a time.
+pub struct DisplayScratch {
     propagation: Option<ConvolveScratch>,
     /// A plane, where colours are moved.
     moved: Vec<Complex32>,
@@ -49,7 +49,7 @@ pub struct ModulatorScratch {
     cancel: Cancel,
 }
 
-impl ModulatorScratch {
+impl DisplayScratch {
     /// Has fields end where `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.encoder.set_cancel(cancel);
@@ -69,7 +69,7 @@ pub struct Modulation {
     pub encode: Duration,
 }
 
-impl Modulator {
+impl DisplayPlan {
     /// Plans the way of (C, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
     /// the offset's transfer function, so that it costs nothing beside it.
     ///
@@ -90,7 +90,7 @@ impl Modulator {
         }
         let distance_m = target.display.offset_m() - z_m;
         let colours = target.display.colours();
-        Ok(Modulator {
+        Ok(DisplayPlan {
             colours,
             height: shape.0,
             width: shape.1,
@@ -125,8 +125,8 @@ impl Modulator {
     }
 
     /// Working memory for one call at a time.
-    pub fn scratch(&self) -> ModulatorScratch {
-        ModulatorScratch {
+    pub fn scratch(&self) -> DisplayScratch {
+        DisplayScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
             encoder: self.encoder.scratch(),
             moved: match &self.registration {
@@ -147,7 +147,7 @@ impl Modulator {
     ///
     /// # Panics
     /// If `scratch` is another plan's, or `field` has not C·H·W values.
-    pub fn propagate(&self, field: &mut [Complex32], scratch: &mut ModulatorScratch) {
+    pub fn propagate(&self, field: &mut [Complex32], scratch: &mut DisplayScratch) {
         if let (Some(plans), Some(waves)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
                 if scratch.cancel.requested() {
@@ -169,7 +169,7 @@ impl Modulator {
     ///
     /// # Panics
     /// If `field` or `levels` has not C·H·W values.
-    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut ModulatorScratch) -> Modulation {
+    pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut DisplayScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
@@ -180,7 +180,7 @@ impl Modulator {
         past: Option<Past>,
         field: &mut [Complex32],
         levels: &mut [u8],
-        scratch: &mut ModulatorScratch,
+        scratch: &mut DisplayScratch,
     ) -> Modulation {
         let stage = stage!("encode");
         if scratch.phases.is_empty() {
@@ -213,7 +213,7 @@ impl Modulator {
         field: &mut [Complex32],
         phases: &mut [f32],
         words: &mut [u16],
-        scratch: &mut ModulatorScratch,
+        scratch: &mut DisplayScratch,
     ) -> Modulation {
         self.modulate_words_after(None, field, phases, words, scratch)
     }
@@ -225,7 +225,7 @@ impl Modulator {
         field: &mut [Complex32],
         phases: &mut [f32],
         words: &mut [u16],
-        scratch: &mut ModulatorScratch,
+        scratch: &mut DisplayScratch,
     ) -> Modulation {
         let stage = stage!("encode");
         let scale = self.phases(past, field, phases, scratch);
@@ -242,7 +242,7 @@ impl Modulator {
         past: Option<Past>,
         field: &mut [Complex32],
         phases: &mut [f32],
-        scratch: &mut ModulatorScratch,
+        scratch: &mut DisplayScratch,
     ) -> f32 {
         let scale = self.brightness.scale(field, past, &mut scratch.percentile);
         let mut midpoint = self.midpoint.as_ref().zip(scratch.midpoint.as_mut());

@@ -226,7 +226,7 @@ mod tests {
     use crate::encode::brightness::Brightness;
     use crate::encode::{EncoderOptions, Encoding};
     use crate::optics::aperture::Opening;
-    use crate::pipeline::display_plan::Modulator;
+    use crate::pipeline::display_plan::DisplayPlan;
     use crate::view::refocus::{Refocus, phase_only_field};
 
     const SHAPE: (usize, usize) = (96, 128);
@@ -251,7 +251,7 @@ mod tests {
             brightness: Brightness::FrameMax,
             ..Encoding::DoublePhase.into()
         };
-        let home = Modulator::new(SHAPE, &target, &options).unwrap();
+        let home = DisplayPlan::new(SHAPE, &target, &options).unwrap();
         let mut scratch = home.scratch();
         home.propagate(&mut field, &mut scratch);
         let mut levels = vec![0; 3 * height * width];

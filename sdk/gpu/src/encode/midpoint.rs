@@ -144,7 +144,7 @@ mod tests {
     use phasefront_core::encode::EncoderOptions;
     use phasefront_core::encode::brightness::{Brightness, Past};
     use phasefront_core::optics::zernike::Aberration;
-    use phasefront_core::pipeline::display_plan::Modulator;
+    use phasefront_core::pipeline::display_plan::DisplayPlan;
 
     #[test]
     fn steps_are_those_of_the_cpu() {
@@ -191,7 +191,7 @@ mod tests {
                     Ok((Encoder::new(&device, &job, &buffers)?, buffers))
                 })
                 .unwrap();
-            let twin = Modulator::new(size, &target, &options).unwrap();
+            let twin = DisplayPlan::new(size, &target, &options).unwrap();
             let mut scratch = twin.scratch();
             let past = Past { scale: 1.2, share: 1.0 };
             // A frame by itself, and one that follows: of it a part stands still.

@@ -1,0 +1,61 @@
+"""Prints what the crate `phasefront` makes public, with what it takes from `phasefront-core` and `phasefront-gpu`.
+
+`stable.py TARGET` reads what `surface` has listed of each crate in TARGET, and rustdoc's JSON beside it. It fails where a
+public signature names a type that `phasefront` does not hand on.
+"""
+
+import json
+import re
+import sys
+from pathlib import Path
+
+
+def exported(folder: Path) -> dict[str, str]:
+    """Where each item of another crate is found in `phasefront`, by its path there."""
+    index = json.loads((folder / "phasefront.json").read_text())["index"]
+    inside = {}
+    for item in index.values():
+        for child in item["inner"].get("module", {}).get("items", []):
+            inside[str(child)] = item
+    found = {}
+    for key, item in index.items():
+        use = item["inner"].get("use")
+        if not use or not use["source"].startswith(("phasefront_core", "phasefront_gpu")):
+            continue
+        module = inside.get(key)
+        path = [use["name"]]
+        while module is not None:
+            path.insert(0, module["name"])
+            module = inside.get(str(module["id"]))
+        found[use["source"]] = "::".join(path)
+    return found
+
+
+def main(folder: Path) -> int:
+    paths = exported(folder)
+    # The longest first, for one path may begin with another.
+    any_of = re.compile("|".join(rf"{re.escape(path)}\b" for path in sorted(paths, key=len, reverse=True)))
+    lines = [line for line in (folder / "phasefront.txt").read_text().splitlines() if not line.startswith("pub use ")]
+    for crate in ("phasefront_core", "phasefront_gpu"):
+        for line in (folder / f"{crate}.txt").read_text().splitlines():
+            # What the line is about: the type of an implementation, or the first path.
+            about = line.rsplit(" for ", 1)[-1] if line.startswith("impl") else line
+            if re.match(rf"impl {crate}::", line) and " for " in line:
+                continue  # A trait that is not public either.
+            first = re.search(rf"{crate}::[\w:]+", re.sub(r"^impl<[^>]*> ", "", about))
+            if first and any_of.match(first.group()):
+                lines.append(line)
+    lines = {any_of.sub(lambda found: paths[found.group()], line) for line in lines}
+    lines = sorted(lines, key=lambda line: (re.findall(r"phasefront::[\w:]+", line), line))
+    print("\n".join(lines))
+    kinds = r"(?:struct|enum|trait|type|fn|const) phasefront::(?:[a-z_]+::)?[A-Z]\w+$"
+    count = sum(bool(re.search(kinds, re.sub(r"[<(=:] .*|<.*", "", line))) for line in lines)
+    print(f"phasefront: {count} public items", file=sys.stderr)
+    hidden = [line for line in lines if re.search(r"phasefront_(core|gpu|kernels)::", line)]
+    for line in hidden:
+        print(f"names a type that phasefront does not hand on: {line}", file=sys.stderr)
+    return 1 if hidden else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
