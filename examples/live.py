@@ -1,4 +1,4 @@
-"""Makes holograms of a camera's frames as they come. A picture that moves stands for the camera:
+"""Makes holograms of a camera's frames while it runs. A picture that moves stands for the camera:
 
     pip install phasefront pillow
     python examples/live.py samples/scene_rgb.jpg samples/scene_depth.png last.png

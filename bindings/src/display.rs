@@ -119,10 +119,10 @@ mod tests {
         assert_eq!((display.width, display.green_nm), (640, 521.5));
         let core = phasefront::Display::try_from(&display).unwrap();
         assert_eq!(core, phasefront::Display::from_toml(text).unwrap());
-        let usual = display_from_toml(String::new()).unwrap();
+        let defaults = display_from_toml(String::new()).unwrap();
         let one = display_from_toml("wavelengths_nm = [532]".into()).unwrap();
         let laser_nm = Some(532.0);
-        assert_eq!(one, Display { laser_nm, ..usual });
+        assert_eq!(one, Display { laser_nm, ..defaults });
         assert_eq!(phasefront::Display::try_from(&one).unwrap().colours(), 1);
     }
 

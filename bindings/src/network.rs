@@ -35,7 +35,7 @@ pub struct DeepPair {
     pub prefilter: Arc<Network>,
 }
 
-/// The pair in int8 that comes along for a modulator at `offset_mm` and the default display's pitch, colours and
+/// The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
 /// volume.
 ///
 /// # Errors
@@ -135,7 +135,7 @@ impl Network {
         })
     }
 
-    /// A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default
+    /// A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
     /// display's pitch, colours and volume.
     ///
     /// # Errors

@@ -88,8 +88,8 @@ pub enum Method {
     },
 }
 
-/// One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
-/// shown in its middle.
+/// One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
+/// is shown in its middle.
 #[derive(Debug, Clone, uniffi::Record)]
 pub struct QualityLevel {
     /// What makes the hologram.
@@ -151,7 +151,7 @@ pub struct SessionOptions {
     pub quality_levels: Vec<QualityLevel>,
     /// Whether the session may change its quality level by itself.
     pub quality: Quality,
-    /// Frames a second that are aimed at; none takes frames as they come and never steps.
+    /// Frames a second that are aimed at; none takes every frame and never steps.
     pub target_rate_hz: Option<f64>,
     /// How the field becomes phases.
     pub encoding: Encoding,
@@ -160,9 +160,9 @@ pub struct SessionOptions {
     /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
     /// in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
     #[uniffi(default = None)]
-    pub dark: Option<f32>,
-    /// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
-    /// suits the encoding: 1, and 0 with a pre-filter.
+    pub dark_threshold: Option<f32>,
+    /// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+    /// what suits the encoding: 1, and 0 with a pre-filter.
     #[uniffi(default = None)]
     pub local_steps: Option<u32>,
     /// Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
@@ -248,24 +248,24 @@ impl Method {
 #[uniffi::export(default(method = None))]
 pub fn session_options(target: Arc<Target>, method: Option<Method>) -> Result<SessionOptions, PhasefrontError> {
     guard(|| {
-        let usual = match &method {
+        let defaults = match &method {
             Some(method) => {
                 let method = method.core(&target.core.display);
                 session::SessionOptions::new(target.core.clone(), method)
             }
-            None => usual(&target.core),
+            None => default_options(&target.core),
         };
-        Ok(SessionOptions::new(target, usual))
+        Ok(SessionOptions::new(target, defaults))
     })
 }
 
 #[cfg(feature = "built-in-network")]
-fn usual(target: &phasefront::Target) -> session::SessionOptions {
+fn default_options(target: &phasefront::Target) -> session::SessionOptions {
     phasefront_models::session_options(target.clone())
 }
 
 #[cfg(not(feature = "built-in-network"))]
-fn usual(target: &phasefront::Target) -> session::SessionOptions {
+fn default_options(target: &phasefront::Target) -> session::SessionOptions {
     let sweep = Sweep::for_display(&target.display);
     session::SessionOptions::new(target.clone(), phasefront::Method::Sweep(sweep))
 }
@@ -315,7 +315,7 @@ impl SessionOptions {
                 phasefront::Brightness::Fixed(scale) => Brightness::Fixed { scale },
                 phasefront::Brightness::FrameMax => Brightness::FrameMax,
             },
-            dark: None,
+            dark_threshold: None,
             local_steps: None,
             midpoint_steps: core.encoder.midpoint_steps as u32,
             depth_range: match core.depth.range {
@@ -347,8 +347,8 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
         let mut to = session::SessionOptions::new(target.clone(), method(best));
         to.quality = options.quality.into();
         to.target_rate_hz = options.target_rate_hz;
-        let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
-        let usual = phasefront::EncoderOptions::from(match &options.encoding {
+        let steps = |asked: Option<u32>, defaults: usize| asked.map_or(defaults, |steps| steps as usize);
+        let defaults = phasefront::EncoderOptions::from(match &options.encoding {
             Encoding::DoublePhase => phasefront::Encoding::DoublePhase,
             Encoding::AntiAlias { sigma, width } => phasefront::Encoding::AntiAlias {
                 sigma: *sigma,
@@ -358,10 +358,10 @@ impl TryFrom<&SessionOptions> for session::SessionOptions {
             Encoding::Deep { prefilter } => phasefront::Encoding::Deep(prefilter.core.clone()),
         });
         to.encoder = phasefront::EncoderOptions {
-            dark: options.dark.unwrap_or(usual.dark),
-            local_steps: steps(options.local_steps, usual.local_steps),
+            dark_threshold: options.dark_threshold.unwrap_or(defaults.dark_threshold),
+            local_steps: steps(options.local_steps, defaults.local_steps),
             midpoint_steps: options.midpoint_steps as usize,
-            ..usual
+            ..defaults
         };
         to.encoder.brightness = match options.brightness {
             Brightness::Smoothed => phasefront::Brightness::Smoothed,

@@ -178,7 +178,7 @@ fn any_frame_becomes_a_hologram_or_is_refused_in_one_line() {
     let target = Target::of_display(display).unwrap();
     let mut options = session_options(target, Some(Method::Sweep)).unwrap();
     options.encoding = Encoding::DoublePhase;
-    (options.local_steps, options.dark, options.threads) = (Some(0), Some(0.0), Some(1));
+    (options.local_steps, options.dark_threshold, options.threads) = (Some(0), Some(0.0), Some(1));
     let session: Arc<RawSession> = RawSession::new(options, RunningMode::Video, None).unwrap();
     let random = &mut Random(ChaCha8Rng::seed_from_u64(1));
     let (mut made, mut refused) = (0, 0);

@@ -179,20 +179,20 @@ fn info(frame: &Value) -> FrameInfo {
 
 /// What a case's frames become, one after another.
 #[derive(Default)]
-struct Made {
+struct CaseResult {
     levels: Vec<u8>,
     /// Of each the amplitudes at 1.5 mm and the field at -1 mm.
     seen: Vec<u8>,
 }
 
-fn run(case: &Value, frames: &[u8]) -> Made {
+fn run(case: &Value, frames: &[u8]) -> CaseResult {
     let mode = match case["mode"].as_str().unwrap() {
         "image" => RunningMode::Image,
         "video" => RunningMode::Video,
         other => panic!("{other}"),
     };
     let session = RawSession::new(options(case), mode, None).unwrap();
-    let mut all = Made::default();
+    let mut all = CaseResult::default();
     for frame in case["frames"].as_array().unwrap() {
         let colour = |index: usize| bytes(frames, &frame["colour"]["planes"][index]);
         let hologram: Arc<RawHologram> = session
@@ -231,9 +231,9 @@ fn frames_become_the_levels_that_are_expected() {
     let suite: Value = serde_json::from_str(&suite).unwrap();
     let frames = std::fs::read(folder().join("frames.bin")).unwrap();
     let expected = std::fs::read(folder().join("levels.bin")).unwrap();
-    let mut all = Made::default();
+    let mut all = CaseResult::default();
     for case in suite["cases"].as_array().unwrap() {
-        let Made { levels: got, seen } = run(case, &frames);
+        let CaseResult { levels: got, seen } = run(case, &frames);
         let want = &expected[all.levels.len()..][..got.len()];
         // Another processor rounds otherwise in the last bit, which turns a level here and there. A calibrated
         // modulator's levels are in no order, so a turned one may be any other.

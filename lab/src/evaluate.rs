@@ -287,7 +287,7 @@ impl Shown {
 
 fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
     let EncoderOptions {
-        dark,
+        dark_threshold,
         local_steps,
         midpoint_steps,
         ..
@@ -296,7 +296,7 @@ fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
         0 => String::new(),
         more => format!(" + {more}"),
     };
-    format!("{encoder}, dark {dark}, steps {local_steps}{more}")
+    format!("{encoder}, dark {dark_threshold}, steps {local_steps}{more}")
 }
 
 /// The ways of `shown` that apply to fields of `method`. A pre-filter takes the place of every encoder, so that

@@ -31,7 +31,7 @@ pub struct Setting {
     /// Whether brightness is [`Brightness::Smoothed`]; if not, it is [`Brightness::FrameMax`].
     pub smoothed: bool,
     /// As in [`EncoderOptions`].
-    pub dark: f32,
+    pub dark_threshold: f32,
     /// As in [`EncoderOptions`].
     pub local_steps: usize,
     /// As in [`EncoderOptions`].
@@ -43,7 +43,7 @@ const ALONE: Setting = Setting {
     name: "each frame by itself",
     video: false,
     smoothed: false,
-    dark: EncoderOptions::DARK,
+    dark_threshold: EncoderOptions::DARK_THRESHOLD,
     local_steps: 1,
     midpoint_steps: 0,
 };
@@ -73,7 +73,7 @@ pub const SETTINGS: [Setting; 6] = [
     BOTH,
     Setting {
         name: "both, AA-DPM as published",
-        dark: 0.0,
+        dark_threshold: 0.0,
         local_steps: 0,
         ..BOTH
     },
@@ -122,7 +122,7 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
         .map(|setting| {
             let mut options = SessionOptions::new(display, method.clone());
             options.encoder = EncoderOptions {
-                dark: setting.dark,
+                dark_threshold: setting.dark_threshold,
                 local_steps: setting.local_steps,
                 midpoint_steps: setting.midpoint_steps,
                 brightness: match setting.smoothed {

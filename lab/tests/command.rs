@@ -751,7 +751,7 @@ fn a_flag_of_other_calls_is_refused() {
             "--near",
         ),
         ("view there.png --method sweep -o v.html", "--method"),
-        ("view there.png --dark 0.2 -o v.html", "--dark"),
+        ("view there.png --dark-threshold 0.2 -o v.html", "--dark-threshold"),
         ("show there.png --colour red", "--display"),
     ] {
         folder.refuses(&call.split(' ').collect::<Vec<_>>(), 2, &[word]);
@@ -1121,7 +1121,7 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
         let made = made(more);
         assert_eq!(made["encoder"], "deep", "{more:?}: {made}");
         assert_eq!(
-            (made["dark"].as_f64(), made["local_steps"].as_u64()),
+            (made["dark_threshold"].as_f64(), made["local_steps"].as_u64()),
             (Some(0.0), Some(0))
         );
     }
@@ -1133,16 +1133,16 @@ fn a_pre_filter_belongs_to_the_deep_encoder() {
     ] {
         let made = made(more);
         assert_eq!(made["encoder"], "anti-alias", "{more:?}: {made}");
-        assert!((made["dark"].as_f64().unwrap() - 0.4).abs() < 1e-6 && made["local_steps"] == 1);
+        assert!((made["dark_threshold"].as_f64().unwrap() - 0.4).abs() < 1e-6 && made["local_steps"] == 1);
     }
-    let plain = made(&["--dark", "0", "--local-steps", "0"]);
+    let plain = made(&["--dark-threshold", "0", "--local-steps", "0"]);
     assert_eq!(
-        (plain["dark"].as_f64(), plain["local_steps"].as_u64()),
+        (plain["dark_threshold"].as_f64(), plain["local_steps"].as_u64()),
         (Some(0.0), Some(0))
     );
     let call = with(&["-o", "h.png"]);
     folder.refuses(&[&call[..], &["--local-steps", "9"]].concat(), 1, &["at most 8"]);
-    folder.refuses(&[&call[..], &["--dark", "1.5"]].concat(), 1, &["from 0 to 1"]);
+    folder.refuses(&[&call[..], &["--dark-threshold", "1.5"]].concat(), 1, &["from 0 to 1"]);
 }
 
 #[test]
@@ -1160,7 +1160,7 @@ fn a_hologram_is_judged_by_its_own_wave() {
         assert!((0.5..2.0).contains(&shown["brightness"].as_f64().unwrap()), "{made}");
         shown["psnr_db"].as_f64().unwrap()
     };
-    let plain = judged(&["--dark", "0", "--local-steps", "0"]);
+    let plain = judged(&["--dark-threshold", "0", "--local-steps", "0"]);
     let corrected = judged(&[]);
     assert!(corrected > plain, "{plain} {corrected}");
     folder.refuses(&with(&["-o", "h.png", "--judge", "--backend", "gpu"]), 1, &["--judge"]);

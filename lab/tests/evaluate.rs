@@ -455,7 +455,7 @@ fn the_command_prints_figures_and_draws_the_worst() {
         1,
         "--precision goes with a bundled --network or --pair",
     );
-    refused(&["--method", "rgb", "--dark", "0"], 2, "--encoder");
+    refused(&["--method", "rgb", "--dark-threshold", "0"], 2, "--encoder");
 }
 
 /// A pre-filter takes the place of every encoder, once.
@@ -465,7 +465,7 @@ fn a_pairs_rows_are_deep() {
     let encoders = [
         "--encoder",
         "double,anti-alias,band-limit",
-        "--dark",
+        "--dark-threshold",
         "0,0.4",
         "--scenes",
         "1",

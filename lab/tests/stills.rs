@@ -137,7 +137,9 @@ fn holograms_of_the_same_request_are_kept() {
         error.contains("no --method") && error.contains("--method sweep"),
         "{error}"
     );
-    assert!(refusal(&borrowed(&folder.call(&["--resume", "--dark", "0.1"]))).contains("--dark 0.1"));
+    assert!(
+        refusal(&borrowed(&folder.call(&["--resume", "--dark-threshold", "0.1"]))).contains("--dark-threshold 0.1")
+    );
     // One is missing, and one picture has changed.
     std::fs::remove_file(folder.path("out/cat.png")).unwrap();
     let dog = std::fs::read(folder.path("out/dog 2.png")).unwrap();

@@ -606,7 +606,11 @@ fn a_run_is_resumed_with_the_same_flags_and_input_alone() {
     let refused = |more: &[&str]| refusal(&[&call[..], &["--resume"], more].concat());
     for (more, earlier, now) in [
         (&["--method", "sweep"][..], "--method network", "--method sweep"),
-        (&["--dark", "0.2"], "no --dark", "--dark 0.2"),
+        (
+            &["--dark-threshold", "0.2"],
+            "no --dark-threshold",
+            "--dark-threshold 0.2",
+        ),
         (&["--local-steps", "3"], "no --local-steps", "--local-steps 3"),
         (&["--network", "15"], "no --network", "--network 15"),
         (&["--precision", "f32"], "--precision int8", "--precision f32"),

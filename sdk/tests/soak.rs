@@ -1,5 +1,5 @@
-//! A live session under load and faults: every frame is told of once, and neither memory nor threads nor handles grow.
-//! `PHASEFRONT_SOAK=100000 cargo test --release --workspace --test soak -- --nocapture` is the long run.
+//! A live session under load and faults: every frame is reported exactly once, and neither memory nor threads nor
+//! handles grow. `PHASEFRONT_SOAK=100000 cargo test --release --workspace --test soak -- --nocapture` is the long run.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 

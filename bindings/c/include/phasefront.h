@@ -310,7 +310,7 @@ typedef struct PfImageInfo {
 // are refused there.
 typedef void (*PfOnLog)(void *context, enum PfLogLevel level, const char *message);
 
-// One quality: a method, a resolution, and how what is shown is corrected.
+// One quality: a method, a resolution, and how the displayed image is corrected.
 typedef struct PfQualityLevel {
   // A PfMethod but for PF_METHOD_DEFAULT.
   uint32_t method;
@@ -539,7 +539,7 @@ void pf_image_free(struct PfImage *image);
 // under way when this returns still has the `context` of before, so let each context live as long as the process.
 enum PfStatus pf_set_log_listener(uint32_t level, PfOnLog on_log, void *context);
 
-// A network in int8 that comes along, by name, as "rgbd-8".
+// A network in int8 that is bundled, by name, as "rgbd-8".
 enum PfStatus pf_network_built_in(const char *name, struct PfNetwork **network);
 
 // The bytes of an ONNX file.
@@ -567,7 +567,7 @@ enum PfStatus pf_options_clear_quality_levels(struct PfOptions *options);
 // Adds a quality level, below those that are there; a session takes 16 at most.
 enum PfStatus pf_options_push_quality_level(struct PfOptions *options, const struct PfQualityLevel *quality_level);
 
-// Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.
+// Frames a second that are aimed at; 0 takes every frame and never changes the quality level.
 enum PfStatus pf_options_set_target_rate_hz(struct PfOptions *options, double rate_hz);
 
 // Encodes by double phase on the field as it is.
@@ -593,10 +593,10 @@ enum PfStatus pf_options_set_brightness_frame_max(struct PfOptions *options);
 
 // Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
 // the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
-enum PfStatus pf_options_set_dark(struct PfOptions *options, float dark);
+enum PfStatus pf_options_set_dark_threshold(struct PfOptions *options, float threshold);
 
-// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted. Not set, they suit
-// the encoding: 1, and 0 with a pre-filter.
+// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted. Not set, they
+// suit the encoding: 1, and 0 with a pre-filter.
 enum PfStatus pf_options_set_local_steps(struct PfOptions *options, uint32_t steps);
 
 // Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for

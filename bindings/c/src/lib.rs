@@ -32,7 +32,7 @@ pub use options::{
     PfBackend, PfMethod, PfOptions, PfQualityLevel, pf_options_clear_quality_levels, pf_options_free, pf_options_new,
     pf_options_push_quality_level, pf_options_set_anti_alias, pf_options_set_backend, pf_options_set_band_limit,
     pf_options_set_brightness_fixed, pf_options_set_brightness_frame_max, pf_options_set_brightness_smoothed,
-    pf_options_set_dark, pf_options_set_deep, pf_options_set_depth_range, pf_options_set_double_phase,
+    pf_options_set_dark_threshold, pf_options_set_deep, pf_options_set_depth_range, pf_options_set_double_phase,
     pf_options_set_least_confidence, pf_options_set_local_steps, pf_options_set_midpoint_steps,
     pf_options_set_most_pixels, pf_options_set_target_rate_hz, pf_options_set_threads,
 };

@@ -13,7 +13,7 @@ fn given(network: Arc<Network>) -> *mut PfNetwork {
     object(PfNetwork(network))
 }
 
-/// A network in int8 that comes along, by name, as "rgbd-8".
+/// A network in int8 that is bundled, by name, as "rgbd-8".
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_network_built_in(name: *const c_char, network: *mut *mut PfNetwork) -> PfStatus {
     // SAFETY: the rules of this border.

@@ -34,7 +34,7 @@ pub enum PfBackend {
 
 const BACKENDS: [Backend; 2] = [Backend::Cpu, Backend::Gpu];
 
-/// One quality: a method, a resolution, and how what is shown is corrected.
+/// One quality: a method, a resolution, and how the displayed image is corrected.
 #[repr(C)]
 #[derive(Debug, Clone, Copy)]
 pub struct PfQualityLevel {
@@ -147,7 +147,7 @@ pub unsafe extern "C" fn pf_options_push_quality_level(
     }
 }
 
-/// Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.
+/// Frames a second that are aimed at; 0 takes every frame and never changes the quality level.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_target_rate_hz(options: *mut PfOptions, rate_hz: f64) -> PfStatus {
     // SAFETY: the rules of this border.
@@ -230,13 +230,13 @@ pub unsafe extern "C" fn pf_options_set_brightness_frame_max(options: *mut PfOpt
 /// Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in
 /// the dark. Not set, it suits the encoding: 0.4, and 0 with a pre-filter.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn pf_options_set_dark(options: *mut PfOptions, dark: f32) -> PfStatus {
+pub unsafe extern "C" fn pf_options_set_dark_threshold(options: *mut PfOptions, threshold: f32) -> PfStatus {
     // SAFETY: the rules of this border.
-    unsafe { set(options, |options| options.dark = Some(dark)) }
+    unsafe { set(options, |options| options.dark_threshold = Some(threshold)) }
 }
 
-/// Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted. Not set, they suit
-/// the encoding: 1, and 0 with a pre-filter.
+/// Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted. Not set, they
+/// suit the encoding: 1, and 0 with a pre-filter.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn pf_options_set_local_steps(options: *mut PfOptions, steps: u32) -> PfStatus {
     // SAFETY: the rules of this border.

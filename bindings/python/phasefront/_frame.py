@@ -122,7 +122,7 @@ class Frame:
             normalized depth.
         timestamp_ns: When it was taken, in nanoseconds of any clock that runs forward. Image sessions do not look at it.
         colour_format: How colour lies in memory; needed for BGRA and for planes.
-        depth_format: What the depth's numbers mean, where the usual is wrong.
+        depth_format: What the depth's numbers mean, where the default is wrong.
         confidence: How sure the depth is, uint8, (h, w).
         confidence_format: What its numbers mean.
         matrix: Between luma, chroma and colour; other formats do not look at it.

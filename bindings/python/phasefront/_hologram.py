@@ -104,7 +104,7 @@ class Hologram:
 
     def output(self, placement: Placement | None = None, image: int = 0) -> NDArray[numpy.uint8]:
         """Image `image` of those that the modulator's driver takes, of the modulator's resolution, levels as they are;
-        uint8, (H, W, bytes of a pixel). All layouts but grey have one; RGB is usual. Read only.
+        uint8, (H, W, bytes of a pixel). All layouts but grey have one; RGB is the default. Read only.
 
         Raises `PhasefrontError.Setting` for an image that the layout has not.
         """

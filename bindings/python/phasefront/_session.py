@@ -115,7 +115,7 @@ class Changes(TypedDict, total=False):
     target_rate_hz: float | None
     encoding: Encoding
     brightness: Brightness
-    dark: float | None
+    dark_threshold: float | None
     local_steps: int | None
     midpoint_steps: int
     depth_range: DepthRange

@@ -68,7 +68,7 @@ def test_the_conventions_reconstruct_a_hologram(tmp_path, monkeypatch):
 def test_a_type_checker_follows_the_pages(tmp_path):
     for i, code in enumerate(snippets(GUIDE) + snippets(ROOT / "README.md")):
         (tmp_path / f"snippet_{i}.py").write_text(code)
-    wrong = "import phasefront\nphasefront.session_options(dark='much', no_option=1)\nphasefront.Display(width='1')\n"
+    wrong = "import phasefront\nphasefront.session_options(dark_threshold='much', no_option=1)\nphasefront.Display(width='1')\n"
     (tmp_path / "wrong.py").write_text(wrong)
     # Not in this folder, where the package lies without what is generated.
     mypy = [sys.executable, "-P", "-m", "mypy", "--strict", "."]

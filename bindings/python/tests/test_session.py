@@ -299,9 +299,9 @@ def test_grey_and_float64_are_taken(options):
     grey = (3 * x + y).astype(numpy.uint8)
     metres = numpy.where(x < 20, 0.5, 1.0 + x / 64)
     with Session(options) as session:
-        usual = session.process(Frame(numpy.stack(3 * [grey], axis=2), metres.astype(numpy.float32))).levels
+        expected = session.process(Frame(numpy.stack(3 * [grey], axis=2), metres.astype(numpy.float32))).levels
         for colour, depth in [(grey, metres), (grey[:, :], numpy.asfortranarray(metres))]:
-            numpy.testing.assert_array_equal(session.process(Frame(colour, depth)).levels, usual)
+            numpy.testing.assert_array_equal(session.process(Frame(colour, depth)).levels, expected)
         # What 32 bits do not hold is no reading.
         metres[0, 0], infinite = 1e300, metres.astype(numpy.float32, copy=True)
         infinite[0, 0] = numpy.inf
@@ -411,7 +411,7 @@ def test_networks_that_are_none_are_named(tmp_path):
     assert (info.layers, info.pitch_um) == (8, 8.0)
 
 
-def test_the_network_that_is_built_in_is_usual():
+def test_the_network_that_is_built_in_is_the_default():
     for offset_mm in (0, 3, 12):
         display = phasefront.Display(width=64, height=48, offset_mm=offset_mm)
         options = session_options(target=display)
@@ -434,17 +434,17 @@ def test_steps_and_dark_can_be_set(display):
         with Session(session_options(target=display, **changes)) as session:
             return session.process(still()).levels
 
-    usual = levels()
-    assert (levels(dark=0.4, local_steps=1) == usual).all()
-    assert (levels(local_steps=0) != usual).any()
-    assert (levels(midpoint_steps=1) != usual).any()
+    defaults = levels()
+    assert (levels(dark_threshold=0.4, local_steps=1) == defaults).all()
+    assert (levels(local_steps=0) != defaults).any()
+    assert (levels(midpoint_steps=1) != defaults).any()
     with pytest.raises(PhasefrontError, match="at most 8"):
         levels(local_steps=9)
     with pytest.raises(PhasefrontError, match="from 0 to 1"):
-        levels(dark=2.0)
+        levels(dark_threshold=2.0)
 
 
-def test_without_a_network_the_sweep_is_usual():
+def test_without_a_network_the_sweep_is_the_default():
     options = session_options(target=phasefront.Display(width=64, height=48, pitch_um=3.74))
     assert isinstance(options.quality_levels[0].method, Method.SWEEP)
     with Session(options) as session:

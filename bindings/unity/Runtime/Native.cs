@@ -147,7 +147,7 @@ namespace Phasefront
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_smoothed(SessionOptions options);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_fixed(SessionOptions options, float scale);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_brightness_frame_max(SessionOptions options);
-        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_dark(SessionOptions options, float dark);
+        [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_dark_threshold(SessionOptions options, float threshold);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_local_steps(SessionOptions options, uint steps);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_midpoint_steps(SessionOptions options, uint steps);
         [DllImport(Library, CallingConvention = C)] public static extern Status pf_options_set_depth_range(SessionOptions options, float nearM, float farM);

@@ -63,8 +63,8 @@ namespace Phasefront
         public void ClearQualityLevels() => Check(Native.pf_options_clear_quality_levels(this));
 
         /// <summary>
-        /// Adds a quality level, below those that are there: a method, a resolution, and how often what is shown is
-        /// corrected; below 0 as often as in the session.
+        /// Adds a quality level, below those that are there: a method, a resolution, and how often the displayed image
+        /// is corrected; below 0 as often as in the session.
         /// </summary>
         public void PushQualityLevel(Method method, Network network, int width, int height, int localSteps = -1, int midpointSteps = -1)
         {
@@ -84,7 +84,7 @@ namespace Phasefront
             });
         }
 
-        /// <summary>Frames a second that are aimed at; 0 takes frames as they come and never changes the quality level.</summary>
+        /// <summary>Frames a second that are aimed at; 0 takes every frame and never changes the quality level.</summary>
         public double TargetRateHz { set => Check(Native.pf_options_set_target_rate_hz(this, value)); }
 
         /// <summary>Encodes by double phase on the field as it is.</summary>
@@ -110,7 +110,7 @@ namespace Phasefront
         public void FrameMaxBrightness() => Check(Native.pf_options_set_brightness_frame_max(this));
 
         /// <summary>Where the amplitude is below this share of full light, phases are drawn to 0.</summary>
-        public float Dark { set => Check(Native.pf_options_set_dark(this, value)); }
+        public float DarkThreshold { set => Check(Native.pf_options_set_dark_threshold(this, value)); }
 
         /// <summary>Steps of correction, 0 to 8.</summary>
         public int LocalSteps { set => Check(Native.pf_options_set_local_steps(this, checked((uint)value))); }

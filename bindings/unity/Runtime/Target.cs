@@ -67,7 +67,7 @@ namespace Phasefront
     {
         private Network(IntPtr handle) : base(handle) { }
 
-        /// <summary>A network in int8 that comes along.</summary>
+        /// <summary>A network in int8 that is bundled.</summary>
         public static Network BuiltIn(string name = "rgbd-8")
         {
             Check(Native.pf_network_built_in(Text.Write(name), out var network));

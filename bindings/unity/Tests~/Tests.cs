@@ -286,7 +286,7 @@ internal static class Tests
             var statistics = session.Statistics;
             Require(statistics.Submitted == 20 && statistics.Processed + statistics.Dropped == 20, "statistics");
             session.Dispose();
-            Require(heard.Holograms > 0 && heard.Holograms + heard.Dropped == 20, "each frame is told of once");
+            Require(heard.Holograms > 0 && heard.Holograms + heard.Dropped == 20, "each frame is reported exactly once");
             Require(session.ListenerFailures == heard.Holograms, "what a listener throws is counted");
         }
     }

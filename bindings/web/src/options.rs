@@ -120,9 +120,9 @@ impl RawOptions {
     }
 
     /// Corrections; none for what suits the encoding.
-    pub fn corrections(&mut self, dark: Option<f32>, local_steps: Option<u32>, midpoint_steps: Option<u32>) {
+    pub fn corrections(&mut self, dark_threshold: Option<f32>, local_steps: Option<u32>, midpoint_steps: Option<u32>) {
         let encoder = &mut self.core.encoder;
-        encoder.dark = dark.unwrap_or(encoder.dark);
+        encoder.dark_threshold = dark_threshold.unwrap_or(encoder.dark_threshold);
         *encoder = stepped(encoder, local_steps, midpoint_steps);
     }
 
@@ -183,7 +183,7 @@ impl RawOptions {
 
 /// `encoder` with other counts of steps, where they are given.
 fn stepped(encoder: &EncoderOptions, local_steps: Option<u32>, midpoint_steps: Option<u32>) -> EncoderOptions {
-    let steps = |asked: Option<u32>, usual: usize| asked.map_or(usual, |steps| steps as usize);
+    let steps = |asked: Option<u32>, defaults: usize| asked.map_or(defaults, |steps| steps as usize);
     EncoderOptions {
         local_steps: steps(local_steps, encoder.local_steps),
         midpoint_steps: steps(midpoint_steps, encoder.midpoint_steps),

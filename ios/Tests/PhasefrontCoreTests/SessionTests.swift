@@ -35,7 +35,7 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(other.info.width, 64)
     }
 
-    func testSlicesAndForeignMemoryAreHeeded() throws {
+    func testSlicesAndForeignMemoryAreRespected() throws {
         let session = try Session(options(), mode: .image)
         let want = try session.process(still()).levels()
         let padded = Data(repeating: 9, count: 60) + colourBytes() + Data(repeating: 9, count: 30)
@@ -296,12 +296,12 @@ final class SessionTests: XCTestCase {
         XCTAssertEqual(try Session(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
     }
 
-    func testTheNetworkThatIsBuiltInIsUsual() throws {
+    func testTheNetworkThatIsBuiltInIsTheDefault() throws {
         for offset in [0.0, 3, 12] {
-            let usual = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
-            guard case .trained = usual.qualityLevels[0].method else { return XCTFail("\(usual.qualityLevels)") }
-            guard case .antiAlias = usual.encoding else { return XCTFail("\(usual.encoding)") }
-            _ = try Session(usual, mode: .image).process(still())
+            let defaults = try SessionOptions(display: Display(width: 64, height: 48, offsetMm: offset))
+            guard case .trained = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
+            guard case .antiAlias = defaults.encoding else { return XCTFail("\(defaults.encoding)") }
+            _ = try Session(defaults, mode: .image).process(still())
         }
     }
 
@@ -314,30 +314,30 @@ final class SessionTests: XCTestCase {
     }
 
     func testStepsAndDarkCanBeSet() throws {
-        let usual = try SessionOptions(display: smallDisplay)
-        let levels = try Session(usual, mode: .image).process(still()).levels()
-        var options = usual
-        (options.dark, options.localSteps) = (0.4, 1)
+        let defaults = try SessionOptions(display: smallDisplay)
+        let levels = try Session(defaults, mode: .image).process(still()).levels()
+        var options = defaults
+        (options.darkThreshold, options.localSteps) = (0.4, 1)
         XCTAssertEqual(try Session(options, mode: .image).process(still()).levels(), levels)
         options.localSteps = 0
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
-        options = usual
+        options = defaults
         options.midpointSteps = 1
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
         options.midpointSteps = 0
         options.qualityLevels[0].midpointSteps = 1
         XCTAssertNotEqual(try Session(options, mode: .image).process(still()).levels(), levels)
-        options = usual
+        options = defaults
         options.localSteps = 9
         assertRefused("at most 8") { try Session(options, mode: .image) }
-        (options.dark, options.localSteps) = (2, nil)
+        (options.darkThreshold, options.localSteps) = (2, nil)
         assertRefused("from 0 to 1") { try Session(options, mode: .image) }
     }
 
-    func testWithoutANetworkTheSweepIsUsual() throws {
-        let usual = try SessionOptions(display: Display(width: 64, height: 48, pitchUm: 3.74))
-        guard case .sweep = usual.qualityLevels[0].method else { return XCTFail("\(usual.qualityLevels)") }
-        _ = try Session(usual, mode: .image).process(still())
+    func testWithoutANetworkTheSweepIsTheDefault() throws {
+        let defaults = try SessionOptions(display: Display(width: 64, height: 48, pitchUm: 3.74))
+        guard case .sweep = defaults.qualityLevels[0].method else { return XCTFail("\(defaults.qualityLevels)") }
+        _ = try Session(defaults, mode: .image).process(still())
         assertRefused("pairs for 0, 6, 12 mm") { try builtInPair(offsetMm: 3) }
     }
 

@@ -43,9 +43,9 @@ pub(crate) struct Evaluate {
     /// Encoders to judge as well, separated by commas; the complex field always is
     #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
     encoder: Vec<EncoderName>,
-    /// Each encoder with each of these amounts of dark: shares of full light below which phases are drawn to 0
-    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK], requires = "encoder")]
-    dark: Vec<f32>,
+    /// Each encoder with each of these dark thresholds: shares of full light below which phases are drawn to 0
+    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK_THRESHOLD], requires = "encoder")]
+    dark_threshold: Vec<f32>,
     /// Each encoder with each of these numbers of local steps of correction
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1], requires = "encoder")]
     local_steps: Vec<usize>,
@@ -232,11 +232,11 @@ impl Evaluate {
                     encoder.name()
                 ))
             })?;
-            for &dark in &self.dark {
+            for &dark_threshold in &self.dark_threshold {
                 for &local_steps in &self.local_steps {
                     shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| {
                         let options = EncoderOptions {
-                            dark,
+                            dark_threshold,
                             local_steps,
                             midpoint_steps,
                             ..encoding.clone().into()

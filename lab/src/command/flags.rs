@@ -116,7 +116,7 @@ pub(crate) struct EncoderFlags {
     /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0
     /// with --encoder deep]
     #[arg(long, value_name = "D")]
-    dark: Option<f32>,
+    dark_threshold: Option<f32>,
     /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
     #[arg(long, value_name = "N")]
     local_steps: Option<usize>,
@@ -135,7 +135,7 @@ pub(crate) struct Encoder {
 impl Encoder {
     pub(crate) fn describe(&self) -> String {
         let EncoderOptions {
-            dark,
+            dark_threshold,
             local_steps,
             midpoint_steps,
             ..
@@ -144,16 +144,16 @@ impl Encoder {
             0 => String::new(),
             steps => format!(", midpoint steps {steps}"),
         };
-        format!("{}, dark {dark}, local steps {local_steps}{last}", self.name)
+        format!("{}, dark {dark_threshold}, local steps {local_steps}{last}", self.name)
     }
 }
 
 impl EncoderFlags {
-    pub(crate) fn of(encoder: EncoderName, dark: f32, local_steps: usize, midpoint_steps: usize) -> Self {
+    pub(crate) fn of(encoder: EncoderName, dark_threshold: f32, local_steps: usize, midpoint_steps: usize) -> Self {
         EncoderFlags {
             encoder: Some(encoder),
             prefilter: None,
-            dark: Some(dark),
+            dark_threshold: Some(dark_threshold),
             local_steps: Some(local_steps),
             midpoint_steps,
         }
@@ -163,13 +163,13 @@ impl EncoderFlags {
         let EncoderFlags {
             encoder,
             prefilter,
-            dark,
+            dark_threshold,
             local_steps,
             midpoint_steps,
         } = self;
         request.choice("--encoder", encoder.as_ref());
         request.file("--prefilter", prefilter.as_ref().map(Path::new))?;
-        request.set("--dark", *dark);
+        request.set("--dark-threshold", *dark_threshold);
         request.set("--local-steps", *local_steps);
         request.set("--midpoint-steps", Some(*midpoint_steps));
         Ok(())
@@ -190,7 +190,7 @@ impl EncoderFlags {
         let usual = EncoderOptions::from(encoding);
         Encoder {
             options: EncoderOptions {
-                dark: self.dark.unwrap_or(usual.dark),
+                dark_threshold: self.dark_threshold.unwrap_or(usual.dark_threshold),
                 local_steps: self.local_steps.unwrap_or(usual.local_steps),
                 midpoint_steps: self.midpoint_steps,
                 ..usual

@@ -273,7 +273,7 @@ impl Hologram {
             json,
             &json!({
                 "output": self.output.display().to_string(), "complex": self.complex, "width": width, "height": height,
-                "method": made.method, "encoder": made.encoder.name, "dark": made.encoder.options.dark,
+                "method": made.method, "encoder": made.encoder.name, "dark_threshold": made.encoder.options.dark_threshold,
                 "local_steps": made.encoder.options.local_steps, "scale": made.scale, "engine": made.engine,
                 "stage_ms": stages, "total_ms": ms(&total), "shown": judged,
             }),
@@ -309,7 +309,7 @@ impl Making {
         "occlusion",
         "encoder",
         "prefilter",
-        "dark",
+        "dark_threshold",
         "local_steps",
         "midpoint_steps",
         "scale",

@@ -200,8 +200,8 @@ impl Judge {
                 let steps = EncoderOptions::default().local_steps;
                 let corrections = [
                     (0.0, 0, 0),
-                    (EncoderOptions::DARK, steps, 0),
-                    (EncoderOptions::DARK, steps, STILL_STEPS),
+                    (EncoderOptions::DARK_THRESHOLD, steps, 0),
+                    (EncoderOptions::DARK_THRESHOLD, steps, STILL_STEPS),
                 ];
                 ways.extend(corrections.map(|(dark, local, midpoint)| Way {
                     method,

@@ -27,7 +27,7 @@ pub struct EncoderOptions {
     pub brightness: Brightness,
     /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase,
     /// which shows noise there as coloured speckle. 0 leaves phases as they are.
-    pub dark: f32,
+    pub dark_threshold: f32,
     /// Steps of local correction: each draws what is shown behind the display's aperture toward the field that is
     /// wanted. The first brings most; 8 at most.
     pub local_steps: usize,
@@ -37,13 +37,13 @@ pub struct EncoderOptions {
 }
 
 impl EncoderOptions {
-    /// The usual [`Self::dark`], chosen on validation scenes.
-    pub const DARK: f32 = 0.4;
+    /// The default [`Self::dark_threshold`], chosen on validation scenes.
+    pub const DARK_THRESHOLD: f32 = 0.4;
 
     /// `encoding` as it is published: nothing is drawn or corrected.
     pub fn plain(encoding: Encoding) -> Self {
         EncoderOptions {
-            dark: 0.0,
+            dark_threshold: 0.0,
             local_steps: 0,
             ..encoding.into()
         }
@@ -54,10 +54,10 @@ impl EncoderOptions {
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
-        if !(0.0..=1.0).contains(&self.dark) {
+        if !(0.0..=1.0).contains(&self.dark_threshold) {
             return Err(Error::Plan(format!(
-                "dark is {}; it must be a share of full light from 0 to 1",
-                self.dark
+                "the dark threshold is {}; it must be a share of full light from 0 to 1",
+                self.dark_threshold
             )));
         }
         if self.local_steps > local::MAX_STEPS {
@@ -86,17 +86,17 @@ impl Default for EncoderOptions {
 }
 
 impl From<Encoding> for EncoderOptions {
-    /// This encoding, smoothed brightness, [`Self::DARK`] and one local step. A pre-filter was trained without the two:
-    /// with it both are 0.
+    /// This encoding, smoothed brightness, [`Self::DARK_THRESHOLD`] and one local step. A pre-filter was trained
+    /// without the two: with it both are 0.
     fn from(encoding: Encoding) -> Self {
         let (dark, local_steps) = match encoding {
             Encoding::Deep(_) => (0.0, 0),
-            _ => (Self::DARK, 1),
+            _ => (Self::DARK_THRESHOLD, 1),
         };
         EncoderOptions {
             encoding,
             brightness: Brightness::default(),
-            dark,
+            dark_threshold: dark,
             local_steps,
             midpoint_steps: 0,
         }

@@ -97,7 +97,7 @@ fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, opt
             let filter = BandLimit::new(h, w, k).unwrap();
             filter.filter(&mut filtered, &mut filter.scratch());
         }
-        let dark = (f64::from(options.dark), f64::from(SCALE));
+        let dark = (f64::from(options.dark_threshold), f64::from(SCALE));
         let start = start(&filtered, shape, &options.encoding, dark, &light);
         let goal = |u: &Complex32| Complex64::new(u.re.into(), u.im.into()) / f64::from(SCALE);
         let goal: Vec<Complex64> = plane.iter().map(goal).collect();
@@ -128,7 +128,7 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
         for encoding in &encodings {
             for (dark, local_steps) in [(0.4, 0), (0.0, 1), (0.4, 1), (0.4, 2), (1.0, 3)] {
                 let options = EncoderOptions {
-                    dark,
+                    dark_threshold: dark,
                     local_steps,
                     ..encoding.clone().into()
                 };
@@ -192,7 +192,7 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
         for encoding in [Encoding::DoublePhase, Encoding::ANTI_ALIAS, Encoding::BAND_LIMIT] {
             let error = |dark, local_steps| {
                 let options = EncoderOptions {
-                    dark,
+                    dark_threshold: dark,
                     local_steps,
                     ..encoding.clone().into()
                 };
@@ -387,7 +387,7 @@ fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
 #[test]
 fn a_dark_frame_is_dark() {
     let options = EncoderOptions {
-        dark: 0.4,
+        dark_threshold: 0.4,
         local_steps: 2,
         ..Default::default()
     };
@@ -441,7 +441,7 @@ fn refused(options: EncoderOptions, what: &str) {
 fn a_dark_that_is_no_share_is_refused() {
     for dark in [-0.1, 1.5, f32::NAN, f32::INFINITY] {
         let options = EncoderOptions {
-            dark,
+            dark_threshold: dark,
             ..Default::default()
         };
         refused(options, "from 0 to 1");

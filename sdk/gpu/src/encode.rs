@@ -216,7 +216,7 @@ mod tests {
             let (size, brightness) = (*size, *brightness);
             let options = EncoderOptions {
                 brightness,
-                dark: if matches!(encoding, Encoding::AntiAlias { width: 9, .. }) {
+                dark_threshold: if matches!(encoding, Encoding::AntiAlias { width: 9, .. }) {
                     0.0
                 } else {
                     dark

@@ -21,7 +21,7 @@ pub struct SessionOptions {
     /// Whether the session may change its quality level by itself.
     pub quality: Quality,
     /// Frames a second that are aimed at: a live session drops frames that come sooner, and an adaptive one steps down
-    /// where it cannot hold it. None takes frames as they come and never steps.
+    /// where it cannot hold it. None takes every frame and never steps.
     pub target_rate_hz: Option<f64>,
     /// How fields become levels.
     pub encoder: EncoderOptions,

@@ -319,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn it_heeds_heat() {
+    fn it_follows_heat() {
         let mut control = LevelControl::new(3, 0);
         let costs = [25, 15, 5];
         assert!(run(&mut control, &costs, Thermal::Nominal, 500).is_empty());

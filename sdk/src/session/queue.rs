@@ -292,7 +292,7 @@ mod tests {
         clock: u64,
         tickets: Vec<Ticket>,
         flying: Option<(u64, u64)>,
-        /// What was told of each admitted frame, which is told once. Timestamps begin anew with each epoch.
+        /// What was told of each admitted frame, which is reported exactly once. Timestamps begin anew with each epoch.
         told: BTreeMap<(u64, u64), Option<DropReason>>,
         admitted: Vec<(u64, u64)>,
         drops: Vec<(u64, DropReason)>,
@@ -442,7 +442,7 @@ mod tests {
                 (self.refused, self.processed, self.failed)
             );
             assert_eq!(counts.dropped.total(), self.drops.len() as u64);
-            // Every admitted frame is told once: done, failed or dropped, by its timestamp.
+            // Every admitted frame is reported exactly once: done, failed or dropped, by its timestamp.
             let mut told: Vec<u64> = (self.told.keys().map(|(_, timestamp)| *timestamp))
                 .chain(self.drops.iter().map(|(timestamp, _)| *timestamp))
                 .collect();

@@ -52,14 +52,14 @@ export interface SessionOptions {
   readonly qualityLevels?: readonly QualityLevel[];
   /** `adaptive` unless it is said. */
   readonly quality?: Quality;
-  /** Frames a second that are aimed at; without it the session takes frames as they come and never steps. */
+  /** Frames a second that are aimed at; without it the session takes every frame and never steps. */
   readonly targetRateHz?: number;
   /** `anti-alias` unless it is said. */
   readonly encoding?: Encoding;
   /** `smoothed` unless it is said. */
   readonly brightness?: Brightness;
   /** The share of full light below which phases are drawn to 0; what suits the encoding unless it is said. */
-  readonly dark?: number;
+  readonly darkThreshold?: number;
   /** Steps of correction, 0 to 8; what suits the encoding unless it is said. */
   readonly localSteps?: number;
   /** Steps of correction at the midpoint, 0 to 100, each of four transforms a colour; 0 unless it is said. */
@@ -109,7 +109,7 @@ function setEncoder(raw: RawOptions, options: SessionOptions): void {
   else if (encoding?.kind === "band-limit") raw.encoding(encoding.kind, encoding.k);
   else if (encoding) raw.encoding(encoding.kind);
   if (brightness) raw.brightness(brightness.kind, brightness.kind === "fixed" ? brightness.scale : undefined);
-  raw.corrections(options.dark, options.localSteps, options.midpointSteps);
+  raw.corrections(options.darkThreshold, options.localSteps, options.midpointSteps);
 }
 
 function qualityLevel(quality: Quality): number | undefined {

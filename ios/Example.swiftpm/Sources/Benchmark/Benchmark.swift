@@ -36,7 +36,7 @@ struct Spread: Codable, Equatable, Sendable {
 }
 
 /// What is timed: frames by `method`, corrected by `localSteps` and nothing else, and the stage that the run is about;
-/// where one is nil, as is usual.
+/// where one is nil, the default.
 struct Run: Sendable {
     let name: String
     let stage: Stage
@@ -46,11 +46,11 @@ struct Run: Sendable {
     /// Its options on `display`.
     func options(_ display: Display) throws -> SessionOptions {
         var options = try SessionOptions(display: display, method: method)
-        if let localSteps { (options.dark, options.localSteps) = (0, localSteps) }
+        if let localSteps { (options.darkThreshold, options.localSteps) = (0, localSteps) }
         return options
     }
 
-    /// Networks of 8, 15 and `deep`'s layers, the plane sweep, one step of correction, and what is usual.
+    /// Networks of 8, 15 and `deep`'s layers, the plane sweep, one step of correction, and the default.
     static func all(deep: Network) throws -> [Run] {
         let shallow = try Method.trained(network: Network.builtIn(name: "rgbd-8"))
         return try [

@@ -98,7 +98,7 @@ impl Encoder {
             height,
             width,
             prefilter,
-            dark: options.dark,
+            dark: options.dark_threshold,
             local: (options.local_steps > 0).then(|| Local {
                 filter: LocalFilter::of_aperture(target.display.aperture_radius()),
                 steps: options.local_steps,

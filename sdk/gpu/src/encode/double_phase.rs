@@ -217,7 +217,7 @@ fn header(job: &EncoderJob<'_>, filtered: &Filtered<'_>, curves: &Curves) -> Str
         filtered.taps.len() - 1,
         filtered.turn.is_some(),
         matches!(job.options.brightness, Brightness::Fixed(_)),
-        job.options.dark,
+        job.options.dark_threshold,
         curves.steps,
         curves.table.len() > 1,
         curves.pixels,

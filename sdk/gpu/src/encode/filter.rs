@@ -52,9 +52,9 @@ impl Filter {
                     rest.taps = blur.taps().to_vec();
                     Filter::None
                 } else {
-                    if job.options.dark > 0.0 {
+                    if job.options.dark_threshold > 0.0 {
                         return Err(GpuError::Refused(format!(
-                            "a blur over {width} pixels with dark; up to {} pixels, dark 0, or the CPU are right",
+                            "a blur over {width} pixels with a dark threshold; up to {} pixels, a threshold of 0, or the CPU are right",
                             2 * FUSED_HALF + 1
                         )));
                     }

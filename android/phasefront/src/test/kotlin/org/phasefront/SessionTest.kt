@@ -50,7 +50,7 @@ class SessionTest {
     }
 
     @Test
-    fun positionsAndSlicesOfBuffersAreHeeded() = image { session ->
+    fun positionsAndSlicesOfBuffersAreRespected() = image { session ->
         val want = session.process(still()).use { it.levels() }
         val colour = colourBytes()
         val positioned = direct(colour.capacity() + 100).position(60).put(colour.duplicate())
@@ -314,12 +314,12 @@ class SessionTest {
     }
 
     @Test
-    fun theNetworkThatIsBuiltInIsUsual() {
+    fun theNetworkThatIsBuiltInIsTheDefault() {
         for (offset in listOf(0.0, 3.0, 12.0)) {
-            val usual = sessionOptions(display.copy(offsetMm = offset))
-            assertIs<Method.Trained>(usual.qualityLevels[0].method)
-            assertTrue(usual.encoding is Encoding.AntiAlias)
-            Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+            val defaults = sessionOptions(display.copy(offsetMm = offset))
+            assertIs<Method.Trained>(defaults.qualityLevels[0].method)
+            assertTrue(defaults.encoding is Encoding.AntiAlias)
+            Session(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         }
     }
 
@@ -334,21 +334,21 @@ class SessionTest {
     fun stepsAndDarkCanBeSet() {
         fun levels(options: SessionOptions) =
             Session(options, RunningMode.IMAGE).use { session -> session.process(still()).use { it.levels() } }
-        val usual = sessionOptions(display)
-        assertContentEquals(levels(usual), levels(usual.copy(dark = 0.4f, localSteps = 1u)))
-        assertTrue(!levels(usual).contentEquals(levels(usual.copy(localSteps = 0u))))
-        assertTrue(!levels(usual).contentEquals(levels(usual.copy(midpointSteps = 1u))))
-        val qualityLevel = usual.qualityLevels[0].copy(midpointSteps = 1u)
-        assertTrue(!levels(usual).contentEquals(levels(usual.copy(qualityLevels = listOf(qualityLevel)))))
-        assertRefused<PhasefrontException>("at most 8") { Session(usual.copy(localSteps = 9u), RunningMode.IMAGE) }
-        assertRefused<PhasefrontException>("from 0 to 1") { Session(usual.copy(dark = 2f), RunningMode.IMAGE) }
+        val defaults = sessionOptions(display)
+        assertContentEquals(levels(defaults), levels(defaults.copy(darkThreshold = 0.4f, localSteps = 1u)))
+        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(localSteps = 0u))))
+        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(midpointSteps = 1u))))
+        val qualityLevel = defaults.qualityLevels[0].copy(midpointSteps = 1u)
+        assertTrue(!levels(defaults).contentEquals(levels(defaults.copy(qualityLevels = listOf(qualityLevel)))))
+        assertRefused<PhasefrontException>("at most 8") { Session(defaults.copy(localSteps = 9u), RunningMode.IMAGE) }
+        assertRefused<PhasefrontException>("from 0 to 1") { Session(defaults.copy(darkThreshold = 2f), RunningMode.IMAGE) }
     }
 
     @Test
-    fun withoutANetworkTheSweepIsUsual() {
-        val usual = sessionOptions(display.copy(pitchUm = 3.74))
-        assertIs<Method.Sweep>(usual.qualityLevels[0].method)
-        Session(usual, RunningMode.IMAGE).use { session -> session.process(still()).close() }
+    fun withoutANetworkTheSweepIsTheDefault() {
+        val defaults = sessionOptions(display.copy(pitchUm = 3.74))
+        assertIs<Method.Sweep>(defaults.qualityLevels[0].method)
+        Session(defaults, RunningMode.IMAGE).use { session -> session.process(still()).close() }
         assertRefused<PhasefrontException.Network>("pairs for 0, 6, 12 mm") { builtInPair(3.0) }
     }
 

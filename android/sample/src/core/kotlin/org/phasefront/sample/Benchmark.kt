@@ -46,17 +46,17 @@ data class Spread(val least: Double, val lower: Double, val median: Double, val 
 
 /**
  * What is timed: frames by [method], corrected by [localSteps] and nothing else, and the [stage] that the run is about;
- * where one is null, as is usual.
+ * where one is null, the default.
  */
 class Run(val name: String, val stage: Stage, val method: Method? = null, val localSteps: UInt? = 0u) {
     /** Its options on [display]. */
     fun options(display: Display): SessionOptions {
-        val usual = sessionOptions(display, method)
-        return if (localSteps == null) usual else usual.copy(dark = 0f, localSteps = localSteps)
+        val defaults = sessionOptions(display, method)
+        return if (localSteps == null) defaults else defaults.copy(darkThreshold = 0f, localSteps = localSteps)
     }
 
     companion object {
-        /** Networks of 8, 15 and [deep]'s layers, the plane sweep, one step of correction, and what is usual. */
+        /** Networks of 8, 15 and [deep]'s layers, the plane sweep, one step of correction, and the default. */
         fun all(deep: Network): List<Run> {
             val shallow = Method.Trained(Network.builtIn("rgbd-8"))
             return listOf(
