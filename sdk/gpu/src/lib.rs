@@ -1,11 +1,28 @@
-//! The whole frame on the GPU: the stages of [`phasefront_core::pipeline`] as compute passes of wgpu, for Vulkan, Metal and
-//! DirectX 12, RGB-D in and modulator levels out, nothing coming back to the CPU between.
+//! Whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as compute passes of wgpu, for Vulkan, Metal and
+//! DirectX 12. A frame goes in, modulator levels come out, and nothing comes back to the CPU between.
 //!
-//! Each stage is a .wgsl file beside its Rust, and has its CPU twin as oracle: f32 agrees with it to 1e-4, int8 chains
-//! to the bit. A device is not trusted before a small frame came out of it as out of the CPU.
+//! Each stage is a .wgsl file beside its Rust. A header that the Rust writes before the text holds the constants, so that
+//! loops have constant bounds. The CPU's stage is the oracle: f32 agrees with it to 1e-4, int8 networks agree to the
+//! bit. A device is used only after it has computed a small frame as the CPU does.
 //!
-//! A session falls back to the CPU by itself. Whoever wants the levels on the GPU, to show them without a copy, plans
-//! here:
+//! | module | what it does |
+//! |---|---|
+//! | `device` | opens a GPU, compiles programs, holds memory; errors are values |
+//! | `input` | camera formats to groups of four channels |
+//! | `method` | a network (`chain`), the plane sweep (`sweep`, `hidden`), or the network on the sweep's field |
+//! | `fft` | a filter in the Fourier domain in three dispatches |
+//! | `encode` | filters, largest amplitude, double phase, levels, local and midpoint correction |
+//! | `pipeline` | all of it, three frames in flight |
+//! | `probe` | compares a small frame with the CPU's |
+//! | `renderer` | opens a lost device again |
+//! | `watch` | gives up on drivers that do not answer |
+//!
+//! In `chain` a thread computes four pixels of a column for eight filters at a time, with weights in uniform memory in
+//! reading order. Two layers and the skip around them can be one dispatch: fewer reads and writes of memory for a fifth
+//! more arithmetic. `sweep` can take one or two planes in a dispatch. The plan measures both ways and takes the faster.
+//! Sines, arc functions and tanh are polynomials of our own, because drivers promise only 5e-4.
+//!
+//! A session falls back to the CPU by itself. To display levels without a copy to the CPU, plan here:
 //!
 //! ```no_run
 //! use phasefront_gpu::{Deliver, Device, DeviceOptions, Frame, GpuError, GpuPipeline, Job, probe};
