@@ -68,13 +68,6 @@
 
 pub use {ndarray, num_complex};
 
-#[cfg(feature = "gpu")]
-#[cfg_attr(docsrs, doc(cfg(feature = "gpu")))]
-pub mod gpu {
-    //! Which GPU a session computes on, and how.
-    pub use crate::session::GpuOptions;
-    pub use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
-}
 #[doc(hidden)]
 pub mod device {
     pub use phasefront_core::output::modulator::{ModulatorSpec as Device, Packing};
@@ -90,11 +83,14 @@ pub mod target {
     //! What a hologram is made for beside its [`Display`](crate::Display): the modulator's response, the lasers' light, the
     //! correction of the optics.
     pub use phasefront_core::display::illumination::Illumination;
-    pub use phasefront_core::display::panel::{Flatness, Panel};
-    pub use phasefront_core::display::registration::Registration;
     pub use phasefront_core::display::response::Response;
-    pub use phasefront_core::display::response::per_pixel::PerPixel;
-    pub use phasefront_core::optics::zernike::{Aberration, Coefficients};
+    #[doc(hidden)]
+    pub use phasefront_core::display::{
+        panel::{Flatness, Panel},
+        registration::Registration,
+        response::per_pixel::PerPixel,
+    };
+    pub use phasefront_core::optics::zernike::Aberration;
 }
 #[cfg_attr(surface, doc(hidden))]
 pub mod unstable;

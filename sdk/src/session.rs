@@ -34,7 +34,9 @@ pub use handle::SessionHandle;
 pub use hologram::Hologram;
 #[cfg(feature = "gpu")]
 pub use on_gpu::GpuOptions;
-pub use options::{MOST_PIXELS, MOST_QUALITY_LEVELS, MOST_THREADS, SessionOptions};
+pub use options::SessionOptions;
+#[cfg(feature = "gpu")]
+pub use phasefront_gpu::{Device, DeviceOptions};
 pub use quality::{Backend, Quality, QualityChange, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 

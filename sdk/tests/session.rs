@@ -9,7 +9,7 @@ use phasefront::input::{
     Alignment, CameraFrame, Cameras, ColourFormat, ColourImage, DepthFormat, Intrinsics, Orientation, Plane, Rotation,
 };
 use phasefront::output::{Layout, Output, Placement};
-use phasefront::session::{DropReason, Event, MOST_QUALITY_LEVELS, Quality, QualityLevel, Submission, Thermal};
+use phasefront::session::{DropReason, Event, Quality, QualityLevel, Submission, Thermal};
 use phasefront::target::{Aberration, Response};
 use phasefront::{
     Brightness, Display, EncoderOptions, Error, ImageSession, LiveSession, Method, SessionOptions, Sweep, Target,
@@ -718,7 +718,9 @@ fn options_that_cannot_be_meant_are_named() {
         assert!(message.contains(word), "{word}: {message}");
     };
     refuse(&|o| o.quality_levels.clear(), "no quality levels");
-    let many = |o: &mut SessionOptions| o.quality_levels = vec![o.quality_levels[0].clone(); MOST_QUALITY_LEVELS + 1];
+    let many = |o: &mut SessionOptions| {
+        o.quality_levels = vec![o.quality_levels[0].clone(); SessionOptions::MOST_QUALITY_LEVELS + 1]
+    };
     refuse(&many, "17 quality levels are too many; 1 to 16 are right");
     refuse(&|o| o.quality = Quality::Fixed(1), "no quality level 1");
     refuse(&|o| o.quality_levels[0].width = W + 1, "quality level 0 is 65×48");

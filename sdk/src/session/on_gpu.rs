@@ -17,7 +17,8 @@ use std::sync::Arc;
 pub struct GpuOptions {
     /// Which one, and what was compiled for it on an earlier run.
     pub device: DeviceOptions,
-    /// How networks are computed: f32 networks in 16 bits where the GPU has them, if nothing else is said.
+    /// How networks are computed. By default f32 networks run in 16 bits where the GPU has them.
+    #[doc(hidden)]
     pub chain: ChainOptions,
 }
 

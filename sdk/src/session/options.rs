@@ -16,7 +16,7 @@ use std::num::NonZeroUsize;
 pub struct SessionOptions {
     /// What holograms are for.
     pub target: Target,
-    /// Quality levels, the best first, [`MOST_QUALITY_LEVELS`] at most.
+    /// Quality levels, the best first, [`Self::MOST_QUALITY_LEVELS`] at most.
     pub quality_levels: Vec<QualityLevel>,
     /// Whether the session may change its quality level by itself.
     pub quality: Quality,
@@ -32,22 +32,22 @@ pub struct SessionOptions {
     /// Which GPU, and how.
     #[cfg(feature = "gpu")]
     pub gpu: GpuOptions,
-    /// Threads to compute with, [`MOST_THREADS`] at most; None for as many as the device has, and no more than that.
+    /// Threads to compute with, [`Self::MOST_THREADS`] at most; None for as many as the device has, and no more than that.
     pub threads: Option<NonZeroUsize>,
     /// Most pixels of a quality level and of the modulator: what a session allocates is a multiple of them.
     pub most_pixels: usize,
 }
 
-/// Most threads of a session's pool. A live session has one more.
-pub const MOST_THREADS: usize = 256;
-
-/// Most quality levels of a session: each is planned once when the session is made.
-pub const MOST_QUALITY_LEVELS: usize = 16;
-
-/// [`SessionOptions::most_pixels`] unless it is set: 8192×4096, which holds 8K UHD.
-pub const MOST_PIXELS: usize = 1 << 25;
-
 impl SessionOptions {
+    /// Most threads of a session's pool. A live session has one more.
+    pub const MOST_THREADS: usize = 256;
+
+    /// Most quality levels of a session: each is planned once when the session is made.
+    pub const MOST_QUALITY_LEVELS: usize = 16;
+
+    /// The default of [`Self::most_pixels`]: 8192×4096, which holds 8K UHD.
+    pub const MOST_PIXELS: usize = 1 << 25;
+
     /// Holograms of the modulator's resolution by `method`: AA-DPM, smoothed brightness, near and far by percentiles,
     /// no target rate.
     pub fn new(target: impl Into<Target>, method: Method) -> Self {
@@ -69,7 +69,7 @@ impl SessionOptions {
             #[cfg(feature = "gpu")]
             gpu: GpuOptions::default(),
             threads: None,
-            most_pixels: MOST_PIXELS,
+            most_pixels: Self::MOST_PIXELS,
             target,
         }
     }
@@ -85,10 +85,11 @@ impl SessionOptions {
             )));
         }
         if let Some(threads) = self.threads
-            && threads.get() > MOST_THREADS
+            && threads.get() > Self::MOST_THREADS
         {
             return Err(Error::Plan(format!(
-                "{threads} threads are too many; 1 to {MOST_THREADS} are right, or none for as many as the device has"
+                "{threads} threads are too many; 1 to {} are right, or none for as many as the device has",
+                Self::MOST_THREADS
             )));
         }
         if let Some(rate) = self.target_rate_hz

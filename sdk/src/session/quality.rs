@@ -1,6 +1,6 @@
 //! Quality levels, and when a session changes between them.
 
-use super::{MOST_QUALITY_LEVELS, SessionOptions};
+use super::SessionOptions;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
@@ -248,10 +248,11 @@ pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator
             "there are no quality levels; at least one is needed".into(),
         ));
     }
-    if quality_levels.len() > MOST_QUALITY_LEVELS {
+    if quality_levels.len() > SessionOptions::MOST_QUALITY_LEVELS {
         return Err(Error::Plan(format!(
-            "{} quality levels are too many; 1 to {MOST_QUALITY_LEVELS} are right",
-            quality_levels.len()
+            "{} quality levels are too many; 1 to {} are right",
+            quality_levels.len(),
+            SessionOptions::MOST_QUALITY_LEVELS
         )));
     }
     quality.check(quality_levels.len())?;

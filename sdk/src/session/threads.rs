@@ -1,7 +1,7 @@
 //! The threads that a session computes with.
 
+use super::SessionOptions;
 use super::computing::Computing;
-use super::options::MOST_THREADS;
 use phasefront_core::runtime::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
@@ -31,7 +31,7 @@ impl Threads {
         let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let pool = match threads {
             Some(threads) => pool.num_threads(threads.get()),
-            None if device > MOST_THREADS => pool.num_threads(MOST_THREADS),
+            None if device > SessionOptions::MOST_THREADS => pool.num_threads(SessionOptions::MOST_THREADS),
             None => pool,
         };
         let started = pool.build();

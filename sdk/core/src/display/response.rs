@@ -25,7 +25,8 @@ pub enum Response {
         /// phase of the nearest one that does.
         phase: Box<[f32; 256]>,
     },
-    /// Each pixel of each colour has its own curve.
+    /// Each pixel of each colour has its own curve. It comes with a calibrated target's file.
+    #[doc(hidden)]
     PerPixel(Arc<PerPixel>),
 }
 

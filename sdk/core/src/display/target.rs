@@ -31,9 +31,11 @@ pub struct Target {
     pub illumination: Option<Illumination>,
     /// What corrects the optics' aberration, where it is one for all depths.
     pub correction: Option<Aberration>,
-    /// What the panel adds to the response.
+    /// What the panel adds to the response. It comes with a calibrated target's file.
+    #[doc(hidden)]
     pub panel: Panel,
-    /// How each colour is moved and scaled.
+    /// How each colour is moved and scaled. It comes with a calibrated target's file.
+    #[doc(hidden)]
     pub registration: Registration,
 }
 

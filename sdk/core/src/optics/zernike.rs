@@ -69,7 +69,7 @@ impl Aberration {
     ///
     /// # Errors
     /// Neither three colours nor one; a coefficient that is not finite or beyond ±10⁴.
-    pub fn new(coefficients: impl Into<Vec<Coefficients>>) -> Result<Self> {
+    pub fn new(coefficients: impl Into<Vec<[f64; 5]>>) -> Result<Self> {
         let coefficients = coefficients.into();
         if ![1, 3].contains(&coefficients.len()) {
             return Err(Error::Plan(format!(
@@ -86,7 +86,7 @@ impl Aberration {
     }
 
     /// The coefficients of each colour, radians.
-    pub fn coefficients(&self) -> &[Coefficients] {
+    pub fn coefficients(&self) -> &[[f64; 5]] {
         &self.coefficients
     }
 
