@@ -1,8 +1,9 @@
-//! What the laboratory reads: the first byte says as what, the rest is the file.
+//! What `phasefront-io` and `phasefront-lab` read: the first byte says as what, the rest is the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use phasefront_lab::{files, ldi, scene};
+use phasefront_io::{display, hologram, ldi, picture};
+use phasefront_lab::scene;
 use std::path::Path;
 
 fuzz_target!(|data: &[u8]| {
@@ -14,17 +15,17 @@ fuzz_target!(|data: &[u8]| {
         std::fs::write(&path, file).expect("a file");
         path
     };
-    let told = |result: phasefront_lab::Result<()>| {
+    let told = |result: phasefront_io::Result<()>| {
         if let Err(why) = result {
             assert!(!why.to_string().contains(char::is_control), "{why}");
         }
     };
     let model = |path: &Path| scene::read_model(path, 8, 8, None).map(|_| ());
     match kind % 8 {
-        0 => told(files::read_rgb(&write("a.png")).map(|_| ())),
-        1 => told(files::read_depth(&write("a.npy"), false).map(|_| ())),
-        2 => told(files::read_hologram(&write("a.png")).map(|_| ())),
-        3 => told(files::read_display(&write("a.toml")).map(|_| ())),
+        0 => told(picture::read_rgb(&write("a.png")).map(|_| ())),
+        1 => told(picture::depth_map::read_depth(&write("a.npy"), false).map(|_| ())),
+        2 => told(hologram::read_hologram(&write("a.png")).map(|_| ())),
+        3 => told(display::read_display(&write("a.toml")).map(|_| ())),
         4 => told(model(&write("a.glb"))),
         5 => told(model(&write("a.gltf"))),
         6 => {

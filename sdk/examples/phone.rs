@@ -1,5 +1,5 @@
 //! What a phone needs of the SDK behind one C function: a network from memory, a frame to levels. Built as a library to
-//! measure its size, see `lab/library_size.py`; bindings for apps are another crate's.
+//! measure its size, see `tools/lab/library_size.py`; bindings for apps are another crate's.
 #![allow(unsafe_code)]
 
 use ndarray::{Array2, Array3};

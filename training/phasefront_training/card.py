@@ -11,7 +11,7 @@ from .files import replacing
 from .networks import multiplies_per_pixel
 from .optics import Display
 
-USUAL = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront dataset`
+USUAL = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront-lab dataset`
 SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "average", "rate", "seed", "scenes", "f32")
 
 

@@ -1,4 +1,4 @@
-"""Pairs of scene and hologram, as `phasefront dataset` writes them, held in memory; and samples drawn from them.
+"""Pairs of scene and hologram, as `phasefront-lab dataset` writes them, held in memory; and samples drawn from them.
 
 A data set is a folder with `manifest.json` and one `pair_000123.npz` a scene:
 `rgb` uint8 (L, H, W, 4), front layer first, alpha 0 where the layer has no hit; `depth` uint16 (L, H, W),
@@ -37,8 +37,8 @@ class DataError(Exception):
     """Something about a data set that keeps it from being used; the message says what and where."""
 
 
-def make(output, arguments, command="phasefront"):
-    """Calls the lab's `phasefront dataset` to make or complete a data set; raises DataError where it fails."""
+def make(output, arguments, command="phasefront-lab"):
+    """Calls `phasefront-lab dataset` to make or complete a data set; raises DataError where it fails."""
     call = [command, "dataset", *arguments, "-o", str(output)]
     try:
         status = subprocess.run(call, check=False).returncode

@@ -44,10 +44,10 @@ def check(shares, scenes, shard_scenes, arguments):
         raise ValueError(f"{', '.join(taken)} behind -- is the pool's own to say")
 
 
-def make(folder, scenes, shares=None, shard_scenes=SHARD_SCENES, limit_bytes=None, textures=None, arguments=(), command="phasefront"):
+def make(folder, scenes, shares=None, shard_scenes=SHARD_SCENES, limit_bytes=None, textures=None, arguments=(), command="phasefront-lab"):
     """Makes the shards that are not there yet, until there are `scenes` scenes or the disk's share is spent.
 
-    textures: a folder of pictures for surfaces. arguments: more for `phasefront dataset`, such as --size 256. Stopped, the
+    textures: a folder of pictures for surfaces. arguments: more for `phasefront-lab dataset`, such as --size 256. Stopped, the
     same call goes on. Returns how many shards there are.
     """
     shares = shares or SHARES

@@ -2,7 +2,7 @@
 
 A folder beside a data set, made by `python -m phasefront_training seeds`. This package writes the depths,
 `depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are degraded
-(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront seeds` may add R more, read by a
+(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront-lab seeds` may add R more, read by a
 sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W); and adds to all of them the fields that the SDK
 computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale that `seeds.json`
 says.
@@ -24,7 +24,7 @@ from .files import replacing
 FORMAT = "phasefront-seeds-1"
 
 
-def make(manifest, output, variants, arguments, command="phasefront"):
+def make(manifest, output, variants, arguments, command="phasefront-lab"):
     """Makes or completes the seeds of a data set: `variants` depths a scene, then the lab's command for the fields."""
     output = Path(output)
     output.mkdir(parents=True, exist_ok=True)

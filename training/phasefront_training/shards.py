@@ -1,4 +1,4 @@
-"""A data set made by many processes or machines: each shard of `phasefront dataset` is a Ray task.
+"""A data set made by many processes or machines: each shard of `phasefront-lab dataset` is a Ray task.
 
 All tasks write into one folder, which every machine must see under the same path, as it must the command. A pair
 is renamed into its place when it is whole, so shards neither wait for nor disturb each other, and a stopped run goes
@@ -17,7 +17,7 @@ SHARDS_PER_SLOT = 4  # scenes differ in cost: small shards leave no machine idle
 RETRIES = 2  # of a shard whose machine was lost
 
 
-def make(output, arguments, command="phasefront", address=None, shards=None, cpus=1):
+def make(output, arguments, command="phasefront-lab", address=None, shards=None, cpus=1):
     """Makes the data set in `output`, `shards` tasks of `cpus` cores; returns how many shards there were.
 
     `address` is the Ray cluster's; None starts one on this machine for the time of the call. Raises DataError where

@@ -10,7 +10,7 @@ from phasefront_training import recipe
 from phasefront_training.__main__ import main
 
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "phasefront"
-COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target")) / "release" / "phasefront"
+COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target")) / "release" / "phasefront-lab"
 
 
 def settings(folder, **changes):
@@ -76,7 +76,7 @@ def test_what_there_is_not_is_named(tmp_path, changes, words):
 
 
 def test_all_of_it_from_nothing(tmp_path):
-    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
+    assert COMMAND.exists(), "cargo build --release --workspace builds the command"
     few = settings(tmp_path, networks=("rgbd-8", "rgbd-15-wide"), hours=0.002, training=("--f32", "--crop", "48"))
     assert recipe.run(few, lambda arguments: main(list(arguments))) == len(list(recipe.steps(few)))
     for name in ("rgbd-8.onnx", "rgbd-8-int8.onnx", "rgbd-8.md"):

@@ -21,7 +21,8 @@ from phasefront_training.quantize import Quantized, calibrate
 from phasefront_training.stage2 import prefilter_network
 
 CACHE = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "phasefront"
-COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target")) / "release" / "phasefront"
+BUILT = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target")) / "release"
+COMMAND, LAB = BUILT / "phasefront", BUILT / "phasefront-lab"
 OFFSET_MM = 2.0
 
 
@@ -37,7 +38,7 @@ def networks():
 
 @pytest.mark.parametrize("precision", ["f32", "int8"])
 def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
-    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
+    assert COMMAND.exists(), "cargo build --release --workspace builds the command"
     display, (hologram, prefilter) = Display(), networks()
     height, width = 60, 83
     y, x = np.mgrid[:height, :width]
@@ -77,9 +78,9 @@ def test_deep_encoding_of_an_image_is_the_same(tmp_path, precision):
 
 
 def test_what_is_visible_by_waves_is_the_labs(tmp_path):
-    assert COMMAND.exists(), "cargo build --release -p phasefront-lab builds the command"
+    assert LAB.exists(), "cargo build --release --workspace builds the command"
     size = ["--scenes", "1", "--size", "61", "--planes", "23", "--ldi-layers", "1"]
-    subprocess.run([COMMAND, "dataset", *size, "-o", tmp_path / "data"], check=True)
+    subprocess.run([LAB, "dataset", *size, "-o", tmp_path / "data"], check=True)
     manifest = Manifest.read(tmp_path / "data")
     pair = np.load(manifest.pair(0))
     assert pair["rgb"][..., 3].all()

@@ -1,0 +1,61 @@
+//! The crate's command, run in a folder of its own; for the tests of both commands.
+
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const COMMAND: &str = match option_env!("CARGO_BIN_EXE_phasefront") {
+    Some(path) => path,
+    None => match option_env!("CARGO_BIN_EXE_phasefront-lab") {
+        Some(path) => path,
+        None => panic!("the crate has no command"),
+    },
+};
+
+pub(crate) struct Folder(pub(crate) tempfile::TempDir);
+
+impl Folder {
+    pub(crate) fn new() -> Self {
+        Folder(tempfile::tempdir().unwrap())
+    }
+
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs the command in this folder.
+    pub(crate) fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(COMMAND)
+            .args(arguments)
+            .current_dir(self.0.path())
+            .env_remove("RUST_LOG")
+            .output()
+            .unwrap()
+    }
+
+    /// The command succeeds; what it prints.
+    pub(crate) fn succeeds(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {errors}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// The command fails with `code`, without a panic; what it says.
+    pub(crate) fn fails(&self, arguments: &[&str], code: i32) -> String {
+        let output = self.run(arguments);
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {errors}");
+        assert!(!errors.contains("panicked"), "{errors}");
+        errors
+    }
+
+    /// Adds a small frame, `rgb.png` and `depth.png` of 48×32 pixels.
+    #[allow(dead_code, reason = "not every test needs a frame")]
+    pub(crate) fn with_frame(self) -> Self {
+        let rgb = image::RgbImage::from_fn(48, 32, |x, y| image::Rgb([(x * 5) as u8, (y * 7) as u8, 90]));
+        rgb.save(self.path("rgb.png")).unwrap();
+        let depth = image::GrayImage::from_fn(48, 32, |x, _| image::Luma([if x < 24 { 30 } else { 220 }]));
+        depth.save(self.path("depth.png")).unwrap();
+        self
+    }
+}

@@ -1,0 +1,437 @@
+//! Where a photograph shows the modulator, and which pattern: the marks and the code of [`crate::camera::pattern`].
+//!
+//! The camera stands upright before the display and not mirrored, sees the whole modulator, and the modulator fills at
+//! least 40 % of the photograph's width.
+
+use crate::camera::homography::Homography;
+use crate::camera::pattern::{CELLS, Pattern, decode};
+use crate::camera::photograph::Photograph;
+use ndarray::Array2;
+use phasefront_io::Result;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// What a part of the local light a pixel must be below to be part of a dark square.
+const DARKER: f32 = 0.55;
+/// How many times as bright as a dark square its frame is, at least.
+const FRAMED: f32 = 1.4;
+/// What a part of the brightest light must be near for a place to be on the modulator at all.
+const LIT: f32 = 0.06;
+
+/// Why no marks were found, and what would be right.
+#[derive(Debug, Clone, PartialEq)]
+pub enum NoMarks {
+    /// Not four dark squares in bright frames; how many there were.
+    Count(usize),
+    /// The mark with the hole is not at the top left but there.
+    Turned(&'static str),
+}
+
+impl std::fmt::Display for NoMarks {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            NoMarks::Count(n) => write!(
+                f,
+                "shows {n} of the 4 corner marks; focus on the modulator, light it, have all of it in the picture; where the marks are not dark, write patterns with another --dark"
+            ),
+            NoMarks::Turned(corner) => write!(
+                f,
+                "shows the mark with the hole at the {corner}; it must be at the top left: turn the picture, or mirror it"
+            ),
+        }
+    }
+}
+
+/// Where the modulator lies in photographs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Registration {
+    /// From pixels of the modulator to those of the photograph.
+    pub map: Homography,
+    /// The marks' centres in the photograph.
+    pub marks: [[f64; 2]; 4],
+    /// Pixels of the photograph that one of the modulator takes.
+    pub zoom: f64,
+}
+
+impl Registration {
+    /// Finds the marks of `pattern` in `photograph`.
+    ///
+    /// # Errors
+    /// Marks that are not there, or not upright.
+    pub fn find(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<Self, NoMarks> {
+        let marks = find_marks(photograph, pattern)?;
+        let map = Homography::through(pattern.marks(), marks).map_err(|_| NoMarks::Count(4))?;
+        let registration = Registration {
+            map,
+            marks,
+            zoom: (marks[1][0] - marks[0][0]).hypot(marks[1][1] - marks[0][1])
+                / (pattern.marks()[1][0] - pattern.marks()[0][0]),
+        };
+        // The hole is bright, the middles of the other squares are dark.
+        let quarter = pattern.square() as f64 / 4.0;
+        let brightness = |[x, y]: [f64; 2]| registration.mean(photograph, x, y, quarter);
+        let bright: [f32; 4] = pattern.marks().map(brightness);
+        let ring = pattern.marks().map(|[x, y]| brightness([x, y - 3.0 * quarter]));
+        let light = |i: usize| bright[i] / ring[i].max(f32::MIN_POSITIVE);
+        let corners = ["top left", "top right", "bottom left", "bottom right"];
+        let holed = (0..4).max_by(|a, b| light(*a).total_cmp(&light(*b)));
+        match holed {
+            Some(0) | None => Ok(registration),
+            Some(i) => Err(NoMarks::Turned(corners[i])),
+        }
+    }
+
+    /// How far the marks of `other` are from these, pixels of the photograph: the mean of the four.
+    pub fn shift(&self, other: &Self) -> [f64; 2] {
+        let mean = |axis: usize| {
+            let apart = (0..4).map(|i| other.marks[i][axis] - self.marks[i][axis]);
+            apart.sum::<f64>() / 4.0
+        };
+        [mean(0), mean(1)]
+    }
+
+    /// The mean of `photograph` over a square of the modulator, `half` pixels to each side of (`x`, `y`).
+    fn mean(&self, photograph: &Photograph, x: f64, y: f64, half: f64) -> f32 {
+        let n = (2.0 * half * self.zoom).ceil().clamp(2.0, 24.0) as usize;
+        let at = |i: usize| half * ((2 * i + 1) as f64 / n as f64 - 1.0);
+        let mut sum = 0.0;
+        for i in 0..n {
+            for j in 0..n {
+                let [u, v] = self.map.map([x + at(i), y + at(j)]);
+                sum += photograph.sample(u, v);
+            }
+        }
+        sum / (n * n) as f32
+    }
+
+    /// The pattern that the code in `photograph` says, None where it cannot be read.
+    pub fn code(&self, photograph: &Photograph, pattern: &Pattern) -> Option<u8> {
+        let half = pattern.cell() as f64 / 4.0;
+        let (cells, between) = pattern.code();
+        let light = |[x, y]: [f64; 2]| self.mean(photograph, x, y, half);
+        let bright = between.map(light);
+        let dark = light(cells[0]) / (0.5 * (bright[0] + bright[1]));
+        let is_dark: [bool; CELLS] = std::array::from_fn(|i| {
+            let part = light(cells[i]) / (0.5 * (bright[i] + bright[i + 1]));
+            part < 0.5 * (1.0 + dark)
+        });
+        decode(is_dark)
+    }
+
+    /// `photograph` on the modulator's pixels, (H, W), the mean over each, as parts of the sensor's range.
+    pub fn resample(&self, photograph: &Photograph, (height, width): (usize, usize)) -> Array2<f32> {
+        let n = self.zoom.ceil().clamp(1.0, 8.0) as usize;
+        let at = |i: usize| (2 * i + 1) as f64 / (2 * n) as f64;
+        let scale = 1.0 / (f32::from(photograph.full) * (n * n) as f32);
+        let mut out = Array2::zeros((height, width));
+        let rows = out.as_slice_mut().expect("standard layout");
+        rows.par_chunks_exact_mut(width).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                for i in 0..n {
+                    for j in 0..n {
+                        let [u, v] = self.map.map([x as f64 + at(i), y as f64 + at(j)]);
+                        *value += photograph.sample(u, v);
+                    }
+                }
+                *value *= scale;
+            }
+        });
+        out
+    }
+
+    /// The median of the light around the modulator, as a part of the sensor's range: what is there without it.
+    pub fn surroundings(&self, photograph: &Photograph, (height, width): (usize, usize)) -> f32 {
+        let (h, w) = (height as f64, width as f64);
+        let out = 0.03 * h.min(w);
+        let mut values = Vec::new();
+        for i in 0..=100 {
+            let t = f64::from(i) / 100.0;
+            for point in [[t * w, -out], [t * w, h + out], [-out, t * h], [w + out, t * h]] {
+                let [u, v] = self.map.map(point);
+                let inside =
+                    (0.0..photograph.width as f64).contains(&u) && (0.0..photograph.height as f64).contains(&v);
+                if inside {
+                    values.push(photograph.sample(u, v) / f32::from(photograph.full));
+                }
+            }
+        }
+        values.sort_by(f32::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(0.0)
+    }
+}
+
+/// A connected dark place: its box, both ends within, and how many pixels it has.
+struct Spot {
+    x: [usize; 2],
+    y: [usize; 2],
+    area: usize,
+}
+
+/// The centres of the four marks' dark squares, to a part of a pixel.
+fn find_marks(photograph: &Photograph, pattern: &Pattern) -> std::result::Result<[[f64; 2]; 4], NoMarks> {
+    let widest = photograph.width as f64 / pattern.shape().1 as f64;
+    let side = widest * pattern.square() as f64;
+    let factor = ((side / 14.0) as usize).max(1);
+    let (height, width, small) = photograph.shrunk(factor);
+    if height < 16 || width < 16 {
+        return Err(NoMarks::Count(0));
+    }
+    let small = blurred(&small, height, width);
+    let side = side / factor as f64;
+    let most = local_maxima(&small, height, width, (1.5 * side).ceil() as usize);
+    let mut sorted = small.clone();
+    sorted.sort_by(f32::total_cmp);
+    let (floor, top) = (sorted[sorted.len() / 200], sorted[sorted.len() * 199 / 200]);
+    let lit = floor + LIT * (top - floor);
+    let is_dark: Vec<bool> = (small.iter().zip(&most))
+        .map(|(v, most)| *most < lit || v - floor < DARKER * (most - floor))
+        .collect();
+    let spots: Vec<_> = spots(&is_dark, height, width)
+        .into_iter()
+        .filter(|spot| {
+            let (w, h) = ((spot.x[1] + 1 - spot.x[0]) as f64, (spot.y[1] + 1 - spot.y[0]) as f64);
+            let inside = spot.x[0] > 0 && spot.y[0] > 0 && spot.x[1] + 1 < width && spot.y[1] + 1 < height;
+            inside
+                && is_framed(spot, &small, width, floor)
+                && (0.3 * side..1.4 * side).contains(&w.max(h))
+                && w.min(h) > 0.6 * w.max(h)
+                && spot.area as f64 > 0.5 * w * h
+        })
+        .collect();
+    if spots.len() < 4 {
+        return Err(NoMarks::Count(spots.len()));
+    }
+    let corner = |right: f64, down: f64| {
+        let along = |s: &Spot| right * (s.x[0] + s.x[1]) as f64 + down * (s.y[0] + s.y[1]) as f64;
+        spots
+            .iter()
+            .max_by(|a, b| along(a).total_cmp(&along(b)))
+            .expect("four spots")
+    };
+    let marks = [
+        corner(-1.0, -1.0),
+        corner(1.0, -1.0),
+        corner(-1.0, 1.0),
+        corner(1.0, 1.0),
+    ];
+    let distinct = (0..4).filter(|i| !marks[..*i].iter().any(|m| std::ptr::eq(*m, marks[*i])));
+    let distinct = distinct.count();
+    if distinct < 4 {
+        return Err(NoMarks::Count(distinct));
+    }
+    let areas = marks.map(|s| (s.x[1] + 1 - s.x[0]) * (s.y[1] + 1 - s.y[0]));
+    let (least, largest) = areas.iter().fold((usize::MAX, 0), |(l, m), a| (l.min(*a), m.max(*a)));
+    if largest > 3 * least {
+        return Err(NoMarks::Count(areas.iter().filter(|a| 3 * **a >= largest).count()));
+    }
+    Ok(marks.map(|spot| centre(photograph, spot, factor)))
+}
+
+/// Whether a spot has a bright frame: beyond each of its sides a band of a quarter of its size is brighter in the mean
+/// than half of what is in it, by far. Single pixels would not do: the frame is grainy, and a hole is bright.
+fn is_framed(spot: &Spot, small: &[f32], width: usize, floor: f32) -> bool {
+    let height = small.len() / width;
+    let ([left, right], [top, bottom]) = (spot.x, spot.y);
+    let values = |y: Range<usize>, x: Range<usize>| -> Vec<f32> {
+        (y.flat_map(|y| &small[y * width..][x.clone()]).copied()).collect()
+    };
+    let mean = |y: Range<usize>, x: Range<usize>| -> f32 {
+        let values = values(y, x);
+        values.iter().sum::<f32>() / values.len() as f32 - floor
+    };
+    let (x, y) = (left..right + 1, top..bottom + 1);
+    let (wide, tall) = (x.len().div_ceil(4), y.len().div_ceil(4));
+    if left < wide || top < tall || right + wide >= width || bottom + tall >= height {
+        return false;
+    }
+    let mut within = values(y.clone(), x.clone());
+    within.sort_by(f32::total_cmp);
+    let within = within[within.len() / 2] - floor;
+    [
+        mean(y.clone(), left - wide..left),
+        mean(y, right + 1..right + 1 + wide),
+        mean(top - tall..top, x.clone()),
+        mean(bottom + 1..bottom + 1 + tall, x),
+    ]
+    .into_iter()
+    .all(|beyond| beyond > FRAMED * within)
+}
+
+/// The centre of a dark square, weighted by how dark its pixels are, in the full photograph.
+fn centre(photograph: &Photograph, spot: &Spot, factor: usize) -> [f64; 2] {
+    let grown = |[from, to]: [usize; 2], end: usize| {
+        let (from, to) = (from * factor, (to + 1) * factor);
+        let more = (to - from) / 4;
+        (from.saturating_sub(more), (to + more).min(end))
+    };
+    let (x0, x1) = grown(spot.x, photograph.width);
+    let (y0, y1) = grown(spot.y, photograph.height);
+    let mut values: Vec<u16> = (y0..y1)
+        .flat_map(|y| &photograph.values[y * photograph.width..][x0..x1])
+        .copied()
+        .collect();
+    values.sort_unstable();
+    let part = |percent: usize| f64::from(values[values.len() * percent / 100]);
+    let (dark, bright) = (part(10), part(85));
+    let (mut sum, mut sum_x, mut sum_y) = (0.0, 0.0, 0.0);
+    for y in y0..y1 {
+        for x in x0..x1 {
+            let value = f64::from(photograph.values[y * photograph.width + x]);
+            let darkness = (bright - value) / (bright - dark).max(1.0) - 0.3;
+            let weight = darkness.clamp(0.0, 0.4);
+            sum += weight;
+            sum_x += weight * (x as f64 + 0.5);
+            sum_y += weight * (y as f64 + 0.5);
+        }
+    }
+    let sum = f64::max(sum, f64::MIN_POSITIVE);
+    [sum_x / sum, sum_y / sum]
+}
+
+/// The mean over 3×3 pixels, the rim going on outside.
+fn blurred(plane: &[f32], height: usize, width: usize) -> Vec<f32> {
+    let mut out = vec![0.0; plane.len()];
+    for y in 0..height {
+        for x in 0..width {
+            let mut sum = 0.0;
+            for v in [y.saturating_sub(1), y, (y + 1).min(height - 1)] {
+                for u in [x.saturating_sub(1), x, (x + 1).min(width - 1)] {
+                    sum += plane[v * width + u];
+                }
+            }
+            out[y * width + x] = sum / 9.0;
+        }
+    }
+    out
+}
+
+/// The largest value within `radius` along both axes.
+fn local_maxima(plane: &[f32], height: usize, width: usize, radius: usize) -> Vec<f32> {
+    let along = |from: &[f32], length: usize, step: usize, start: usize, to: &mut [f32]| {
+        for i in 0..length {
+            let near = i.saturating_sub(radius)..(i + radius + 1).min(length);
+            to[start + i * step] = near.map(|j| from[start + j * step]).fold(f32::NEG_INFINITY, f32::max);
+        }
+    };
+    let mut rows = vec![0.0; plane.len()];
+    (0..height).for_each(|y| along(plane, width, 1, y * width, &mut rows));
+    let mut out = vec![0.0; plane.len()];
+    (0..width).for_each(|x| along(&rows, height, width, x, &mut out));
+    out
+}
+
+/// The connected places of `is_dark`, by their four neighbours.
+fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
+    let mut seen = vec![false; is_dark.len()];
+    let mut spots = Vec::new();
+    let mut open = Vec::new();
+    for start in 0..is_dark.len() {
+        if !is_dark[start] || seen[start] {
+            continue;
+        }
+        seen[start] = true;
+        open.push(start);
+        let mut spot = Spot {
+            x: [usize::MAX, 0],
+            y: [usize::MAX, 0],
+            area: 0,
+        };
+        while let Some(at) = open.pop() {
+            let (y, x) = (at / width, at % width);
+            spot.x = [spot.x[0].min(x), spot.x[1].max(x)];
+            spot.y = [spot.y[0].min(y), spot.y[1].max(y)];
+            spot.area += 1;
+            let mut visit = |there: usize| {
+                if is_dark[there] && !seen[there] {
+                    seen[there] = true;
+                    open.push(there);
+                }
+            };
+            if x > 0 {
+                visit(at - 1);
+            }
+            if x + 1 < width {
+                visit(at + 1);
+            }
+            if y > 0 {
+                visit(at - width);
+            }
+            if y + 1 < height {
+                visit(at + width);
+            }
+        }
+        spots.push(spot);
+    }
+    spots
+}
+
+/// [`Registration::find`] as the laboratory's error.
+///
+/// # Errors
+/// Marks that are not there, or not upright.
+pub fn register(photograph: &Photograph, pattern: &Pattern) -> Result<Registration> {
+    Registration::find(photograph, pattern).map_err(|e| phasefront_io::Error::Input(format!("the photograph {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::simulated_display::SimulatedDisplay;
+    use phasefront::Display;
+
+    fn displays() -> Vec<(SimulatedDisplay, Pattern)> {
+        [
+            ("width = 144\nheight = 96", 2.0),
+            ("width = 320\nheight = 180", 3.3),
+            ("width = 320\nheight = 180", 2.5),
+            ("width = 144\nheight = 64", 1.6),
+        ]
+        .into_iter()
+        .enumerate()
+        .map(|(seed, (size, zoom))| {
+            let display = Display::from_toml(size).unwrap();
+            let pattern = Pattern::new(display.height(), display.width()).unwrap();
+            (SimulatedDisplay::new(&display, zoom, seed as u64).unwrap(), pattern)
+        })
+        .collect()
+    }
+
+    /// In some patterns, dark ones and bright ones, in all three colours; those in which red is darkest are the
+    /// hardest.
+    #[test]
+    fn marks_are_found_to_a_part_of_a_pixel_and_codes_are_read() {
+        for (display, pattern) in displays() {
+            let (h, w) = pattern.shape();
+            let (w, h) = (w as f64, h as f64);
+            let panel = [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]];
+            let truth = Homography::through(panel, display.camera().corners).unwrap();
+            for k in (0..=255).step_by(17).chain(104..110) {
+                for colour in 0..3 {
+                    let photo = display
+                        .photograph(pattern.frame(k).view(), colour, 0.0, k.into())
+                        .unwrap();
+                    let found = Registration::find(&photo, &pattern).unwrap();
+                    for (mark, at) in pattern.marks().into_iter().zip(found.marks) {
+                        let [x, y] = truth.map(mark);
+                        let apart = (x - at[0]).hypot(y - at[1]);
+                        assert!(apart < 0.4 * found.zoom, "{k} {colour}: {apart}");
+                    }
+                    assert_eq!(found.code(&photo, &pattern), Some(k));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn turned_and_empty_pictures_are_told() {
+        let (display, pattern) = displays().remove(0);
+        let mut photo = display.photograph(pattern.frame(0).view(), 1, 0.0, 0).unwrap();
+        photo.values.reverse();
+        let told = Registration::find(&photo, &pattern).unwrap_err();
+        assert_eq!(told, NoMarks::Turned("bottom right"));
+        photo.values.fill(900);
+        let told = Registration::find(&photo, &pattern).unwrap_err();
+        assert!(told.to_string().contains("of the 4 corner marks"), "{told}");
+    }
+}

@@ -1,0 +1,226 @@
+//! One photograph as numbers that grow in proportion to light: read from PNG or TIFF, written as PNG.
+//!
+//! A camera's tone curve must be off (its raw file, developed linearly): nothing here can undo one.
+
+use image::DynamicImage;
+use phasefront_io::input::decode::{self, Reading};
+use phasefront_io::output::write_atomically;
+use phasefront_io::{Error, Result};
+use std::path::Path;
+
+/// The most pixels of a photograph: 200 megapixels.
+const MOST_PIXELS: u64 = 200_000_000;
+
+/// The share of a photograph's pixels that may be at the sensor's end before it is called saturated.
+pub const SATURATED_SHARE: f64 = 1e-3;
+
+/// Grey values, (H, W), linear in light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Photograph {
+    /// Pixels along y.
+    pub height: usize,
+    /// Pixels along x.
+    pub width: usize,
+    /// Row by row.
+    pub values: Vec<u16>,
+    /// The largest number that a value can be: 255 of 8 bits, 65535 of 16.
+    pub full: u16,
+}
+
+impl Photograph {
+    /// Reads a PNG or TIFF of 8 or 16 bits, grey or colour; of a colour one, channel `colour` (0 red, 1 green, 2 blue).
+    ///
+    /// # Errors
+    /// A file that is missing, cut short, of another kind, or over 200 megapixels.
+    pub fn read(path: &Path, colour: usize) -> Result<Self> {
+        let how = Reading {
+            most_pixels: MOST_PIXELS,
+            ..Reading::AS_STORED
+        };
+        let (image, _) = decode::open_picture(path, how)?;
+        let (height, width) = (image.height() as usize, image.width() as usize);
+        let eight = |bytes: Vec<u8>, channels: usize| {
+            let values = every(bytes, channels, colour, u16::from);
+            (values, 255)
+        };
+        let sixteen = |words: Vec<u16>, channels: usize| (every(words, channels, colour, |v| v), 65535);
+        let (values, full) = match image {
+            DynamicImage::ImageLuma8(i) => eight(i.into_raw(), 1),
+            DynamicImage::ImageLumaA8(i) => eight(i.into_raw(), 2),
+            DynamicImage::ImageRgb8(i) => eight(i.into_raw(), 3),
+            DynamicImage::ImageRgba8(i) => eight(i.into_raw(), 4),
+            DynamicImage::ImageLuma16(i) => sixteen(i.into_raw(), 1),
+            DynamicImage::ImageLumaA16(i) => sixteen(i.into_raw(), 2),
+            DynamicImage::ImageRgb16(i) => sixteen(i.into_raw(), 3),
+            DynamicImage::ImageRgba16(i) => sixteen(i.into_raw(), 4),
+            other => return Err(kind(path, &other.color())),
+        };
+        Ok(Photograph {
+            height,
+            width,
+            values,
+            full,
+        })
+    }
+
+    /// Writes a grey PNG of 8 bits where `full` is 255, of 16 otherwise.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let eight = self.full == 255;
+        let bytes: Vec<u8> = match eight {
+            true => self.values.iter().map(|v| *v as u8).collect(),
+            false => self.values.iter().flat_map(|v| v.to_be_bytes()).collect(),
+        };
+        write_atomically(path, |file| {
+            let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+            encoder.set_color(png::ColorType::Grayscale);
+            encoder.set_depth(match eight {
+                true => png::BitDepth::Eight,
+                false => png::BitDepth::Sixteen,
+            });
+            encoder.set_compression(png::Compression::Fast);
+            let other = std::io::Error::other;
+            let mut writer = encoder.write_header().map_err(other)?;
+            writer.write_image_data(&bytes).map_err(other)?;
+            writer.finish().map_err(other)
+        })
+    }
+
+    /// The share of pixels at the end of the sensor's range, 0 where the brightest is none that a sensor ends at: 255,
+    /// or the largest number of 10, 12, 14 or 16 bits, at either end of a word of 16.
+    pub fn saturated(&self) -> f64 {
+        let most = self.values.iter().copied().max().unwrap_or(0);
+        let is_end = match self.full {
+            255 => most == 255,
+            _ => [10, 12, 14, 16].iter().any(|bits| {
+                let all = (1u32 << bits) - 1;
+                u32::from(most) == all || u32::from(most) == all << (16 - bits)
+            }),
+        };
+        match is_end {
+            false => 0.0,
+            true => {
+                let at_end = self.values.iter().filter(|v| **v == most).count();
+                at_end as f64 / self.values.len() as f64
+            }
+        }
+    }
+
+    /// The value at (`x`, `y`), pixel centres at halves, between the four nearest, the rim going on outside.
+    pub fn sample(&self, x: f64, y: f64) -> f32 {
+        let (x, y) = (x - 0.5, y - 0.5);
+        let (x0, y0) = (x.floor(), y.floor());
+        let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
+        let column = |x: f64| x.clamp(0.0, (self.width - 1) as f64) as usize;
+        let row = |y: f64| y.clamp(0.0, (self.height - 1) as f64) as usize;
+        let (left, right) = (column(x0), column(x0 + 1.0));
+        let at = |y: f64| {
+            let line = &self.values[row(y) * self.width..][..self.width];
+            let (a, b) = (f32::from(line[left]), f32::from(line[right]));
+            a + (b - a) * fx
+        };
+        let (top, bottom) = (at(y0), at(y0 + 1.0));
+        top + (bottom - top) * fy
+    }
+
+    /// The mean of each block of `factor`×`factor` pixels, what is left over at the end dropped: (H/f, W/f).
+    pub fn shrunk(&self, factor: usize) -> (usize, usize, Vec<f32>) {
+        let (height, width) = (self.height / factor, self.width / factor);
+        let mut out = vec![0.0; height * width];
+        for (y, line) in out.chunks_exact_mut(width.max(1)).enumerate() {
+            for dy in 0..factor {
+                let row = &self.values[(y * factor + dy) * self.width..][..width * factor];
+                for (sum, block) in line.iter_mut().zip(row.chunks_exact(factor)) {
+                    *sum += block.iter().map(|v| f32::from(*v)).sum::<f32>();
+                }
+            }
+            line.iter_mut().for_each(|v| *v /= (factor * factor) as f32);
+        }
+        (height, width, out)
+    }
+}
+
+/// Channel `colour` of each pixel; of a grey one the grey.
+fn every<T: Copy>(raw: Vec<T>, channels: usize, colour: usize, to: impl Fn(T) -> u16) -> Vec<u16> {
+    let channel = if channels >= 3 { colour } else { 0 };
+    raw.chunks_exact(channels).map(|p| to(p[channel])).collect()
+}
+
+fn kind(path: &Path, what: &dyn std::fmt::Debug) -> Error {
+    Error::file(
+        path,
+        format!("holds {what:?} pixels; a photograph must be grey or RGB, of 8 or 16 bits"),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn ramp(full: u16) -> Photograph {
+        let values = (0..12 * 9).map(|i| (i * 331 % 256) * (full / 255)).collect();
+        Photograph {
+            height: 9,
+            width: 12,
+            values,
+            full,
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let dir = tempfile::tempdir().unwrap();
+        for full in [255, 65535] {
+            let path = dir.path().join("p.png");
+            ramp(full).write(&path).unwrap();
+            assert_eq!(Photograph::read(&path, 1).unwrap(), ramp(full));
+        }
+    }
+
+    #[test]
+    fn tiff_is_read_and_of_colour_one_channel() {
+        let dir = tempfile::tempdir().unwrap();
+        let grey = dir.path().join("g.tif");
+        let encoder = |path: &Path| tiff::encoder::TiffEncoder::new(std::fs::File::create(path).unwrap());
+        let p = ramp(65535);
+        encoder(&grey)
+            .unwrap()
+            .write_image::<tiff::encoder::colortype::Gray16>(12, 9, &p.values)
+            .unwrap();
+        assert_eq!(Photograph::read(&grey, 2).unwrap(), p);
+        let colour = dir.path().join("c.TIFF");
+        let rgb: Vec<u8> = (0..36 * 9).map(|i| (i % 251) as u8).collect();
+        encoder(&colour)
+            .unwrap()
+            .write_image::<tiff::encoder::colortype::RGB8>(12, 9, &rgb)
+            .unwrap();
+        let green = Photograph::read(&colour, 1).unwrap();
+        assert_eq!((green.values[0], green.values[1], green.full), (1, 4, 255));
+        std::fs::write(&grey, b"II*\0 and nothing more").unwrap();
+        assert!(Photograph::read(&grey, 0).unwrap_err().to_string().contains("g.tif"));
+    }
+
+    #[test]
+    fn the_sensor_s_end_is_told_from_a_bright_wall() {
+        let mut p = ramp(65535);
+        p.values.fill(4095);
+        assert_eq!(p.saturated(), 1.0);
+        p.values.fill(40_000);
+        assert_eq!(p.saturated(), 0.0);
+        p.values[3] = 65535;
+        assert!((p.saturated() - 1.0 / 108.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn samples_lie_between_pixels_and_blocks_are_means() {
+        let mut p = ramp(255);
+        (p.values[0], p.values[1], p.values[12], p.values[13]) = (10, 20, 30, 40);
+        assert_eq!(p.sample(1.0, 1.0), 25.0);
+        assert_eq!(p.sample(-3.0, 0.5), 10.0);
+        assert_eq!(p.shrunk(2).2[0], 25.0);
+        assert_eq!((p.shrunk(2).0, p.shrunk(2).1), (4, 6));
+    }
+}

@@ -1,0 +1,7 @@
+//! Phase curves: fits, tables for each pixel, and reports on them.
+
+pub mod chart;
+pub mod curve;
+pub mod lut;
+pub mod report;
+pub mod surface;

@@ -1,0 +1,571 @@
+//! From photographs of the 256 patterns to each pixel's phase curve, and from the curves to the table that a phone
+//! holds.
+//!
+//! # Memory
+//! One photograph is held at a time. Its light on the modulator's pixels goes to a temporary file of 2 bytes a pixel
+//! and pattern (1 GB for 1920×1080), from which rows are read pattern by pattern for the fits. Curves take 48 bytes a
+//! pixel.
+
+use crate::COLOURS;
+use crate::camera::marks::{NoMarks, Registration};
+use crate::camera::pattern::{PATTERNS, Pattern};
+use crate::camera::photograph::{Photograph, SATURATED_SHARE};
+use crate::curves::curve::{self, Basis, COEFFICIENTS, LEVELS};
+use crate::curves::surface;
+use ndarray::Array2;
+use phasefront::target::PerPixel;
+use phasefront_io::{Error, Result};
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// Nodes of the table along the wider axis, at most, but for the last.
+const NODES: usize = 60;
+/// Intervals of phase of the table.
+const INTERVALS: usize = 32;
+/// Rows that are fitted at a time.
+const STRIP: usize = 8;
+/// By how many pixels of the modulator a photograph may be shifted against the first.
+const MOST_SHIFT: f64 = 0.75;
+/// A pixel whose light changes by less than this part of the median does not answer.
+const LEAST_CONTRAST: f32 = 0.1;
+/// The most that a fit may leave, as a part of the light's amplitude, for its pixel to count.
+const MOST_RESIDUAL: f32 = 0.25;
+/// The share of pixels that need not answer.
+pub const SILENT_SHARE: f64 = 0.01;
+
+/// What is wrong with one photograph, and what to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Problem {
+    /// The colour, 0 red to 2 blue.
+    pub colour: usize,
+    /// The pattern that it should show.
+    pub pattern: usize,
+    /// What is wrong.
+    pub what: What,
+}
+
+/// See [`Problem`].
+#[derive(Debug, Clone, PartialEq)]
+pub enum What {
+    /// No file of that name.
+    Missing,
+    /// The file cannot be read.
+    Unreadable(String),
+    /// (H, W) of it and of the first.
+    Size([usize; 2], [usize; 2]),
+    /// The share of pixels at the sensor's end.
+    Saturated(f64),
+    /// The marks are not there.
+    NoMarks(NoMarks),
+    /// The code says another pattern.
+    Shows(u8),
+    /// The code cannot be read.
+    NoCode,
+    /// By how many pixels of the photograph it is shifted, x and y.
+    Shifted([f64; 2]),
+}
+
+impl std::fmt::Display for Problem {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (colour, k) = (COLOURS[self.colour], self.pattern);
+        write!(f, "{colour}/capture_{k:03}: ")?;
+        match &self.what {
+            What::Missing => write!(
+                f,
+                "is missing; photograph pattern_{k:03}.png and name it capture_{k:03}.png or .tif"
+            ),
+            What::Unreadable(why) => write!(f, "{why}; photograph pattern_{k:03}.png again"),
+            What::Size([h, w], [first_h, first_w]) => write!(
+                f,
+                "is {w}×{h}, others are {first_w}×{first_h}; photograph all with one setting of the camera"
+            ),
+            What::Saturated(share) => write!(
+                f,
+                "{:.1} % of its pixels are saturated; shorten the exposure and photograph all patterns again",
+                share * 100.0
+            ),
+            What::NoMarks(why) => write!(f, "{why}"),
+            What::Shows(other) => write!(
+                f,
+                "shows pattern {other:03}; name the captures in the order of the patterns"
+            ),
+            What::NoCode => write!(
+                f,
+                "its code cannot be read: blurred, too dark, or changed while it was taken; photograph pattern_{k:03}.png again"
+            ),
+            What::Shifted([x, y]) => write!(
+                f,
+                "is shifted by ({x:+.1}, {y:+.1}) pixels against the others; fix camera and display, and photograph all patterns again"
+            ),
+        }
+    }
+}
+
+/// Why there are no curves: the photographs, or the disk.
+#[derive(Debug)]
+pub enum Refusal {
+    /// Photographs that cannot be used, all of them.
+    Problems(Vec<Problem>),
+    /// Something else.
+    Other(Error),
+}
+
+impl From<Error> for Refusal {
+    fn from(e: Error) -> Self {
+        Refusal::Other(e)
+    }
+}
+
+/// The photograph of a pattern in one colour: a file's, or what a camera gives.
+pub type Source<'a> = &'a dyn Fn(usize) -> std::result::Result<Photograph, What>;
+
+/// The file of the photograph of pattern `k`, one of `capture_000.png`, `.tif`, `.tiff` in `folder`.
+fn capture_path(folder: &Path, k: usize) -> Option<PathBuf> {
+    ["png", "tif", "tiff", "PNG", "TIF", "TIFF"]
+        .iter()
+        .map(|extension| folder.join(format!("capture_{k:03}.{extension}")))
+        .find(|path| path.is_file())
+}
+
+/// Reads the photograph of pattern `k` in `colour` from `folder`.
+///
+/// # Errors
+/// A file that is missing or cannot be read.
+pub fn read_capture(folder: &Path, colour: usize, k: usize) -> std::result::Result<Photograph, What> {
+    let path = capture_path(folder, k).ok_or(What::Missing)?;
+    Photograph::read(&path, colour).map_err(|e| match e {
+        Error::File { reason, .. } => What::Unreadable(reason),
+        other => What::Unreadable(other.to_string()),
+    })
+}
+
+/// The light of each pixel in each pattern, on disk.
+struct Stack {
+    file: File,
+    shape: (usize, usize),
+    folder: PathBuf,
+}
+
+impl Stack {
+    fn new(folder: &Path, shape: (usize, usize)) -> Result<Self> {
+        let file = tempfile::tempfile_in(folder)
+            .map_err(|e| Error::file(folder, format!("cannot hold a temporary file: {e}")))?;
+        Ok(Stack {
+            file,
+            shape,
+            folder: folder.to_owned(),
+        })
+    }
+
+    fn refuse(&self, e: std::io::Error) -> Error {
+        Error::file(&self.folder, format!("its temporary file: {e}"))
+    }
+
+    fn push(&mut self, light: &Array2<f32>) -> Result<()> {
+        let bytes: Vec<u8> = (light.iter())
+            .flat_map(|v| ((v * 65535.0).round() as u16).to_le_bytes())
+            .collect();
+        self.file.write_all(&bytes).map_err(|e| self.refuse(e))
+    }
+
+    /// Rows `y`.. of `rows` rows: for each pixel its light in all patterns.
+    fn rows(&mut self, y: usize, rows: usize) -> Result<Vec<[f32; LEVELS]>> {
+        let (height, width) = self.shape;
+        let mut bytes = vec![0; 2 * rows * width];
+        let mut light = vec![[0.0; LEVELS]; rows * width];
+        for k in 0..PATTERNS {
+            let start = 2 * (k * height + y) * width;
+            let read = (self.file.seek(SeekFrom::Start(start as u64))).and_then(|_| self.file.read_exact(&mut bytes));
+            read.map_err(|e| self.refuse(e))?;
+            for (pixel, pair) in light.iter_mut().zip(bytes.chunks_exact(2)) {
+                pixel[k] = f32::from(u16::from_le_bytes([pair[0], pair[1]])) / 65535.0;
+            }
+        }
+        Ok(light)
+    }
+}
+
+/// The curves of one colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curves {
+    /// 0 red to 2 blue.
+    pub colour: usize,
+    /// (H, W), each the coefficients of [`Basis`]; NaN where a pixel gave none.
+    pub coefficients: Array2<[f32; COEFFICIENTS]>,
+    /// (H, W): what the fit left, as a part of the light's amplitude; NaN where there is none.
+    pub residual: Array2<f32>,
+    /// Pixels that do not answer, (y, x): dust, or dead ones. Their curves are taken from their neighbours.
+    pub silent: Vec<(usize, usize)>,
+    /// The share of pixels whose light passed no minimum: their range is about π or less.
+    pub under_pi: f64,
+    /// Pixels of the photograph that one of the modulator takes.
+    pub zoom: f64,
+    /// A few pixels, (y, x), with their light: for plots.
+    pub samples: Vec<((usize, usize), [f32; LEVELS])>,
+    /// The light around the modulator, as a part of the sensor's range.
+    pub dark: f32,
+}
+
+/// Finds the curves of one colour from the photographs that `source` gives; `spool` is a folder for the temporary
+/// file. `progress` hears of the photographs and rows done, of all.
+///
+/// # Errors
+/// Photographs that cannot be used, told one by one; more than [`SILENT_SHARE`] of the pixels without an answer.
+pub fn measure(
+    pattern: &Pattern,
+    colour: usize,
+    source: Source<'_>,
+    spool: &Path,
+    progress: &dyn Fn(usize, usize),
+) -> std::result::Result<Curves, Refusal> {
+    let (height, width) = pattern.shape();
+    let work = PATTERNS + height;
+    let mut problems = Vec::new();
+    let mut stack = Stack::new(spool, (height, width))?;
+    let mut first: Option<([usize; 2], Registration, f32)> = None;
+    for k in 0..PATTERNS {
+        let mut add = |what| {
+            problems.push(Problem {
+                colour,
+                pattern: k,
+                what,
+            });
+        };
+        match source(k) {
+            Err(what) => add(what),
+            Ok(photograph) => match checked(&photograph, pattern, k, first.as_ref()) {
+                Err(what) => add(what),
+                Ok(registration) => {
+                    let dark = registration.surroundings(&photograph, (height, width));
+                    let size = [photograph.height, photograph.width];
+                    let (_, registration, _) = first.get_or_insert((size, registration, dark));
+                    if problems.is_empty() {
+                        stack.push(&registration.resample(&photograph, (height, width)))?;
+                    }
+                }
+            },
+        }
+        progress(k + 1, work);
+    }
+    let (Some((_, registration, dark)), true) = (first, problems.is_empty()) else {
+        return Err(Refusal::Problems(problems));
+    };
+    let mut curves = fitted(pattern, colour, stack, dark, &|row| {
+        progress(PATTERNS + row, work);
+    })?;
+    curves.zoom = registration.zoom;
+    Ok(curves)
+}
+
+/// What is right with a photograph, against the first.
+fn checked(
+    photograph: &Photograph,
+    pattern: &Pattern,
+    k: usize,
+    first: Option<&([usize; 2], Registration, f32)>,
+) -> std::result::Result<Registration, What> {
+    let size = [photograph.height, photograph.width];
+    if let Some((others, _, _)) = first
+        && *others != size
+    {
+        return Err(What::Size(size, *others));
+    }
+    let share = photograph.saturated();
+    if share > SATURATED_SHARE {
+        return Err(What::Saturated(share));
+    }
+    let registration = Registration::find(photograph, pattern).map_err(What::NoMarks)?;
+    match registration.code(photograph, pattern) {
+        None => return Err(What::NoCode),
+        Some(code) if usize::from(code) != k => return Err(What::Shows(code)),
+        _ => {}
+    }
+    if let Some((_, first, _)) = first {
+        let [x, y] = first.shift(&registration);
+        if x.hypot(y) > MOST_SHIFT * first.zoom {
+            return Err(What::Shifted([x, y]));
+        }
+    }
+    Ok(registration)
+}
+
+/// What a pixel's light gave.
+struct Pixel {
+    coefficients: [f32; COEFFICIENTS],
+    residual: f32,
+    contrast: f32,
+    passed_minimum: bool,
+}
+
+fn fitted(pattern: &Pattern, colour: usize, mut stack: Stack, dark: f32, progress: &dyn Fn(usize)) -> Result<Curves> {
+    let (height, width) = pattern.shape();
+    let basis = Basis::new();
+    let none = [f32::NAN; COEFFICIENTS];
+    let mut coefficients = Array2::from_elem((height, width), none);
+    let mut residual = Array2::from_elem((height, width), f32::NAN);
+    let mut contrast = Array2::from_elem((height, width), f32::NAN);
+    let mut samples = Vec::new();
+    let (mut measured, mut under_pi) = (0usize, 0usize);
+    for top in (0..height).step_by(STRIP) {
+        let rows = STRIP.min(height - top);
+        let light = stack.rows(top, rows)?;
+        let pixels: Vec<Option<Pixel>> = (light.par_iter().enumerate())
+            .map(|(i, light)| {
+                let (y, x) = (top + i / width, i % width);
+                pattern.measures(y, x).then(|| {
+                    let most = light.iter().copied().fold(0.0, f32::max);
+                    let least = light.iter().copied().fold(f32::INFINITY, f32::min);
+                    let fit = basis.fit(light, dark);
+                    Pixel {
+                        coefficients: fit.map_or(none, |fit| fit.coefficients),
+                        residual: fit.map_or(f32::NAN, |fit| fit.residual),
+                        contrast: most - least,
+                        passed_minimum: fit.is_some_and(|fit| fit.passed_minimum),
+                    }
+                })
+            })
+            .collect();
+        for (i, pixel) in pixels.iter().enumerate() {
+            let at = (top + i / width, i % width);
+            let Some(pixel) = pixel else { continue };
+            measured += 1;
+            under_pi += usize::from(!pixel.passed_minimum && !pixel.residual.is_nan());
+            coefficients[at] = pixel.coefficients;
+            residual[at] = pixel.residual;
+            contrast[at] = pixel.contrast;
+            // The middle, and two places between it and the corners.
+            let places = [
+                (height / 2, width / 2),
+                (height / 4, width * 3 / 4),
+                (height * 3 / 4, width / 4),
+            ];
+            if places.contains(&at) {
+                samples.push((at, light[i]));
+            }
+        }
+        progress(top + rows);
+    }
+    let mut all: Vec<f32> = contrast.iter().copied().filter(|c| !c.is_nan()).collect();
+    all.sort_by(f32::total_cmp);
+    let median = all.get(all.len() / 2).copied().unwrap_or(0.0);
+    let mut silent = Vec::new();
+    for (at, contrast) in contrast.indexed_iter() {
+        if contrast.is_nan() {
+            continue;
+        }
+        // The comparison says no to NaN.
+        let answers = *contrast >= LEAST_CONTRAST * median && residual[at] <= MOST_RESIDUAL;
+        if !answers {
+            silent.push(at);
+            coefficients[at] = none;
+        }
+    }
+    if silent.len() as f64 > SILENT_SHARE * measured as f64 {
+        let (y, x) = silent[silent.len() / 2];
+        return Err(Error::Input(format!(
+            "{}: {} of {measured} pixels do not answer to their level, one of them ({x}, {y}); focus on the modulator, light all of it, turn its polarisation, and let the camera's tone curve be linear",
+            COLOURS[colour],
+            silent.len()
+        )));
+    }
+    Ok(Curves {
+        colour,
+        coefficients,
+        residual,
+        silent,
+        under_pi: under_pi as f64 / measured.max(1) as f64,
+        zoom: f64::NAN,
+        samples,
+        dark,
+    })
+}
+
+impl Curves {
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        self.coefficients.dim()
+    }
+
+    /// The curve of pixel (`x`, `y`), None where it gave none.
+    pub fn curve(&self, basis: &Basis, y: usize, x: usize) -> Option<[f32; LEVELS]> {
+        let coefficients = &self.coefficients[(y, x)];
+        (!coefficients[0].is_nan()).then(|| basis.curve(coefficients))
+    }
+
+    /// What level 255 turns, in units of 2π, of each pixel that has a curve.
+    pub fn ranges(&self) -> Vec<f32> {
+        let mut ranges: Vec<f32> = (self.coefficients.iter())
+            .map(|c| c[COEFFICIENTS - 1] / TAU)
+            .filter(|range| !range.is_nan())
+            .collect();
+        ranges.sort_by(f32::total_cmp);
+        ranges
+    }
+}
+
+/// Pixels from node to node of the table of a (`height`, `width`) modulator.
+pub fn spacing(height: usize, width: usize) -> usize {
+    height.max(width).div_ceil(NODES)
+}
+
+/// The compact table of the curves of red, green and blue: its nodes' curves are those of a smooth surface through the
+/// pixels' ([`surface`]), which also takes the noise of single pixels away, and bridges marks and dust.
+///
+/// # Errors
+/// Curves of different shapes, or without any.
+pub fn compact(curves: &[Curves; 3]) -> Result<PerPixel> {
+    let (height, width) = curves[0].shape();
+    if curves.iter().any(|c| c.shape() != (height, width)) {
+        return Err(Error::Input("curves of modulators of different sizes".into()));
+    }
+    let spacing = spacing(height, width);
+    let basis = Basis::new();
+    let (mut levels, mut turns) = (Vec::new(), Vec::new());
+    for curves in curves {
+        let nodes = surface::fit(curves.coefficients.view(), spacing)
+            .ok_or_else(|| Error::Input(format!("{}: no pixel has a curve", COLOURS[curves.colour])))?;
+        for coefficients in &nodes {
+            let mut highest = 0.0f32;
+            // Where the surface goes on beyond the pixels a curve could fall.
+            let rising = coefficients.map(|c| {
+                highest = highest.max(c);
+                highest
+            });
+            let (values, turn) = knots(&basis.curve(&rising));
+            levels.extend(values);
+            turns.push(turn);
+        }
+    }
+    Ok(PerPixel::new(height, width, spacing, INTERVALS, &levels, &turns)?)
+}
+
+/// The levels of the knots' phases by a node's curve, and the phase from which 0 is nearer than its end.
+fn knots(curve: &[f32; LEVELS]) -> ([f32; INTERVALS + 1], f32) {
+    let values = std::array::from_fn(|k| curve::level_of(curve, k as f32 / INTERVALS as f32 * TAU));
+    let last = curve[LEVELS - 1];
+    (values, if last < TAU { 0.5 * (last + TAU) } else { TAU })
+}
+
+/// How far apart phases are that should be equal, over all pixels with a curve, radians.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Errors {
+    /// What the factory's linear table leaves, root mean square.
+    pub linear_rms: f64,
+    /// What the full table leaves: its steps of one level.
+    pub full_rms: f64,
+    /// What the compact table leaves.
+    pub compact_rms: f64,
+    /// Between the compact table and the full one, root mean square.
+    pub between_rms: f64,
+    /// Between the compact table and the full one, in 99.9 of 100 places at most.
+    pub between_most: f64,
+}
+
+/// What tables leave of one colour's phases where its curves can reach them, by the curves themselves. Phases are every
+/// fourth of 256 steps.
+pub fn errors(curves: &Curves, table: &PerPixel) -> Errors {
+    let (height, width) = curves.shape();
+    let basis = Basis::new();
+    let plane = curves.colour * height * width;
+    let apart = |a: f32, b: f32| {
+        let d = (a - b).rem_euclid(TAU);
+        f64::from(d.min(TAU - d))
+    };
+    struct Sums {
+        count: f64,
+        squares: [f64; 4],
+        // Counts of |between| by thousandths of a radian.
+        histogram: Vec<u64>,
+    }
+    let none = || Sums {
+        count: 0.0,
+        squares: [0.0; 4],
+        histogram: vec![0; 4000],
+    };
+    let sums = (0..height)
+        .into_par_iter()
+        .fold(none, |mut sums, y| {
+            for x in 0..width {
+                let Some(curve) = curves.curve(&basis, y, x) else {
+                    continue;
+                };
+                let full = curve::inverse(&curve);
+                for step in (0..LEVELS).step_by(4) {
+                    let phase = step as f32 / LEVELS as f32 * TAU;
+                    if phase > curve[LEVELS - 1] {
+                        break;
+                    }
+                    let shown = |level: u8| curve[usize::from(level)];
+                    let compact = shown(table.level(phase, plane + y * width + x));
+                    let full = shown(full[step]);
+                    let between = apart(compact, full);
+                    let all = [
+                        apart(shown(step as u8), phase),
+                        apart(full, phase),
+                        apart(compact, phase),
+                        between,
+                    ];
+                    (sums.squares.iter_mut().zip(all)).for_each(|(s, e)| *s += e * e);
+                    sums.count += 1.0;
+                    sums.histogram[((between * 1e3) as usize).min(3999)] += 1;
+                }
+            }
+            sums
+        })
+        .reduce(none, |mut a, b| {
+            a.count += b.count;
+            (a.squares.iter_mut().zip(b.squares)).for_each(|(a, b)| *a += b);
+            (a.histogram.iter_mut().zip(b.histogram)).for_each(|(a, b)| *a += b);
+            a
+        });
+    let rms = sums.squares.map(|s| (s / sums.count.max(1.0)).sqrt());
+    let mut over = (sums.count * 1e-3) as u64;
+    let most = (0..4000).rev().find(|bin| {
+        let enough = sums.histogram[*bin] > over;
+        over = over.saturating_sub(sums.histogram[*bin]);
+        enough
+    });
+    Errors {
+        linear_rms: rms[0],
+        full_rms: rms[1],
+        compact_rms: rms[2],
+        between_rms: rms[3],
+        between_most: most.map_or(0.0, |bin| (bin + 1) as f64 * 1e-3),
+    }
+}
+
+/// Writes the full table of one colour, uint8 (H, W, 256), to `file` as .npy: for each pixel the level of each of 256
+/// phase steps. Pixels without a curve have those of `table`.
+///
+/// # Errors
+/// What writing refuses.
+pub fn write_full(curves: &Curves, table: &PerPixel, file: &mut dyn Write) -> std::io::Result<()> {
+    let (height, width) = curves.shape();
+    let mut header = format!("{{'descr': '|u1', 'fortran_order': False, 'shape': ({height}, {width}, {LEVELS}), }}");
+    // Magic, version and length are 10 bytes; the whole is a multiple of 64 and ends with a line break.
+    let padding = (10 + header.len() + 1).next_multiple_of(64) - (10 + header.len() + 1);
+    header.push_str(&" ".repeat(padding));
+    header.push('\n');
+    file.write_all(b"\x93NUMPY\x01\x00")?;
+    file.write_all(&(header.len() as u16).to_le_bytes())?;
+    file.write_all(header.as_bytes())?;
+    let basis = Basis::new();
+    let plane = curves.colour * height * width;
+    for y in 0..height {
+        let row: Vec<[u8; LEVELS]> = (0..width)
+            .into_par_iter()
+            .map(|x| match curves.curve(&basis, y, x) {
+                Some(curve) => curve::inverse(&curve),
+                None => std::array::from_fn(|step| {
+                    let phase = step as f32 / LEVELS as f32 * TAU;
+                    table.level(phase, plane + y * width + x)
+                }),
+            })
+            .collect();
+        file.write_all(row.as_flattened())?;
+    }
+    Ok(())
+}

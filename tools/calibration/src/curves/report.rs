@@ -1,0 +1,177 @@
+//! What a calibration of curves found, as numbers and as drawings.
+
+use crate::COLOURS;
+use crate::curves::chart::{self, Curve, Map, Panel};
+use crate::curves::curve::{self, Basis, LEVELS};
+use crate::curves::lut::{self, Curves, Errors};
+use ndarray::Array2;
+use phasefront::target::PerPixel;
+use phasefront_io::Result;
+use serde::Serialize;
+use std::f32::consts::TAU;
+use std::path::Path;
+
+/// One colour's curves.
+#[derive(Debug, Clone, Serialize)]
+pub struct ColourReport {
+    /// "red", "green" or "blue".
+    pub colour: &'static str,
+    /// What level 255 turns, in units of 2π: the least, the median, the most over the modulator.
+    pub range_turns: [f32; 3],
+    /// The share of pixels that do not reach 2π.
+    pub under_two_pi: f64,
+    /// The share of pixels whose light passed no minimum: about π or less.
+    pub under_pi: f64,
+    /// Pixels that do not answer; their curves are their neighbours'.
+    pub silent_pixels: usize,
+    /// The first of them, (x, y).
+    pub silent_at: Vec<[usize; 2]>,
+    /// Root mean square of what fits leave of the light, as a part of its amplitude.
+    pub residual: f64,
+    /// Pixels of a photograph that one of the modulator takes.
+    pub zoom: f64,
+    /// Phase errors of the tables by the measured curves, radians.
+    pub errors_rad: Errors,
+}
+
+/// The curves of all three colours, and their table.
+#[derive(Debug, Clone, Serialize)]
+pub struct LutReport {
+    /// Red, green, blue.
+    pub colours: Vec<ColourReport>,
+    /// The compact table's file, bytes.
+    pub table_bytes: usize,
+    /// A full table of 256 levels for each pixel and colour, bytes.
+    pub full_bytes: usize,
+    /// Pixels between the table's nodes.
+    pub spacing: usize,
+    /// Intervals of phase of the table.
+    pub intervals: usize,
+}
+
+/// The numbers.
+pub fn report(curves: &[Curves; 3], table: &PerPixel) -> LutReport {
+    let colours = curves.iter().map(|curves| {
+        let ranges = curves.ranges();
+        let under = ranges.partition_point(|r| *r < 1.0);
+        let residuals = curves.residual.iter().filter(|r| !r.is_nan());
+        let (sum, count) = residuals.fold((0.0, 0.0), |(s, n), r| (s + f64::from(r * r), n + 1.0));
+        ColourReport {
+            colour: COLOURS[curves.colour],
+            range_turns: [ranges[0], ranges[ranges.len() / 2], ranges[ranges.len() - 1]],
+            under_two_pi: under as f64 / ranges.len() as f64,
+            under_pi: curves.under_pi,
+            silent_pixels: curves.silent.len(),
+            silent_at: curves.silent.iter().take(20).map(|(y, x)| [*x, *y]).collect(),
+            residual: (sum / f64::max(count, 1.0)).sqrt(),
+            zoom: curves.zoom,
+            errors_rad: lut::errors(curves, table),
+        }
+    });
+    let (height, width) = table.shape();
+    LutReport {
+        colours: colours.collect(),
+        table_bytes: table.to_bytes().len(),
+        full_bytes: 3 * height * width * LEVELS,
+        spacing: table.spacing(),
+        intervals: table.intervals(),
+    }
+}
+
+impl LutReport {
+    /// As lines to read.
+    pub fn text(&self) -> String {
+        let mut text = String::from(
+            "colour  range/2π least median most   <2π %   <π %  silent  residual   phase error, rad RMS: linear    full  compact  compact−full (99.9 %)\n",
+        );
+        for c in &self.colours {
+            let [least, median, most] = c.range_turns;
+            let e = &c.errors_rad;
+            text.push_str(&format!(
+                "{:<14} {least:>8.3} {median:>6.3} {most:>5.3} {:>7.1} {:>6.1} {:>7} {:>9.4} {:>29.3} {:>7.4} {:>8.4} {:>9.4} ({:.3})\n",
+                c.colour,
+                c.under_two_pi * 100.0,
+                c.under_pi * 100.0,
+                c.silent_pixels,
+                c.residual,
+                e.linear_rms,
+                e.full_rms,
+                e.compact_rms,
+                e.between_rms,
+                e.between_most,
+            ));
+        }
+        text.push_str(&format!(
+            "table: {} kB, a full one {:.0} MB",
+            self.table_bytes.div_ceil(1000),
+            self.full_bytes as f64 / 1e6
+        ));
+        text
+    }
+}
+
+/// Draws the curves of a few pixels with what was measured, what fits leave, and the maps of range and residual, into
+/// `curves.svg`, `residuals.svg` and `maps.svg` of `folder`.
+///
+/// # Errors
+/// Files that cannot be written.
+pub fn draw(curves: &[Curves; 3], folder: &Path) -> Result<()> {
+    let basis = Basis::new();
+    let (mut fits, mut residuals, mut maps) = (Vec::new(), Vec::new(), Vec::new());
+    for curves in curves {
+        let name = COLOURS[curves.colour];
+        let along = |values: &[f32]| -> Vec<(f64, f64)> {
+            (values.iter().enumerate())
+                .map(|(k, v)| (k as f64, f64::from(*v)))
+                .collect()
+        };
+        let (mut lines, mut left) = (Vec::new(), Vec::new());
+        for ((y, x), light) in &curves.samples {
+            let Some(fitted) = curves.curve(&basis, *y, *x) else {
+                continue;
+            };
+            if let Some((bare, _)) = curve::unfolded(light, curves.dark) {
+                lines.push(Curve {
+                    name: String::new(),
+                    points: along(&bare),
+                    dots: true,
+                });
+                let apart: Vec<f32> = bare.iter().zip(&fitted).map(|(a, b)| a - b).collect();
+                left.push(Curve {
+                    name: format!("({x}, {y})"),
+                    points: along(&apart),
+                    dots: true,
+                });
+            }
+            lines.push(Curve {
+                name: format!("({x}, {y})"),
+                points: along(&fitted),
+                dots: false,
+            });
+        }
+        let panel = |title: String, y, curves| Panel {
+            title,
+            x: "level",
+            y,
+            curves,
+        };
+        fits.push(panel(format!("{name}: Eq. 12–13 (dots) and fits"), "phase, rad", lines));
+        residuals.push(panel(format!("{name}: Eq. 12–13 less the fit"), "phase, rad", left));
+        let range = Array2::from_shape_fn(curves.shape(), |at| {
+            curves.coefficients[at].last().copied().unwrap_or(f32::NAN) / TAU
+        });
+        maps.push(Map {
+            title: format!("{name}: range/2π"),
+            values: range,
+        });
+    }
+    for curves in curves {
+        maps.push(Map {
+            title: format!("{}: residual", COLOURS[curves.colour]),
+            values: curves.residual.clone(),
+        });
+    }
+    chart::write_curves(&folder.join("curves.svg"), &fits, 3)?;
+    chart::write_curves(&folder.join("residuals.svg"), &residuals, 3)?;
+    chart::write_maps(&folder.join("maps.svg"), &maps, 3)
+}

@@ -1,0 +1,334 @@
+//! The laser's amplitude over the modulator, from a photograph of a diffuser in its place (Methods of the paper): a
+//! median of 5×5 pixels takes away dust, the mean around each node the speckle, and, where asked for, a
+//! mixture of Gaussian beams fits what is left.
+
+use crate::camera::marks::Registration;
+use crate::camera::photograph::{Photograph, SATURATED_SHARE};
+use ndarray::Array2;
+use phasefront_io::{Error, Result};
+use rayon::prelude::*;
+
+/// Nodes of the map along the wider axis.
+const NODES: usize = 49;
+/// Half the median's width.
+const HALF: usize = 2;
+/// The most Gaussians of a mixture.
+pub const MOST_GAUSSIANS: usize = 4;
+
+/// The amplitude at the nodes of a map, (Gh, Gw), of a (`height`, `width`) modulator, 1 at its brightest, from a
+/// photograph of the diffuser that `registration` places.
+///
+/// # Errors
+/// A photograph that is saturated or dark.
+pub fn map(
+    photograph: &Photograph,
+    registration: &Registration,
+    (height, width): (usize, usize),
+) -> Result<Array2<f32>> {
+    let share = photograph.saturated();
+    if share > SATURATED_SHARE {
+        return Err(Error::Input(format!(
+            "{:.1} % of its pixels are saturated; shorten the exposure",
+            share * 100.0
+        )));
+    }
+    let clean = median(photograph);
+    let dark = registration.surroundings(&clean, (height, width));
+    let light = registration.resample(&clean, (height, width));
+    let nodes = |n: usize| (NODES * n / height.max(width)).max(2);
+    let (rows, columns) = (nodes(height), nodes(width));
+    let step = |n: usize, nodes: usize| ((n - 1) as f64 / (nodes - 1) as f64).max(1.0);
+    let (step_y, step_x) = (step(height, rows), step(width, columns));
+    // Into pixels at the rim the median, sampling and what registration is off bring the dark beside it: nodes there
+    // look at pixels a little further in, and follow their slope.
+    let reach = ((HALF as f64 + 1.0) / registration.zoom + 0.5).ceil();
+    let window = |node: usize, step: f64, n: usize| {
+        let quarter = (n - 1) as f64 / 4.0;
+        let (rim, half) = (reach.min(quarter), step.min(quarter));
+        let at = node as f64 * step;
+        Window::new(at, at.clamp(rim + half, (n - 1) as f64 - rim - half), half)
+    };
+    let mut map = Array2::zeros((rows, columns));
+    for ((i, j), value) in map.indexed_iter_mut() {
+        let (along_y, along_x) = (window(i, step_y, height), window(j, step_x, width));
+        let mut sum = 0.0;
+        for (y, wy) in &along_y.shares {
+            for (x, wx) in &along_x.shares {
+                let light = f64::from(light[(*y, *x)] - dark);
+                // The plane that fits the window best, where the node is.
+                sum += light * (wy[0] * wx[0] + wy[1] * wx[0] + wy[0] * wx[1]);
+            }
+        }
+        *value = sum.max(0.0).sqrt() as f32;
+    }
+    let most = map.iter().copied().fold(0.0, f32::max);
+    if most < 0.05 {
+        return Err(Error::Input(
+            "is dark: light the diffuser, and expose it to more than a hundredth of the sensor's range".into(),
+        ));
+    }
+    Ok(map / most)
+}
+
+/// The pixels of an axis that a node looks at, with their shares in the mean and in the way from the mean to the node
+/// by the slope.
+struct Window {
+    shares: Vec<(usize, [f64; 2])>,
+}
+
+impl Window {
+    /// Of pixels less than `half` from `centre`, the nearer the more, for a node `at`.
+    fn new(at: f64, centre: f64, half: f64) -> Self {
+        let pixels = (centre - half).ceil() as usize..=(centre + half).floor() as usize;
+        // At a distance of `half` a pixel still counts a little, so that one alone counts at all.
+        let weight = |x: usize| 1.01 - (x as f64 - centre).abs() / half;
+        let all: f64 = pixels.clone().map(weight).sum();
+        let mean = pixels.clone().map(|x| weight(x) * x as f64).sum::<f64>() / all;
+        let spread: f64 = pixels.clone().map(|x| weight(x) * (x as f64 - mean).powi(2)).sum();
+        let slope = if spread > 0.0 { (at - mean) / spread } else { 0.0 };
+        let shares = pixels.map(|x| (x, [weight(x) / all, weight(x) * (x as f64 - mean) * slope]));
+        Window {
+            shares: shares.collect(),
+        }
+    }
+}
+
+/// The median of 5×5 pixels, the rim going on outside.
+fn median(photograph: &Photograph) -> Photograph {
+    let (height, width) = (photograph.height, photograph.width);
+    let mut out = photograph.clone();
+    let rows = out.values.par_chunks_exact_mut(width).enumerate();
+    rows.for_each(|(y, row)| {
+        let mut near = [0; (2 * HALF + 1) * (2 * HALF + 1)];
+        for (x, value) in row.iter_mut().enumerate() {
+            for (i, v) in near.iter_mut().enumerate() {
+                let at = |n: usize, d: usize, end: usize| (n + d).saturating_sub(HALF).min(end - 1);
+                let (y, x) = (at(y, i / 5, height), at(x, i % 5, width));
+                *v = photograph.values[y * width + x];
+            }
+            let middle = near.len() / 2;
+            *value = *near.select_nth_unstable(middle).1;
+        }
+    });
+    out
+}
+
+/// One beam: its intensity, centre, and the three numbers of its inverse width, in nodes of a map.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gaussian([f64; 6]);
+
+impl Gaussian {
+    /// I(x, y) = I₀·exp(−(p·dx² + 2q·dx·dy + r·dy²)).
+    fn intensity(&self, x: f64, y: f64) -> f64 {
+        let [height, cx, cy, p, q, r] = self.0;
+        let (dx, dy) = (x - cx, y - cy);
+        height * (-(p * dx * dx + 2.0 * q * dx * dy + r * dy * dy)).exp()
+    }
+
+    /// Derivatives by its six numbers.
+    fn slopes(&self, x: f64, y: f64) -> [f64; 6] {
+        let [height, cx, cy, p, q, r] = self.0;
+        let (dx, dy) = (x - cx, y - cy);
+        let value = self.intensity(x, y);
+        [
+            value / height,
+            value * 2.0 * (p * dx + q * dy),
+            value * 2.0 * (q * dx + r * dy),
+            -value * dx * dx,
+            -value * 2.0 * dx * dy,
+            -value * dy * dy,
+        ]
+    }
+}
+
+/// Fits the intensity of `map`, amplitudes (Gh, Gw), by a sum of `count` Gaussian beams in the least squares, by
+/// Levenberg and Marquardt's method, one beam more at a time; gives the fit's amplitudes, its beams, and the root mean
+/// square that it leaves of the intensity.
+///
+/// # Errors
+/// No Gaussians or over [`MOST_GAUSSIANS`].
+pub fn mixture(map: &Array2<f32>, count: usize) -> Result<(Array2<f32>, Vec<Gaussian>, f64)> {
+    if !(1..=MOST_GAUSSIANS).contains(&count) {
+        return Err(Error::Input(format!(
+            "{count} Gaussians; a mixture has 1 to {MOST_GAUSSIANS}"
+        )));
+    }
+    let (rows, columns) = map.dim();
+    let seen = map.mapv(|a| f64::from(a).powi(2));
+    let mut beams: Vec<Gaussian> = Vec::new();
+    let mut left = f64::INFINITY;
+    for _ in 0..count {
+        // The next beam begins where the most light is left; a fit of one beam to two leaves less than none too.
+        let rest = Array2::from_shape_fn((rows, columns), |(y, x)| {
+            let sum: f64 = beams.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
+            seen[(y, x)] - sum
+        });
+        let (at, most) = rest
+            .indexed_iter()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map_or(((0, 0), 1.0), |(at, v)| (at, *v));
+        let narrow = 4.0 / (columns.max(rows) as f64).powi(2);
+        let wide = if beams.is_empty() { 1.0 } else { 8.0 };
+        beams.push(Gaussian([
+            most.max(1e-6),
+            at.1 as f64,
+            at.0 as f64,
+            narrow * wide,
+            0.0,
+            narrow * wide,
+        ]));
+        left = descend(&mut beams, &seen);
+    }
+    let fitted = Array2::from_shape_fn((rows, columns), |(y, x)| {
+        let sum: f64 = beams.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
+        sum.max(0.0).sqrt() as f32
+    });
+    Ok((fitted, beams, left))
+}
+
+/// Improves `beams` until nothing is gained; gives the root mean square that is left.
+fn descend(beams: &mut Vec<Gaussian>, seen: &Array2<f64>) -> f64 {
+    let n = 6 * beams.len();
+    let cost = |beams: &[Gaussian]| -> f64 {
+        let square = |((y, x), seen): ((usize, usize), &f64)| {
+            let sum: f64 = beams.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
+            (seen - sum).powi(2)
+        };
+        seen.indexed_iter().map(square).sum()
+    };
+    let (mut now, mut damping) = (cost(beams), 1e-3);
+    for _ in 0..200 {
+        let mut gram = vec![vec![0.0; n]; n];
+        let mut right = vec![0.0; n];
+        for ((y, x), seen) in seen.indexed_iter() {
+            let (x, y) = (x as f64, y as f64);
+            let slopes: Vec<f64> = beams.iter().flat_map(|b| b.slopes(x, y)).collect();
+            let residual = seen - beams.iter().map(|b| b.intensity(x, y)).sum::<f64>();
+            for i in 0..n {
+                right[i] += slopes[i] * residual;
+                for j in 0..=i {
+                    gram[i][j] += slopes[i] * slopes[j];
+                }
+            }
+        }
+        let before = now;
+        for _ in 0..12 {
+            let mut damped = gram.clone();
+            for (i, row) in damped.iter_mut().enumerate() {
+                row[i] *= 1.0 + damping;
+            }
+            let step = solve(damped, right.clone());
+            let tried: Vec<Gaussian> = (beams.iter().zip(step.chunks_exact(6)))
+                .map(|(b, step)| Gaussian(std::array::from_fn(|i| b.0[i] + step[i])))
+                .collect();
+            let closes = (tried.iter()).all(|b| {
+                let [height, _, _, p, q, r] = b.0;
+                height > 0.0 && p > 0.0 && r > 0.0 && q * q < p * r
+            });
+            let then = cost(&tried);
+            if then < now && closes {
+                (*beams, now) = (tried, then);
+                damping *= 0.3;
+                break;
+            }
+            damping *= 4.0;
+        }
+        if before - now <= 1e-9 * before {
+            break;
+        }
+    }
+    (now / seen.len() as f64).sqrt()
+}
+
+/// Solves a symmetric positive system, its lower half given, by Cholesky's method.
+fn solve(mut m: Vec<Vec<f64>>, mut right: Vec<f64>) -> Vec<f64> {
+    let n = right.len();
+    for i in 0..n {
+        for j in 0..=i {
+            let sum = m[i][j] - (0..j).map(|k| m[i][k] * m[j][k]).sum::<f64>();
+            m[i][j] = match i == j {
+                true => sum.max(1e-30).sqrt(),
+                false => sum / m[j][j],
+            };
+        }
+    }
+    for i in 0..n {
+        right[i] = (right[i] - (0..i).map(|k| m[i][k] * right[k]).sum::<f64>()) / m[i][i];
+    }
+    for i in (0..n).rev() {
+        right[i] = (right[i] - (i + 1..n).map(|k| m[k][i] * right[k]).sum::<f64>()) / m[i][i];
+    }
+    right
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::camera::marks;
+    use crate::camera::pattern::Pattern;
+    use crate::simulated_display::SimulatedDisplay;
+    use phasefront::Display;
+
+    #[test]
+    fn the_beam_comes_back_from_dust_and_noise() {
+        let display = Display::from_toml("width = 176\nheight = 120").unwrap();
+        let pattern = Pattern::new(120, 176).unwrap();
+        let simulated = SimulatedDisplay::new(&display, 2.5, 3).unwrap();
+        for colour in 0..3 {
+            let marked = simulated.photograph(pattern.frame(0).view(), colour, 0.0, 0).unwrap();
+            let registration = marks::register(&marked, &pattern).unwrap();
+            let photograph = simulated.photograph_diffuser(colour, 1).unwrap();
+            let measured = map(&photograph, &registration, (120, 176)).unwrap();
+            let (fitted, _, left) = mixture(&measured, 1).unwrap();
+            assert!(left < 0.01, "{left}");
+            let (rows, columns) = measured.dim();
+            let truth = Array2::from_shape_fn((rows, columns), |(i, j)| {
+                let y = i as f64 / (rows - 1) as f64 * 119.0;
+                let x = j as f64 / (columns - 1) as f64 * 175.0;
+                simulated.laser(colour, y, x)
+            });
+            // Maps have no scale: by the best common factor.
+            let rms = |map: &Array2<f32>| {
+                let dot = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
+                    map.iter().zip(&truth).map(|(a, b)| f(f64::from(*a), *b)).sum()
+                };
+                let scale = dot(&|a, b| a * b) / dot(&|a, _| a * a);
+                (dot(&|a, b| (a * scale - b).powi(2)) / dot(&|_, b| b * b)).sqrt()
+            };
+            let (of_map, of_fit) = (rms(&measured), rms(&fitted));
+            assert!(of_map < 0.02 && of_fit < 0.01, "{colour}: {of_map} {of_fit}");
+        }
+    }
+
+    #[test]
+    fn two_beams_are_told_apart() {
+        let two = [
+            Gaussian([0.9, 12.0, 8.0, 0.004, 0.001, 0.006]),
+            Gaussian([0.4, 30.0, 18.0, 0.01, 0.0, 0.008]),
+        ];
+        let map = Array2::from_shape_fn((28, 40), |(y, x)| {
+            let sum: f64 = two.iter().map(|b| b.intensity(x as f64, y as f64)).sum();
+            sum.sqrt() as f32
+        });
+        let (_, _, one) = mixture(&map, 1).unwrap();
+        let (fitted, _, both) = mixture(&map, 2).unwrap();
+        assert!(one > 0.02 && both < 1e-4, "{one} {both}");
+        assert!(fitted.iter().zip(&map).all(|(a, b)| (a - b).abs() < 1e-2));
+        assert!(mixture(&map, 0).is_err() && mixture(&map, 9).is_err());
+    }
+
+    #[test]
+    fn the_median_takes_specks_away() {
+        let mut p = Photograph {
+            height: 9,
+            width: 9,
+            values: vec![500; 81],
+            full: 65535,
+        };
+        for i in [30, 31, 39, 40, 80] {
+            p.values[i] = 0;
+        }
+        assert_eq!(median(&p).values, vec![500; 81]);
+    }
+}

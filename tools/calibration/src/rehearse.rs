@@ -1,0 +1,525 @@
+//! A calibration from beginning to end on a simulated display, with what only a simulation knows: how far what was
+//! found is from the truth.
+
+use crate::COLOURS;
+use crate::camera::marks;
+use crate::camera::pattern::{PATTERNS, Pattern};
+use crate::camera::photograph::Photograph;
+use crate::curves::chart::{self, Curve, Map, Panel};
+use crate::curves::curve::LEVELS;
+use crate::curves::lut::{self, Refusal};
+use crate::curves::report::{self, LutReport};
+use crate::optics::laser;
+use crate::optics::spot::{self, MIDDLE, Search, TRIALS};
+use crate::simulated_display::SimulatedDisplay;
+use ndarray::{Array2, Array3, Axis, s, stack};
+use num_complex::Complex32;
+use phasefront::target::{Aberration, Response};
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::wave::zernike::Coefficients;
+use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
+use phasefront_io::dice::Dice;
+use phasefront_io::display;
+use phasefront_io::display::calibration::{self, Entry};
+use phasefront_io::{Error, Result, output};
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// What is rehearsed.
+#[derive(Debug, Clone)]
+pub struct Rehearsal {
+    /// The display's physics.
+    pub display: Display,
+    /// Pixels of the camera for one of the modulator.
+    pub zoom: f64,
+    /// Seed of the display's flaws and the camera's noise.
+    pub seed: u64,
+    /// z of the focused spot, metres.
+    pub spot_z_m: f64,
+    /// Whether all photographs of the patterns are kept.
+    pub keep_captures: bool,
+}
+
+/// Three colours' number before a calibration and after it.
+#[derive(Debug, Clone, Copy, Default, Serialize)]
+pub struct BeforeAfter {
+    /// With the factory's linear table and no correction.
+    pub before: [f64; 3],
+    /// With what was calibrated.
+    pub after: [f64; 3],
+}
+
+/// What came of it, by the simulation's own truth.
+#[derive(Debug, Clone, Serialize)]
+pub struct Outcome {
+    /// The measured curves and their table.
+    pub lut: LutReport,
+    /// Root mean square of the phase error over all pixels and reachable phases, radians.
+    pub phase_error_rad: BeforeAfter,
+    /// Light of double-phase black against white (Fig. 11), dB.
+    pub black_db: BeforeAfter,
+    /// Variation of the light of a flat grey over the frame, its standard deviation over its mean.
+    pub unevenness: BeforeAfter,
+    /// Strehl ratio of the focused spot.
+    pub strehl: BeforeAfter,
+    /// Coefficients of the correction that would be perfect, radians.
+    pub true_coefficients: [Coefficients; 3],
+    /// Those that the search found.
+    pub found_coefficients: [Coefficients; 3],
+    /// Photographs taken.
+    pub photographs: usize,
+}
+
+/// Calibrates a simulated display into `folder`: the four files of a calibration, `outcome.json`, pictures and
+/// drawings. `progress` hears of the photographs and rows done, of all.
+///
+/// # Errors
+/// A display too small for marks or whose sub-hologram does not fit; files that cannot be written.
+pub fn run(rehearsal: &Rehearsal, folder: &Path, progress: &dyn Fn(usize, usize)) -> Result<Outcome> {
+    let display = &rehearsal.display;
+    let stage = Stage {
+        rehearsal,
+        folder,
+        pattern: Pattern::new(display.height(), display.width())?,
+        simulated: SimulatedDisplay::new(display, rehearsal.zoom, rehearsal.seed)?,
+        progress,
+    };
+    // The search for aberrations comes last and would fail there.
+    for colour in 0..COLOURS.len() {
+        spot::levels(&Target::from(display), colour, rehearsal.spot_z_m, MIDDLE, &[0.0; 5])?;
+    }
+    output::make_folder(folder)?;
+    let curves = stage.curves()?;
+    let per_pixel = lut::compact(&curves)?;
+    calibration::write_per_pixel(&folder.join("table.pfp"), &per_pixel)?;
+    report::draw(&curves, folder)?;
+    let lut = report::report(&curves, &per_pixel);
+    let calibrated = Response::PerPixel(per_pixel.into());
+    let laser_map = stage.laser_map()?;
+    let aberrations = stage.aberrations(&calibrated)?;
+    write_display(&folder.join("display.toml"), display)?;
+
+    let worth = stage.worth(&calibrated)?;
+    stage.pictures(&calibrated, &laser_map, &aberrations.spots)?;
+    let Aberrations { truth, found, .. } = aberrations;
+    let outcome = Outcome {
+        lut,
+        phase_error_rad: worth.phase_error_rad,
+        black_db: worth.black_db,
+        unevenness: worth.unevenness,
+        strehl: BeforeAfter {
+            before: truth.map(|a| spot::strehl(&a)),
+            after: std::array::from_fn(|c| spot::strehl(&apart(&truth[c], &found[c]))),
+        },
+        true_coefficients: truth,
+        found_coefficients: found,
+        photographs: COLOURS.len() * (PATTERNS + 1) + aberrations.photographs,
+    };
+    let path = folder.join("outcome.json");
+    let text = serde_json::to_string_pretty(&outcome).map_err(|e| Error::file(&path, e))?;
+    output::write_atomically(&path, |file| writeln!(file, "{text}"))?;
+    Ok(outcome)
+}
+
+/// What is calibrated, where to, and who hears of it.
+struct Stage<'a> {
+    rehearsal: &'a Rehearsal,
+    folder: &'a Path,
+    pattern: Pattern,
+    simulated: SimulatedDisplay,
+    progress: &'a dyn Fn(usize, usize),
+}
+
+/// What the search for aberrations found.
+struct Aberrations {
+    truth: [Coefficients; 3],
+    found: [Coefficients; 3],
+    /// The green spot without a correction and with the one that was found.
+    spots: [Photograph; 2],
+    photographs: usize,
+}
+
+/// What a calibration is worth, by the simulation's own truth.
+struct Worth {
+    phase_error_rad: BeforeAfter,
+    black_db: BeforeAfter,
+    unevenness: BeforeAfter,
+}
+
+impl Stage<'_> {
+    /// Photographs and rows before the search for aberrations, and of all.
+    fn work(&self) -> [usize; 2] {
+        let before = 3 * (PATTERNS + self.rehearsal.display.height());
+        [before, before + 3 * spot::ROUNDS * TRIALS]
+    }
+
+    /// Where the photographs of a colour are kept, if they are.
+    fn captures(&self, colour: usize) -> Option<PathBuf> {
+        let kept = self.rehearsal.keep_captures;
+        kept.then(|| self.folder.join("captures").join(COLOURS[colour]))
+    }
+
+    /// From 256 photographs a colour, focused on the modulator.
+    fn curves(&self) -> Result<[lut::Curves; 3]> {
+        let modulator_z_m = self.rehearsal.display.offset_m();
+        let [_, work] = self.work();
+        let mut curves = Vec::new();
+        for colour in 0..COLOURS.len() {
+            let captures = self.captures(colour);
+            captures.as_deref().map_or(Ok(()), output::make_folder)?;
+            let shoot = |k: usize| -> Result<Photograph> {
+                let frame = self.pattern.frame(k as u8);
+                let frame = frame.view();
+                let photo = (self.simulated).photograph(frame, colour, modulator_z_m, k as u64)?;
+                if let Some(captures) = &captures {
+                    photo.write(&captures.join(format!("capture_{k:03}.png")))?;
+                }
+                Ok(photo)
+            };
+            let source = |k: usize| shoot(k).map_err(|e| lut::What::Unreadable(e.to_string()));
+            let done = |n: usize, of: usize| (self.progress)(colour * of + n, work);
+            let measured = lut::measure(&self.pattern, colour, &source, self.folder, &done);
+            curves.push(measured.map_err(|refusal| match refusal {
+                Refusal::Other(e) => e,
+                Refusal::Problems(all) => Error::Input(all.first().map_or_else(String::new, ToString::to_string)),
+            })?);
+        }
+        curves.try_into().map_err(|_| Error::Input("three colours".into()))
+    }
+
+    /// The laser's light, from a photograph of a diffuser a colour.
+    fn laser_map(&self) -> Result<Array3<f32>> {
+        let display = &self.rehearsal.display;
+        let shape = (display.height(), display.width());
+        let frame = self.pattern.frame(0);
+        let mut maps = Vec::new();
+        for colour in 0..COLOURS.len() {
+            let marked = (self.simulated).photograph(frame.view(), colour, display.offset_m(), 0)?;
+            let registration = marks::register(&marked, &self.pattern)?;
+            let photo = self.simulated.photograph_diffuser(colour, 1 << 20)?;
+            if let Some(captures) = self.captures(colour) {
+                photo.write(&captures.join("diffuser.png"))?;
+            }
+            maps.push(laser::mixture(&laser::map(&photo, &registration, shape)?, 1)?.0);
+        }
+        let views: Vec<_> = maps.iter().map(|map| map.view()).collect();
+        let map = stack(Axis(0), &views).map_err(|e| Error::Input(e.to_string()))?;
+        calibration::write_laser(&self.folder.join("laser.png"), map.view())?;
+        Ok(map)
+    }
+
+    /// Searched on a focused spot: of the same lens for all colours, as path; its phase goes with 1/λ.
+    fn aberrations(&self, calibrated: &Response) -> Result<Aberrations> {
+        let Rehearsal {
+            display, spot_z_m: z_m, ..
+        } = self.rehearsal;
+        let mut dice = Dice::new(self.rehearsal.seed ^ 0xab);
+        let green: Coefficients = std::array::from_fn(|_| dice.range(-1.1, 1.1));
+        let wavelengths = display.wavelengths_m();
+        let truth: [Coefficients; 3] = std::array::from_fn(|c| green.map(|a| a * wavelengths[1] / wavelengths[c]));
+        let aberrated = (self.simulated.clone()).with_aberration(Aberration::new(truth)?);
+        let target = Target {
+            response: calibrated.clone(),
+            ..Target::from(display)
+        };
+        let (mut found, mut photographs) = ([[0.0; 5]; 3], 0);
+        let (mut tried, mut spots) = (Vec::new(), Vec::new());
+        for colour in 0..3 {
+            let mut camera = aberrated.camera().clone();
+            camera.exposure = spot::exposure(display, colour, *z_m);
+            let before_lens = aberrated.clone().with_camera(camera);
+            let shoot = |a: &Coefficients, shot: usize| -> Result<Photograph> {
+                let levels = spot::levels(&target, colour, *z_m, MIDDLE, a)?;
+                before_lens.photograph(levels.view(), colour, *z_m, (1 << 21) + shot as u64)
+            };
+            let (search, points) = self.search(colour, &truth[colour], &shoot)?;
+            photographs += search.round * TRIALS;
+            found[colour] = search.best;
+            tried.push(Curve {
+                name: COLOURS[colour].into(),
+                points,
+                dots: false,
+            });
+            if colour == 1 {
+                spots = vec![shoot(&[0.0; 5], 9000)?, shoot(&search.best, 9001)?];
+            }
+        }
+        self.write_aberrations(found, tried)?;
+        Ok(Aberrations {
+            truth,
+            found,
+            spots: (spots.try_into()).map_err(|_| Error::Input("two spots".into()))?,
+            photographs,
+        })
+    }
+
+    /// A colour's search to its end, with the Strehl ratio after each round.
+    fn search(
+        &self,
+        colour: usize,
+        truth: &Coefficients,
+        shoot: &dyn Fn(&Coefficients, usize) -> Result<Photograph>,
+    ) -> Result<(Search, Vec<(f64, f64)>)> {
+        let [before, work] = self.work();
+        let mut search = Search::from([0.0; 5]);
+        let mut history = vec![(0.0, spot::strehl(truth))];
+        while !search.is_done() {
+            let mut sharp = [0.0; TRIALS];
+            for (i, trial) in search.trials().iter().enumerate() {
+                let photo = shoot(trial, search.round * TRIALS + i)?;
+                sharp[i] = spot::sharpness(&photo, spot::window(self.rehearsal.zoom))?;
+            }
+            search = search.learn(&sharp);
+            let left = apart(truth, &search.best);
+            history.push((search.round as f64, spot::strehl(&left)));
+            let rounds = colour * spot::ROUNDS + search.round;
+            (self.progress)(before + rounds * TRIALS, work);
+        }
+        Ok((search, history))
+    }
+
+    fn write_aberrations(&self, found: [Coefficients; 3], tried: Vec<Curve>) -> Result<()> {
+        let [red, green, blue] = found;
+        let entry = Entry {
+            z_mm: self.rehearsal.spot_z_m * 1e3,
+            x: None,
+            y: None,
+            red,
+            green,
+            blue,
+            laser: None,
+        };
+        calibration::write_aberrations(&self.folder.join("aberration.toml"), &[entry])?;
+        let panel = Panel {
+            title: "Strehl ratio of the search".into(),
+            x: "round",
+            y: "Strehl ratio",
+            curves: tried,
+        };
+        chart::write_curves(&self.folder.join("search.svg"), &[panel], 1)
+    }
+
+    fn worth(&self, calibrated: &Response) -> Result<Worth> {
+        let simulated = &self.simulated;
+        let display = &self.rehearsal.display;
+        let factory = Response::linear(display.bits())?;
+        let file = display::read_display(&self.folder.join("display.toml"))?;
+        let bare = Target::from(display);
+        let both = |f: &dyn Fn(&Response, usize) -> Result<f64>| -> Result<BeforeAfter> {
+            let mut all = BeforeAfter::default();
+            for colour in 0..3 {
+                all.before[colour] = f(&factory, colour)?;
+                all.after[colour] = f(calibrated, colour)?;
+            }
+            Ok(all)
+        };
+        let mut unevenness = BeforeAfter::default();
+        for colour in 0..3 {
+            unevenness.before[colour] = flat_grey(simulated, &bare, colour)?;
+            unevenness.after[colour] = flat_grey(simulated, &file.target, colour)?;
+        }
+        Ok(Worth {
+            phase_error_rad: both(&|response, c| Ok(phase_error(simulated, response, c)))?,
+            black_db: both(&|response, c| black_level(simulated, response, c))?,
+            unevenness,
+        })
+    }
+
+    fn pictures(&self, calibrated: &Response, laser_map: &Array3<f32>, spots: &[Photograph; 2]) -> Result<()> {
+        let (folder, display) = (self.folder, &self.rehearsal.display);
+        let side = (24.0 * self.rehearsal.zoom) as usize;
+        let cropped = spots.each_ref().map(|photo| crop(photo, side));
+        write_pair(&folder.join("spot.png"), &cropped)?;
+        draw_laser(folder, &self.simulated, laser_map)?;
+        let factory = Response::linear(display.bits())?;
+        black_pictures(&self.simulated, &factory, calibrated, folder)?;
+        for k in [0usize, 128] {
+            let frame = self.pattern.frame(k as u8);
+            let photo = (self.simulated).photograph(frame.view(), 1, display.offset_m(), k as u64)?;
+            photo.write(&folder.join(format!("capture_{k:03}.png")))?;
+        }
+        Ok(())
+    }
+}
+
+fn apart(a: &Coefficients, b: &Coefficients) -> Coefficients {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+/// The display's file, which refers to the others.
+fn write_display(path: &Path, display: &Display) -> Result<()> {
+    // Numbers and lists of them are written alike in JSON and TOML.
+    let values = serde_json::to_value(display).map_err(|e| Error::file(path, e))?;
+    let mut text = String::new();
+    for (key, value) in values.as_object().into_iter().flatten() {
+        text.push_str(&format!("{key} = {value}\n"));
+    }
+    text.push_str("per_pixel = \"table.pfp\"\nlaser = \"laser.png\"\naberration = \"aberration.toml\"\n");
+    output::write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// The root mean square of what `response` leaves of the phases it is asked for where curves reach, by the true curves.
+pub fn phase_error(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> f64 {
+    let (h, w) = (simulated.display().height(), simulated.display().width());
+    let (mut square, mut count) = (0.0, 0.0);
+    for y in 0..h {
+        for x in 0..w {
+            let curve: [f64; LEVELS] = std::array::from_fn(|level| simulated.phase(colour, y, x, level as f64));
+            for step in 0..64 {
+                let phase = f64::from(step) / 64.0 * TAU;
+                if phase > curve[LEVELS - 1] {
+                    break;
+                }
+                let level = response.level(phase as f32, (colour * h + y) * w + x);
+                let turns = (curve[usize::from(level)] - phase) / TAU;
+                square += ((turns - turns.round()) * TAU).powi(2);
+                count += 1.0;
+            }
+        }
+    }
+    f64::sqrt(square / count)
+}
+
+/// Levels, (H, W), of a double phase of `half` and −`half`.
+fn checkerboard(simulated: &SimulatedDisplay, response: &Response, colour: usize, half: f32) -> Array2<u8> {
+    let (h, w) = (simulated.display().height(), simulated.display().width());
+    Array2::from_shape_fn((h, w), |(y, x)| {
+        let phase = if (x + y) % 2 == 0 {
+            half
+        } else {
+            std::f32::consts::TAU - half
+        };
+        response.level(phase, (colour * h + y) * w + x)
+    })
+}
+
+/// The light of double-phase black against that of white, away from the rim, dB: Fig. 11.
+///
+/// # Errors
+/// None that a simulated display meets.
+pub fn black_level(simulated: &SimulatedDisplay, response: &Response, colour: usize) -> Result<f64> {
+    let z_m = simulated.display().offset_m();
+    let mean = |half: f32| -> Result<f64> {
+        let levels = checkerboard(simulated, response, colour, half);
+        let light = simulated.intensity(levels.view(), colour, z_m)?;
+        let (h, w) = light.dim();
+        let inner = light.slice(s![16.min(h / 4)..h - 16.min(h / 4), 16.min(w / 4)..w - 16.min(w / 4)]);
+        Ok(f64::from(inner.mean().unwrap_or(0.0)))
+    };
+    // A phase of 0 exactly would be 2π for the one half.
+    Ok(10.0 * (mean(std::f32::consts::FRAC_PI_2)? / mean(1e-3)?).log10())
+}
+
+/// Photographs of black side by side, by the factory's table and by the calibrated one, ten times as bright as white is
+/// shown.
+fn black_pictures(
+    simulated: &SimulatedDisplay,
+    factory: &Response,
+    calibrated: &Response,
+    folder: &Path,
+) -> Result<()> {
+    let mut camera = simulated.camera().clone();
+    camera.exposure *= 10.0;
+    let bright = simulated.clone().with_camera(camera);
+    let z_m = simulated.display().offset_m();
+    let photos: Result<Vec<_>> = [factory, calibrated]
+        .into_iter()
+        .map(|response| {
+            let levels = checkerboard(simulated, response, 1, std::f32::consts::FRAC_PI_2);
+            bright.photograph(levels.view(), 1, z_m, 1 << 22)
+        })
+        .collect();
+    write_pair(&folder.join("black.png"), &photos?)
+}
+
+/// How much the light of a flat half grey differs over the frame, away from the rim: its standard deviation over its
+/// mean.
+fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Result<f64> {
+    let shape @ (h, w) = (simulated.display().height(), simulated.display().width());
+    // Where the laser is weakest the modulator must be able to make up for it.
+    let options = EncoderOptions {
+        brightness: Brightness::Fixed(1.0),
+        ..Encoding::DoublePhase.into()
+    };
+    let plan = Modulator::new(shape, target, &options)?;
+    let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
+    let mut levels = Array3::zeros((3, h, w));
+    plan.modulate(
+        field.as_slice_mut().expect("standard layout"),
+        levels.as_slice_mut().expect("standard layout"),
+        &mut plan.scratch(),
+    );
+    let plane = levels.index_axis(Axis(0), colour);
+    let light = simulated.intensity(plane, colour, simulated.display().offset_m())?;
+    let (h, w) = light.dim();
+    let inner = light.slice(s![h / 8..h - h / 8, w / 8..w - w / 8]).mapv(f64::from);
+    Ok(inner.std(0.0) / inner.mean().unwrap_or(1.0))
+}
+
+/// The laser's map and what it is off the truth.
+fn draw_laser(folder: &Path, simulated: &SimulatedDisplay, map: &Array3<f32>) -> Result<()> {
+    let (_, rows, columns) = map.dim();
+    let (h, w) = (simulated.display().height(), simulated.display().width());
+    let maps: Vec<Map> = (0..3)
+        .flat_map(|colour| {
+            let found = map.index_axis(Axis(0), colour).to_owned();
+            let truth = Array2::from_shape_fn((rows, columns), |(i, j)| {
+                let at = |node: usize, n: usize, nodes: usize| node as f64 * (n - 1) as f64 / (nodes - 1) as f64;
+                simulated.laser(colour, at(i, h, rows), at(j, w, columns)) as f32
+            });
+            let most = |a: &Array2<f32>| a.iter().copied().fold(0.0, f32::max);
+            let off = &found / most(&found) - &truth / most(&truth);
+            [
+                Map {
+                    title: format!("{}: laser amplitude", COLOURS[colour]),
+                    values: found,
+                },
+                Map {
+                    title: format!("{}: off the truth", COLOURS[colour]),
+                    values: off,
+                },
+            ]
+        })
+        .collect();
+    let (amplitudes, off): (Vec<_>, Vec<_>) = maps.into_iter().enumerate().partition(|(i, _)| i % 2 == 0);
+    let all: Vec<Map> = amplitudes.into_iter().chain(off).map(|(_, map)| map).collect();
+    chart::write_maps(&folder.join("laser.svg"), &all, 3)
+}
+
+/// The middle of a photograph.
+fn crop(photo: &Photograph, side: usize) -> Photograph {
+    let side = side.min(photo.height).min(photo.width);
+    let (top, left) = ((photo.height - side) / 2, (photo.width - side) / 2);
+    let values = (top..top + side)
+        .flat_map(|y| &photo.values[y * photo.width + left..][..side])
+        .copied()
+        .collect();
+    Photograph {
+        height: side,
+        width: side,
+        values,
+        full: photo.full,
+    }
+}
+
+/// Two photographs of one size side by side.
+fn write_pair(path: &Path, photos: &[Photograph]) -> Result<()> {
+    const GAP: usize = 6;
+    let (height, width) = (photos[0].height, photos[0].width);
+    let mut values = Vec::with_capacity(height * (2 * width + GAP));
+    for y in 0..height {
+        for (i, photo) in photos.iter().enumerate() {
+            values.extend(std::iter::repeat_n(photo.full, if i > 0 { GAP } else { 0 }));
+            values.extend(&photo.values[y * width..][..width]);
+        }
+    }
+    Photograph {
+        height,
+        width: values.len() / height,
+        values,
+        full: photos[0].full,
+    }
+    .write(path)
+}

@@ -1,0 +1,451 @@
+//! A display with the flaws of a real one, and a camera before it: it takes levels and returns a photograph.
+//! Calibration is tested on it and rehearsed with it.
+//!
+//! Light falls on the modulator as a Gaussian beam; each pixel turns its phase by a curve of its own; the
+//! Fourier aperture lets the first order pass and the optics bend it (an aberration, in the pupil); the camera
+//! focuses at a z, stands askew, and answers with shot noise, noise of its own, and a limited number of bits.
+//! A seed means the same on every machine but for the last bits of its arithmetic.
+
+use crate::camera::homography::Homography;
+use crate::camera::photograph::Photograph;
+use crate::curves::curve;
+use ndarray::{Array2, ArrayView2};
+use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::target::{Aberration, PerPixel, Response};
+use phasefront::unstable::slm::per_pixel;
+use phasefront::unstable::wave::aperture;
+use phasefront::unstable::wave::asm::{self, Padding, Transfer};
+use phasefront::unstable::wave::fft::Fft2;
+use phasefront_io::dice::Dice;
+use phasefront_io::{Error, Result};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// How a pixel turns the phase: level/255 = v to 2π·range·(v − steepness·sin(2πv)/2π + bend·v(1 − v)), where
+/// range differs over the panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curves {
+    /// What level 255 turns in red, green, blue, in units of 2π, in the mean of the panel.
+    pub range: [f64; 3],
+    /// By how much of itself the range differs over the panel, at most.
+    pub unevenness: f64,
+    /// S shape, 0 straight, below 1.
+    pub steepness: f64,
+    /// Bow, 0 straight, within ±0.4 for steepness up to ½.
+    pub bend: f64,
+}
+
+/// A camera and where it stands.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// (H, W) of a photograph.
+    pub shape: (usize, usize),
+    /// Where the modulator's corners fall in the photograph, pixels: top left, top right, bottom left, bottom right.
+    pub corners: [[f64; 2]; 4],
+    /// The part of the sensor's range that full light fills.
+    pub exposure: f64,
+    /// Electrons of a full pixel: shot noise is the root of how many there are.
+    pub full_well: f64,
+    /// Electrons of noise in the dark.
+    pub read_noise: f64,
+    /// Light that is always there, as a part of full light.
+    pub stray: f64,
+    /// Bits of a value, 8 to 16; over 8 they fill the upper end of a word of 16.
+    pub bits: u32,
+}
+
+/// A display with its flaws. Deterministic by its seed.
+#[derive(Debug, Clone)]
+pub struct SimulatedDisplay {
+    display: Display,
+    seed: u64,
+    curves: Curves,
+    /// The smooth map, within ±1, by which curves differ: waves over the panel.
+    waves: Vec<[f64; 5]>,
+    /// Centre x, y and 1/e² radius of intensity, in parts of the panel's width.
+    beam: [f64; 3],
+    aberration: Aberration,
+    camera: Camera,
+}
+
+impl SimulatedDisplay {
+    /// A display of the physics of `display`, whose flaws follow from `seed`: curves that leave the factory's linear
+    /// table wrong by more than 0.3 rad, a beam off its middle, a camera a little askew that sees each pixel of the
+    /// modulator with `zoom` of its own; no aberration, see [`Self::with_aberration`].
+    ///
+    /// # Errors
+    /// A camera over 2³⁰ pixels, or a zoom below 1.
+    pub fn new(display: &Display, zoom: f64, seed: u64) -> Result<Self> {
+        let mut dice = Dice::new(seed ^ 0x0044_4953_504c_4159);
+        let waves = (0..4)
+            .map(|_| {
+                [
+                    dice.range(-0.8, 0.8),
+                    dice.range(-0.8, 0.8),
+                    dice.range(0.0, TAU),
+                    dice.range(0.15, 0.25),
+                    dice.range(-0.4, 0.4),
+                ]
+            })
+            .collect();
+        let (w, h) = (display.width() as f64 * zoom, display.height() as f64 * zoom);
+        let border = 0.07 * w;
+        let size = |n: f64| (n + 2.0 * border).round();
+        if !(zoom >= 1.0 && size(w) * size(h) < f64::from(1u32 << 30)) {
+            return Err(Error::Input(format!(
+                "a camera that sees a pixel with {zoom} of its own; it must be 1 or more, and the photograph under 2³⁰ pixels"
+            )));
+        }
+        let mut corner = |x: f64, y: f64| {
+            let askew = 0.012 * w;
+            [
+                border + x * w + dice.range(-askew, askew),
+                border + y * h + dice.range(-askew, askew),
+            ]
+        };
+        let camera = Camera {
+            corners: [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)],
+            shape: (size(h) as usize, size(w) as usize),
+            exposure: 0.55,
+            full_well: 20_000.0,
+            read_noise: 12.0,
+            stray: 2e-4,
+            bits: 12,
+        };
+        let beam = [dice.range(0.42, 0.58), dice.range(0.42, 0.58), 1.1];
+        Ok(SimulatedDisplay {
+            display: display.clone(),
+            seed,
+            curves: Curves {
+                range: [1.06, 1.22, 1.38],
+                unevenness: 0.1,
+                steepness: 0.35,
+                bend: 0.15,
+            },
+            waves,
+            beam,
+            aberration: Aberration::none(display.colours()),
+            camera,
+        })
+    }
+
+    /// The same with an aberration: what would *correct* it is `correction`.
+    pub fn with_aberration(mut self, correction: Aberration) -> Self {
+        self.aberration = correction;
+        self
+    }
+
+    /// The same with other curves.
+    pub fn with_curves(mut self, curves: Curves) -> Self {
+        self.curves = curves;
+        self
+    }
+
+    /// The same before another camera.
+    pub fn with_camera(mut self, camera: Camera) -> Self {
+        self.camera = camera;
+        self
+    }
+
+    /// The physics.
+    pub fn display(&self) -> &Display {
+        &self.display
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The curves.
+    pub fn curves(&self) -> &Curves {
+        &self.curves
+    }
+
+    /// How far level `level` of pixel (`x`, `y`) turns the phase against level 0, radians: the truth that a calibration
+    /// seeks.
+    pub fn phase(&self, colour: usize, y: usize, x: usize, level: f64) -> f64 {
+        let u = (x as f64 + 0.5) / self.display.width() as f64;
+        let v = (y as f64 + 0.5) / self.display.height() as f64;
+        let (mut uneven, mut bent) = (0.0, 0.0);
+        for [fx, fy, start, height, other] in &self.waves {
+            let wave = (TAU * (fx * u + fy * v) + start).sin();
+            uneven += height * wave;
+            bent += other * wave;
+        }
+        let c = &self.curves;
+        let t = level / 255.0;
+        let bend = c.bend * (1.0 + 0.5 * bent);
+        let shape = t - c.steepness * (TAU * t).sin() / TAU + bend * t * (1.0 - t);
+        TAU * c.range[colour] * (1.0 + c.unevenness * uneven) * shape
+    }
+
+    /// What a calibration without error would find: the table of the true curves, a node on every pixel of small
+    /// displays, 120 along the longer side of large ones.
+    ///
+    /// # Errors
+    /// None that a display made by [`Self::new`] meets.
+    pub fn response(&self) -> Result<Response> {
+        let (height, width) = (self.display.height(), self.display.width());
+        let spacing = height.max(width).div_ceil(120);
+        let intervals = per_pixel::MAX_INTERVALS;
+        let (rows, columns) = per_pixel::nodes(height, width, spacing);
+        let (mut levels, mut turns) = (Vec::new(), Vec::new());
+        for node in 0..3 * rows * columns {
+            let (colour, i, j) = (node / (rows * columns), node / columns % rows, node % columns);
+            let curve = std::array::from_fn(|level| self.phase(colour, i * spacing, j * spacing, level as f64) as f32);
+            let phase = |k: usize| k as f32 / intervals as f32 * std::f32::consts::TAU;
+            levels.extend((0..=intervals).map(|k| curve::level_of(&curve, phase(k))));
+            let end = std::f32::consts::TAU;
+            turns.push(if curve[255] < end {
+                0.5 * (curve[255] + end)
+            } else {
+                end
+            });
+        }
+        let table = PerPixel::new(height, width, spacing, intervals, &levels, &turns)?;
+        Ok(Response::PerPixel(table.into()))
+    }
+
+    /// The laser's amplitude at pixel (`x`, `y`), 1 at its brightest.
+    pub fn laser(&self, colour: usize, y: f64, x: f64) -> f64 {
+        let w = self.display.width() as f64;
+        let [cx, cy, radius] = self.beam;
+        // Three beams are never quite on one axis.
+        let cx = cx + 0.03 * (colour as f64 - 1.0);
+        let dx = (x + 0.5) / w - cx;
+        let dy = (y + 0.5 - cy * self.display.height() as f64) / w;
+        (-(dx * dx + dy * dy) / (radius * radius)).exp()
+    }
+
+    /// The intensity that an ideal camera focused at `z_m` would see of `levels`, (H, W), on a grid twice as fine,
+    /// (2H, 2W): its value (i, j) stands at ((j + 1)/2, (i + 1)/2) pixels of the modulator. 1 is what the brightest
+    /// light gives of a flat phase.
+    ///
+    /// # Errors
+    /// Levels of another shape, or a z too far to propagate to.
+    pub fn intensity(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64) -> Result<Array2<f32>> {
+        let (height, width) = (self.display.height(), self.display.width());
+        if levels.dim() != (height, width) {
+            return Err(Error::Input(format!(
+                "levels of {}×{}; the display has {width}×{height}",
+                levels.dim().1,
+                levels.dim().0
+            )));
+        }
+        let (pitch, wavelength) = (self.display.pitch_m(), self.display.wavelengths_m()[colour]);
+        let distance = z_m - self.display.offset_m();
+        let more = (self.aberration.reach_m(pitch) / pitch).ceil() as usize + 8;
+        let padded = asm::padded_shape(height + more, width + more, pitch, wavelength, distance, Padding::Reach)?;
+        let (ph, pw) = padded;
+        let mut plane: Vec<Complex32> = vec![Complex32::ZERO; height * width];
+        let rows = plane.par_chunks_exact_mut(width).enumerate();
+        rows.for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                let amplitude = self.laser(colour, y as f64, x as f64);
+                let phase = self.phase(colour, y, x, levels[(y, x)].into());
+                *value = Complex32::from_polar(amplitude as f32, phase as f32);
+            }
+        });
+        let transfer = Transfer::corrected(padded, pitch, wavelength, distance, |mu, nu| {
+            -self.aberration.phase(colour, mu, nu, pitch)
+        });
+        let fft = Fft2::new(height, width, ph, pw);
+        let mut scratch = fft.scratch();
+        fft.rows_forward(&plane, &mut scratch.rows, &mut scratch.work);
+        let bin = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
+        fft.spectrum(
+            &scratch.rows,
+            &mut scratch.columns,
+            |kx, column, _| {
+                transfer.apply(kx, column);
+                let fx = bin(kx, pw);
+                for (ky, value) in column.iter_mut().enumerate() {
+                    if !aperture::passes(fx, bin(ky, ph), self.display.aperture_radius()) {
+                        *value = Complex32::ZERO;
+                    }
+                }
+            },
+            &mut scratch.work,
+        );
+        // The same spectrum in a plane of twice the samples: band-limited interpolation.
+        let wide = |k: usize, n: usize| if 2 * k < n { k } else { k + n };
+        let mut columns = vec![Complex32::ZERO; 4 * ph * pw];
+        for (kx, column) in scratch.columns.chunks_exact(ph).enumerate() {
+            let to = &mut columns[wide(kx, pw) * 2 * ph..][..2 * ph];
+            for (ky, value) in column.iter().enumerate() {
+                to[wide(ky, ph)] = *value;
+            }
+        }
+        let fine = Fft2::new(2 * height, 2 * width, 2 * ph, 2 * pw);
+        let mut scratch = fine.scratch();
+        fine.columns_inverse(&mut columns, |_, _| {}, &mut scratch.work);
+        fine.rows_inverse(&columns, &mut scratch.rows, &mut scratch.work);
+        Ok(Array2::from_shape_fn((2 * height, 2 * width), |(y, x)| {
+            scratch.rows[y * 2 * pw + x].norm_sqr()
+        }))
+    }
+
+    /// A photograph of `levels`, (H, W), lit in one colour, the camera focused at `z_m`. `shot` tells photographs
+    /// apart: their noise follows from it.
+    ///
+    /// # Errors
+    /// As [`Self::intensity`].
+    pub fn photograph(&self, levels: ArrayView2<'_, u8>, colour: usize, z_m: f64, shot: u64) -> Result<Photograph> {
+        let fine = self.intensity(levels, colour, z_m)?;
+        let (rows, columns) = fine.dim();
+        let at = |y: isize, x: isize| match (y, x) {
+            (0.., 0..) if (y as usize) < rows && (x as usize) < columns => f64::from(fine[(y as usize, x as usize)]),
+            _ => 0.0,
+        };
+        self.expose(colour, shot, |x, y| {
+            let (x, y) = (2.0 * x - 1.0, 2.0 * y - 1.0);
+            let (x0, y0) = (x.floor(), y.floor());
+            let (fx, fy) = (x - x0, y - y0);
+            let (x0, y0) = (x0 as isize, y0 as isize);
+            let top = at(y0, x0) * (1.0 - fx) + at(y0, x0 + 1) * fx;
+            let bottom = at(y0 + 1, x0) * (1.0 - fx) + at(y0 + 1, x0 + 1) * fx;
+            top * (1.0 - fy) + bottom * fy
+        })
+    }
+
+    /// A photograph of a diffuser in the modulator's place, lit in one colour: the beam, grainy with speckle, with
+    /// specks of dust.
+    ///
+    /// # Errors
+    /// None that a display made by [`Self::new`] meets.
+    pub fn photograph_diffuser(&self, colour: usize, shot: u64) -> Result<Photograph> {
+        let (height, width) = (self.display.height(), self.display.width());
+        let mut dice = Dice::new(self.seed ^ 0x4455_5354);
+        let specks: Vec<_> = (0..40)
+            .map(|_| (dice.range(0.0, width as f64), dice.range(0.0, height as f64)))
+            .collect();
+        self.expose(colour, shot, |x, y| {
+            let inside = (0.0..width as f64).contains(&x) && (0.0..height as f64).contains(&y);
+            let dusty = specks.iter().any(|(u, v)| (u - x).hypot(v - y) < 0.6);
+            if !inside || dusty {
+                return 0.0;
+            }
+            self.laser(colour, y - 0.5, x - 0.5).powi(2)
+        })
+    }
+
+    /// The camera's answer to an intensity over the modulator, `light`(x, y), pixels from its top left corner.
+    fn expose(&self, colour: usize, shot: u64, light: impl Fn(f64, f64) -> f64 + Sync) -> Result<Photograph> {
+        let camera = &self.camera;
+        let (height, width) = camera.shape;
+        let (w, h) = (self.display.width() as f64, self.display.height() as f64);
+        let panel = [[0.0, 0.0], [w, 0.0], [0.0, h], [w, h]];
+        let back = Homography::through(camera.corners, panel)?;
+        let end = f64::from((1u32 << camera.bits) - 1);
+        let shift = if camera.bits > 8 { 16 - camera.bits } else { 0 };
+        let mut values = vec![0; height * width];
+        let rows = values.par_chunks_exact_mut(width).enumerate();
+        rows.for_each(|(row, values)| {
+            let mut dice = Dice::new(
+                self.seed ^ (shot << 24 | (colour as u64) << 20 | row as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15),
+            );
+            for (column, value) in values.iter_mut().enumerate() {
+                let [x, y] = back.map([column as f64 + 0.5, row as f64 + 0.5]);
+                let electrons = (light(x, y) + camera.stray) * camera.exposure * camera.full_well;
+                // Shot noise and the camera's own, as one normal number: there are many electrons.
+                let noise = (electrons + camera.read_noise.powi(2)).sqrt();
+                let counted = electrons + noise * normal(&mut dice);
+                let code = (counted / camera.full_well * end).round().clamp(0.0, end);
+                *value = (code as u16) << shift;
+            }
+        });
+        Ok(Photograph {
+            height,
+            width,
+            values,
+            full: if camera.bits > 8 { 65535 } else { 255 },
+        })
+    }
+}
+
+/// A standard normal number (Box and Muller, 1958).
+fn normal(dice: &mut Dice) -> f64 {
+    let radius = (-2.0 * (1.0 - dice.unit()).ln()).sqrt();
+    radius * (2.0 * PI * dice.unit()).cos()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use phasefront::unstable::wave::aperture::{Aperture, Opening};
+
+    fn small() -> SimulatedDisplay {
+        let display = Display::from_toml("width = 48\nheight = 40").unwrap();
+        SimulatedDisplay::new(&display, 2.0, 5).unwrap()
+    }
+
+    #[test]
+    fn a_seed_is_one_photograph() {
+        let levels = Array2::from_shape_fn((40, 48), |(y, x)| (y * 5 + x) as u8);
+        let shoot = |shot| small().photograph(levels.view(), 1, 1e-3, shot).unwrap();
+        assert_eq!(shoot(3), shoot(3));
+        assert_ne!(shoot(3), shoot(4));
+    }
+
+    #[test]
+    fn curves_rise_and_leave_the_linear_table_wrong() {
+        let display = small();
+        let mut square = 0.0;
+        for (y, x) in [(0, 0), (20, 20), (39, 47), (5, 40)] {
+            for level in 0..255 {
+                let (here, next) = (
+                    display.phase(0, y, x, level.into()),
+                    display.phase(0, y, x, f64::from(level) + 1.0),
+                );
+                assert!(next > here);
+                let apart = here - TAU * f64::from(level) / 256.0;
+                square += (TAU * (apart / TAU - (apart / TAU).round())).powi(2);
+            }
+        }
+        let rms = (square / (4.0 * 255.0)).sqrt();
+        assert!(rms > 0.3, "{rms}");
+    }
+
+    /// At the modulator, without noise, the fine grid between two samples of the filtered field is that field.
+    #[test]
+    fn the_intensity_is_that_of_the_filtered_field() {
+        let display = small();
+        let levels = Array2::from_shape_fn((40, 48), |(y, x)| if (x + y) % 2 == 0 { 90 } else { 0 });
+        let fine = display.intensity(levels.view(), 1, 0.0).unwrap();
+        // Away from the rim, where padding with darkness and a periodic plane agree.
+        let mut plane: Vec<_> = (0..40 * 48)
+            .map(|i| {
+                let (y, x) = (i / 48, i % 48);
+                let phase = display.phase(1, y, x, levels[(y, x)].into());
+                Complex32::from_polar(display.laser(1, y as f64, x as f64) as f32, phase as f32)
+            })
+            .collect();
+        let plan = Aperture::new(40, 48, Opening::centred(1.0)).unwrap();
+        plan.filter(&mut plane, &mut plan.scratch());
+        for y in 12..28 {
+            for x in 12..36 {
+                let (a, b) = (fine[(2 * y, 2 * x)], plane[y * 48 + x].norm_sqr());
+                assert!((a - b).abs() < 0.03, "{y} {x}: {a} {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_camera_saturates_and_has_its_bits() {
+        let mut camera = small().camera().clone();
+        (camera.exposure, camera.bits) = (3.0, 12);
+        let bright = small().with_camera(camera.clone());
+        let flat = Array2::zeros((40, 48));
+        let photo = bright.photograph(flat.view(), 0, 0.0, 0).unwrap();
+        assert!(photo.saturated() > 0.1);
+        assert!(photo.values.iter().all(|v| v % 16 == 0));
+        (camera.exposure, camera.bits) = (0.5, 8);
+        let photo = small().with_camera(camera).photograph(flat.view(), 0, 0.0, 0).unwrap();
+        assert_eq!((photo.full, photo.saturated()), (255, 0.0));
+        let middle = f64::from(photo.sample(photo.width as f64 / 2.0, photo.height as f64 / 2.0));
+        assert!((middle / 255.0 - 0.5).abs() < 0.05, "{middle}");
+    }
+}

@@ -1,0 +1,266 @@
+//! How fast a frame is on this machine: every stage of the pipeline, medians of many frames, beside the
+//! machine's own peak measured in the same run.
+
+pub mod gpu;
+pub mod random;
+
+use ndarray::{Array2, Array3};
+use num_complex::Complex32;
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::network::Precision;
+use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront_io::{Error, Result};
+use phasefront_kernels::{f32_peak, int8_peak};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// How long the peak is measured.
+const PEAK_TIME: Duration = Duration::from_millis(200);
+
+/// One combination that is measured.
+#[derive(Debug, Clone)]
+pub struct Case<'a> {
+    /// What makes the hologram.
+    pub method: &'a Method,
+    /// Width and height, pixels.
+    pub size: (usize, usize),
+    /// Threads of the pool.
+    pub threads: usize,
+    /// How its field becomes levels, at one brightness.
+    pub encoder: &'a EncoderOptions,
+}
+
+/// What was measured of one [`Case`]. Times are milliseconds, medians over frames.
+#[derive(Debug, Clone, Serialize)]
+pub struct Row {
+    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    pub method: &'static str,
+    /// Convolution layers; 0 without a network.
+    pub layers: usize,
+    /// `f32` or `int8`.
+    pub precision: String,
+    /// Always `cpu`.
+    pub backend: &'static str,
+    /// The kernels that ran.
+    pub kernels: String,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Threads of the pool.
+    pub threads: usize,
+    /// z of the modulator against the midpoint, mm.
+    pub offset_mm: f64,
+    /// Each stage's median.
+    pub stage_ms: BTreeMap<&'static str, f64>,
+    /// The median of whole frames.
+    pub total_ms: f64,
+    /// The fastest and the slowest frame.
+    pub spread_ms: [f64; 2],
+    /// What encoding through the per-pixel table takes longer than through none, of the whole frame, where there is
+    /// one.
+    pub table_percent: Option<f64>,
+    /// Frames that were measured.
+    pub frames: usize,
+    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
+    pub gmac_per_s: Option<f64>,
+    /// That, of what these kernels' instructions do here from registers alone, on as many threads.
+    pub peak_percent: Option<f64>,
+    /// The most memory this process held, where the system tells.
+    pub peak_memory_mb: Option<f64>,
+}
+
+/// The machine that was measured.
+#[derive(Debug, Clone, Serialize)]
+pub struct Machine {
+    /// The processor's name, where the system tells.
+    pub cpu: String,
+    /// Its logical cores.
+    pub cores: usize,
+    /// Version of this program.
+    pub version: &'static str,
+}
+
+impl Machine {
+    /// This machine.
+    pub fn this() -> Self {
+        let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let name = info.lines().find_map(|line| {
+            let (key, value) = line.split_once(':')?;
+            (key.trim() == "model name").then(|| value.trim().to_owned())
+        });
+        Machine {
+            cpu: name.unwrap_or_else(|| std::env::consts::ARCH.to_owned()),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            version: env!("CARGO_PKG_VERSION"),
+        }
+    }
+}
+
+/// Measures one case on `target`: frames until `budget` is spent, five at least, after one that is not counted. Where
+/// its modulator has a table for each pixel, each frame is encoded once more, through it.
+///
+/// # Errors
+/// A case that cannot be planned.
+pub fn measure(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(case.threads)
+        .build()
+        .map_err(|e| Error::Input(format!("--threads {}: {e}", case.threads)))?;
+    pool.install(|| measure_here(case, target, budget))
+}
+
+/// A method's name, which is also that of its stage, and its network.
+fn named(method: &Method) -> (&'static str, Option<&Arc<Network>>) {
+    match method {
+        Method::Network(network) => ("network", Some(network)),
+        Method::Seeded(network) => ("seeded", Some(network)),
+        _ => ("sweep", None),
+    }
+}
+
+fn measure_here(case: &Case<'_>, target: &Target, budget: Duration) -> Result<Row> {
+    let (width, height) = case.size;
+    let (name, network) = named(case.method);
+    forget_peak_memory();
+    let plain = Target::from(&target.display);
+    let options = full_light(case.encoder);
+    let pipeline = Pipeline::new((height, width), case.method.clone(), &plain, &options)?;
+    let Times {
+        stages,
+        mut totals,
+        mut table_encode,
+    } = time_frames(case, target, &pipeline, budget)?;
+    let stage_ms: BTreeMap<_, _> = (stages.into_iter())
+        .map(|(stage, mut times)| (stage, median(&mut times)))
+        .collect();
+    let total_ms = median(&mut totals);
+    let alone = network.filter(|_| name == "network");
+    let gmac_per_s = alone.map(|network| {
+        let macs = network.chain().macs_per_pixel() as f64 * (width * height) as f64;
+        macs / stage_ms[name] / 1e6
+    });
+    let isa = pipeline.method().engine().and_then(|engine| engine.isa);
+    let precision = network.map_or(Precision::F32, |network| network.precision());
+    let peak = isa.and_then(|isa| match precision {
+        Precision::Int8 => int8_peak(isa, PEAK_TIME),
+        _ => f32_peak(isa, PEAK_TIME),
+    });
+    Ok(Row {
+        method: name,
+        layers: network.map_or(0, |network| network.layers()),
+        precision: precision.to_string(),
+        backend: "cpu",
+        kernels: (pipeline.method().engine()).map_or("", |engine| engine.name).to_owned(),
+        width,
+        height,
+        threads: case.threads,
+        offset_mm: target.display.offset_m() * 1e3,
+        total_ms,
+        spread_ms: [totals[0], totals[totals.len() - 1]],
+        table_percent: (!table_encode.is_empty())
+            .then(|| 100.0 * (median(&mut table_encode) - stage_ms["encode"]) / total_ms),
+        stage_ms,
+        frames: totals.len(),
+        gmac_per_s,
+        peak_percent: peak
+            .zip(gmac_per_s)
+            .map(|(peak, gmac_per_s)| 100.0 * gmac_per_s * 1e9 / peak),
+        peak_memory_mb: peak_memory_mb(),
+    })
+}
+
+/// `encoder` at one brightness.
+fn full_light(encoder: &EncoderOptions) -> EncoderOptions {
+    EncoderOptions {
+        brightness: Brightness::Fixed(1.0),
+        ..encoder.clone()
+    }
+}
+
+/// Times of frames, milliseconds.
+#[derive(Default)]
+struct Times {
+    stages: BTreeMap<&'static str, Vec<f64>>,
+    totals: Vec<f64>,
+    /// Of encoding through the table.
+    table_encode: Vec<f64>,
+}
+
+/// Frames until `budget` is spent, five at least, after one that is not counted.
+fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Duration) -> Result<Times> {
+    let (width, height) = case.size;
+    let (name, _) = named(case.method);
+    let options = full_light(case.encoder);
+    let by_table = (target.response.shape())
+        .map(|_| Modulator::new((height, width), target, &options))
+        .transpose()?;
+    let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
+    let frame = test_frame(height, width)?.for_display(&target.display);
+    let mut scratch = pipeline.scratch();
+    let values = pipeline.colours() * height * width;
+    let mut field = vec![Complex32::ZERO; values];
+    let mut levels = vec![0; values];
+    let mut times = Times::default();
+    pipeline.process(&frame, &mut levels, &mut scratch)?;
+    let start = Instant::now();
+    while times.totals.len() < 5 || start.elapsed() < budget {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let (method, propagate) = pipeline.field(&frame, &mut field, &mut scratch)?;
+        if let Some((scratch, plan)) = &mut by_table {
+            // The encoder's filter changes the field.
+            let mut field = field.clone();
+            let modulation = plan.modulate(&mut field, &mut levels, scratch);
+            times.table_encode.push(ms(modulation.encode));
+        }
+        let encode = pipeline.modulate(&mut field, &mut levels, &mut scratch).encode;
+        for (stage, time) in [(name, method), ("propagate", propagate), ("encode", encode)] {
+            times.stages.entry(stage).or_default().push(ms(time));
+        }
+        times.totals.push(ms(method + propagate + encode));
+    }
+    Ok(times)
+}
+
+/// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it.
+/// What is in it does not change what a network costs; a sweep costs more the more depths are near each other.
+fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
+    let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;
+    let depth = |y: usize, x: usize| {
+        let (v, u) = (y as f32 / height as f32, x as f32 / height as f32);
+        let ground = (2.0 * (1.0 - v)).min(0.95);
+        (0..6).fold(ground, |depth, ball| {
+            let (at, radius) = (0.2 + 0.27 * ball as f32, 0.1 + 0.02 * (ball % 3) as f32);
+            let inside = radius.powi(2) - (u - at).powi(2) - (v - 0.6).powi(2);
+            match inside > 0.0 {
+                true => depth.min(0.15 * ball as f32 + 0.1 - inside.sqrt() / 2.0).max(0.0),
+                false => depth,
+            }
+        })
+    };
+    Ok(RgbdFrame::new(
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| value(c, y, x)),
+        Array2::from_shape_fn((height, width), |(y, x)| depth(y, x)),
+    )?)
+}
+
+/// Sorts `values`, which are not empty, and gives the middle one.
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Linux counts a process's most memory from here on.
+fn forget_peak_memory() {
+    // Where this is not Linux there is nothing to forget.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+}
+
+fn peak_memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let kilobytes: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some((kilobytes / 102.4).round() / 10.0)
+}

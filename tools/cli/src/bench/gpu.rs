@@ -1,0 +1,247 @@
+//! How fast a frame is on a GPU: every stage by the device's own time stamps, beside what the device does at its best,
+//! measured in the same run.
+
+use super::{full_light, median, named};
+use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
+use phasefront::unstable::gpu::{
+    ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
+};
+use phasefront::{EncoderOptions, Method, StageTimes, Target};
+use phasefront_io::Result;
+use serde::Serialize;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// One combination that is measured on a GPU.
+#[derive(Debug, Clone)]
+pub struct GpuCase<'a> {
+    /// What makes the hologram.
+    pub method: &'a Method,
+    /// Width and height, pixels.
+    pub size: (usize, usize),
+    /// How its field becomes levels, at one brightness.
+    pub encoder: &'a EncoderOptions,
+    /// How a network computes.
+    pub chain: ChainOptions,
+}
+
+/// What was measured of one [`GpuCase`]. Times are milliseconds, medians over frames.
+#[derive(Debug, Clone, Serialize)]
+pub struct GpuRow {
+    /// `network`, `sweep` or `seeded`, which is also the name of its stage.
+    pub method: &'static str,
+    /// Convolution layers; 0 without a network.
+    pub layers: usize,
+    /// The numbers that the network, or a sweep by itself, was computed in: `f32`, `f16` or `int8`.
+    pub precision: String,
+    /// Always `gpu`.
+    pub backend: &'static str,
+    /// The device, how many layers or planes a dispatch computes, and how many dispatches the method takes.
+    pub kernels: String,
+    /// Pixels.
+    pub width: usize,
+    /// Pixels.
+    pub height: usize,
+    /// Each stage's median, where the device has time stamps.
+    pub stage_ms: BTreeMap<&'static str, f64>,
+    /// The median of whole frames, one at a time, from the CPU's memory and back to it.
+    pub total_ms: f64,
+    /// The fastest and the slowest frame.
+    pub spread_ms: [f64; 2],
+    /// Time a frame with several in flight whose levels stay on the GPU.
+    pub flying_ms: f64,
+    /// What encoding through the per-pixel table takes longer than through none, of all stages, where there is one and
+    /// the device has time stamps.
+    pub table_percent: Option<f64>,
+    /// Frames that were measured one at a time.
+    pub frames: usize,
+    /// The network's multiply-adds in its median time, 10⁹ a second, where it is all that the stage does.
+    pub gmac_per_s: Option<f64>,
+    /// That, of what the device does here from registers alone in these numbers.
+    pub peak_percent: Option<f64>,
+    /// What the method's dispatches read and write, each value once, of what a copy does here.
+    pub bandwidth_percent: Option<f64>,
+}
+
+/// Measures `case` on `device`: frames until `budget` is spent, five at least, after
+/// one that is not counted; where the modulator has a table for each pixel, each frame once more through it.
+///
+/// # Errors
+/// A case that cannot be planned there, or a device that does not answer as the CPU does.
+pub fn measure(case: &GpuCase<'_>, device: &Arc<Device>, target: &Target, budget: Duration) -> Result<GpuRow> {
+    let (width, height) = case.size;
+    let (name, network) = named(case.method);
+    let mut job = Job::new((height, width), case.method.clone(), &target.display);
+    job.encoder = full_light(case.encoder);
+    job.chain = case.chain;
+    probe(device, &job)?;
+    let format = ColourFormat::Nv12(YuvEncoding::default());
+    job.colour = Colour::Camera {
+        format,
+        height,
+        width,
+        orientation: Orientation::default(),
+    };
+    job.depth = Depth::U16;
+    let mut pipeline = GpuPipeline::new(device, &job)?;
+    let mut by_table = (target.response.shape())
+        .map(|_| {
+            job.target = target.clone();
+            GpuPipeline::new(device, &job)
+        })
+        .transpose()?;
+    let images = Images::new(width, height);
+    let planes = images.planes();
+    let frame = Frame {
+        colour: ColourData::Camera(ColourImage::new(format, width, height, &planes)?),
+        depth: DepthData::U16(&images.depth),
+    };
+    let Alone {
+        mut totals,
+        stages,
+        mut table_encode,
+    } = Alone::measure(name, &mut pipeline, by_table.as_mut(), &frame, budget)?;
+    let flying_ms = flying_ms(&mut pipeline, &frame, budget)?;
+    let stage_ms: BTreeMap<_, _> = (stages.into_iter())
+        .map(|(stage, mut times)| (stage, median(&mut times)))
+        .collect();
+    let total_ms = median(&mut totals);
+    let table_percent = (!table_encode.is_empty()).then(|| {
+        let all: f64 = stage_ms.values().sum();
+        100.0 * (median(&mut table_encode) - stage_ms["encode"]) / all
+    });
+    let peak = pipeline.peak()?;
+    let method_s = stage_ms.get(name).map(|ms| ms / 1e3);
+    let alone = network.filter(|_| name == "network");
+    let mac_per_s = method_s
+        .zip(alone)
+        .map(|(s, network)| network.chain().macs_per_pixel() as f64 * (width * height) as f64 / s);
+    Ok(GpuRow {
+        method: name,
+        layers: network.map_or(0, |network| network.layers()),
+        precision: pipeline.numbers().to_owned(),
+        backend: "gpu",
+        kernels: pipeline.describe(),
+        width,
+        height,
+        stage_ms,
+        total_ms,
+        spread_ms: [totals[0], totals[totals.len() - 1]],
+        flying_ms,
+        table_percent,
+        frames: totals.len(),
+        gmac_per_s: mac_per_s.map(|rate| rate / 1e9),
+        peak_percent: mac_per_s.map(|rate| 100.0 * rate / peak.mac_per_s),
+        bandwidth_percent: method_s.map(|s| 100.0 * pipeline.method_bytes() as f64 / s / peak.bytes_per_s),
+    })
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
+}
+
+/// Times of frames one at a time, milliseconds.
+#[derive(Default)]
+struct Alone {
+    totals: Vec<f64>,
+    stages: BTreeMap<&'static str, Vec<f64>>,
+    /// Of encoding through the table.
+    table_encode: Vec<f64>,
+}
+
+impl Alone {
+    /// Frames until `budget` is spent, five at least, after one that is not counted; each once more `by_table`, where
+    /// there is one. `name` is that of the method's stage.
+    fn measure(
+        name: &'static str,
+        pipeline: &mut GpuPipeline,
+        mut by_table: Option<&mut GpuPipeline>,
+        frame: &Frame<'_>,
+        budget: Duration,
+    ) -> Result<Self> {
+        let mut alone = Alone::default();
+        let (height, width) = pipeline.shape();
+        let mut levels = vec![0; 3 * height * width];
+        pipeline.process(frame, &mut levels)?;
+        let start = Instant::now();
+        while alone.totals.len() < 5 || start.elapsed() < budget {
+            let begin = Instant::now();
+            let report = pipeline.process(frame, &mut levels)?;
+            alone.totals.push(ms(begin.elapsed()));
+            if let Some(times) = report.times {
+                alone.note(name, &times);
+            }
+            if let Some(by_table) = &mut by_table
+                && let Some(times) = by_table.process(frame, &mut levels)?.times
+            {
+                alone.table_encode.push(ms(times.encode));
+            }
+        }
+        Ok(alone)
+    }
+
+    /// Takes a frame's times.
+    fn note(&mut self, name: &'static str, times: &StageTimes) {
+        let StageTimes {
+            input,
+            method,
+            propagate,
+            encode,
+        } = *times;
+        for (stage, time) in [
+            ("input", input),
+            (name, method),
+            ("propagate", propagate),
+            ("encode", encode),
+        ] {
+            self.stages.entry(stage).or_default().push(ms(time));
+        }
+    }
+}
+
+/// Time a frame with several in flight whose levels stay on the GPU, milliseconds.
+fn flying_ms(pipeline: &mut GpuPipeline, frame: &Frame<'_>, budget: Duration) -> Result<f64> {
+    let start = Instant::now();
+    let mut flying = VecDeque::new();
+    let mut flown = 0;
+    while flown < 5 || start.elapsed() < budget {
+        if flying.len() == FLIGHTS {
+            pipeline.finish(flying.pop_front().expect("not empty"))?;
+            flown += 1;
+        }
+        flying.push_back(pipeline.submit(frame, Deliver::Shown)?);
+    }
+    for ticket in flying {
+        pipeline.finish(ticket)?;
+        flown += 1;
+    }
+    Ok(ms(start.elapsed()) / f64::from(flown))
+}
+
+/// A frame as phones give it: luma, chroma at half the resolution, depth of 16 bits.
+struct Images {
+    width: usize,
+    luma: Vec<u8>,
+    chroma: Vec<u8>,
+    depth: Vec<u16>,
+}
+
+impl Images {
+    fn new(width: usize, height: usize) -> Self {
+        let bytes = |n: usize| (0..n).map(|i| (i * 7 % 256) as u8).collect();
+        Images {
+            width,
+            luma: bytes(height * width),
+            chroma: bytes(2 * height.div_ceil(2) * width.div_ceil(2)),
+            depth: (0..height * width).map(|i| (i / 8 * 257) as u16).collect(),
+        }
+    }
+
+    fn planes(&self) -> [Plane<'_>; 2] {
+        [
+            Plane::new(&self.luma, self.width, 1),
+            Plane::new(&self.chroma, 2 * self.width.div_ceil(2), 2),
+        ]
+    }
+}

@@ -1,0 +1,87 @@
+//! The commands of `phasefront`: one file a command, with its flags and what it does.
+
+mod bench;
+mod calibrate;
+mod compare;
+mod devices;
+mod doctor;
+mod hologram;
+mod judge;
+mod link;
+mod multiplex;
+mod networks;
+mod pack;
+mod refocus;
+mod show;
+mod video;
+mod view;
+
+use clap::{Parser, Subcommand};
+use phasefront_command::start::Common;
+use phasefront_io::Result;
+use std::num::NonZeroUsize;
+
+/// The rule for what outputs replace.
+const FILES: &str = "\
+Output files: An output file that exists is replaced, as a whole or not at all. An input is never replaced, nor a \
+folder or a special file such as a device or a pipe. A folder that a command fills with numbered files must be new \
+or empty, and what `calibrate`, `video` and `hologram` with folders made is kept, unless --overwrite is \
+given. `video --resume` and `hologram --resume` complete what an earlier run began. All this is checked before any work.";
+
+/// RGB-D images to phase-only 3D holograms: make them, look at them, show them on a modulator, calibrate it.
+#[derive(Parser)]
+#[command(name = "phasefront", version, max_term_width = 100, after_help = FILES)]
+pub(crate) struct Phasefront {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    #[command(flatten)]
+    pub(crate) common: Common,
+}
+
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    Hologram(Box<hologram::Hologram>),
+    Refocus(refocus::Refocus),
+    View(Box<view::View>),
+    Compare(compare::Compare),
+    Judge(judge::Judge),
+    Networks(networks::Networks),
+    Bench(bench::Bench),
+    Video(video::Video),
+    Multiplex(multiplex::MultiplexCommand),
+    Devices(devices::Devices),
+    Doctor(doctor::Doctor),
+    Pack(pack::Pack),
+    Unpack(pack::Unpack),
+    Show(show::Show),
+    Screens(show::Screens),
+    #[command(subcommand)]
+    Link(link::Link),
+    #[command(subcommand)]
+    Calibrate(calibrate::Calibrate),
+}
+
+impl Command {
+    pub(crate) fn run(self, common: &Common) -> Result<()> {
+        let json = common.json;
+        match self {
+            Command::Hologram(command) => command.run(json),
+            Command::Refocus(command) => command.run(json),
+            Command::View(command) => command.run(json),
+            Command::Compare(command) => command.run(json),
+            Command::Judge(command) => command.run(json),
+            Command::Networks(command) => command.run(json),
+            Command::Bench(command) => command.run(common.threads().map(NonZeroUsize::get), json),
+            Command::Video(command) => command.run(common.threads(), json),
+            Command::Multiplex(command) => command.run(json),
+            Command::Devices(command) => command.run(json),
+            Command::Doctor(command) => command.run(json),
+            Command::Pack(command) => command.run(json),
+            Command::Unpack(command) => command.run(json),
+            Command::Show(command) => command.run(json),
+            Command::Screens(command) => command.run(json),
+            Command::Link(command) => command.run(json),
+            Command::Calibrate(command) => command.run(json),
+        }
+    }
+}

@@ -1,0 +1,338 @@
+//! `phasefront bench`: how fast a frame is on this machine, stage by stage.
+
+use crate::flags::backend::BackendFlags;
+use crate::flags::encoder::{Encoder, EncoderFlags};
+use clap::{Args, ValueEnum};
+use phasefront::unstable::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
+use phasefront::unstable::network;
+use phasefront::{Method, Network, Sweep, Target};
+use phasefront_cli::bench::gpu::{GpuCase, GpuRow};
+use phasefront_cli::bench::{self, Case, Machine, Row};
+use phasefront_cli::gpu;
+use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
+use phasefront_command::networks::{self, Precision};
+use phasefront_command::terminal::{self, progress_bar};
+use phasefront_io::picture::plot::{self, Bar};
+use phasefront_io::{Error, Result, output};
+use serde_json::json;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Measure how fast a frame is, stage by stage; all combinations of what is not given
+///
+/// With a --display that has a per-pixel table, also what reading it adds to a frame.
+#[derive(Args)]
+pub(crate) struct Bench {
+    /// Layers of the network; 0 is the plane sweep. Where none of so many comes along, one with random weights in f32
+    #[arg(long, value_name = "L")]
+    layers: Option<usize>,
+    /// Its numbers
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
+    /// An ONNX file instead of the networks that come along
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["layers", "precision"])]
+    network: Option<String>,
+    /// Width and height [default: 384x384, 960x540 and 1920x1080]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(usize, usize)>,
+    /// Seconds to spend on each combination; five frames at least
+    #[arg(long, value_name = "S", default_value_t = 2.0)]
+    seconds: f64,
+    #[command(flatten)]
+    encoder: EncoderFlags,
+    /// Draw the stages' times there
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    #[command(flatten)]
+    backend: BackendFlags,
+    /// How the network is computed on the GPU, both ways if not given
+    #[arg(long, value_enum)]
+    fusion: Option<FusionName>,
+    #[command(flatten)]
+    display: DisplayFlags,
+}
+
+/// Layers of the deepest network that GPUs are measured with.
+const DEEPEST: usize = 30;
+
+/// How many layers a dispatch of the GPU computes.
+#[derive(Clone, Copy, ValueEnum)]
+enum FusionName {
+    /// One
+    Layers,
+    /// Two and the skip around them
+    Pairs,
+}
+
+impl Bench {
+    pub(crate) fn run(self, threads: Option<usize>, json: bool) -> Result<()> {
+        if let Some(path) = &self.plot {
+            output::file(path, &["svg"])?;
+        }
+        let on_gpu = self.backend.device()?.is_some();
+        check_used(&[
+            ("--fusion", self.fusion.is_some(), on_gpu, "--backend gpu"),
+            ("--plot", self.plot.is_some(), !on_gpu, "--backend cpu"),
+            (
+                "--precision",
+                self.precision.is_some(),
+                self.layers != Some(0),
+                "a network",
+            ),
+        ])?;
+        let target = self.display.read()?.target;
+        let budget = Duration::try_from_secs_f64(self.seconds)
+            .map_err(|_| Error::Input("--seconds must be a number of seconds, 0 or more".into()))?;
+        let encoder = self.encoder.read()?;
+        let device = self.backend.device()?;
+        let methods = self.methods(&target, device.is_some())?;
+        let sizes = self
+            .size
+            .map_or(vec![(384, 384), (960, 540), (1920, 1080)], |size| vec![size]);
+        match device {
+            Some(options) => self.on_gpu(&methods, &sizes, (&target, &encoder), &options, budget, json),
+            None => self.on_cpu(&methods, &sizes, (&target, &encoder), threads, budget, json),
+        }
+    }
+
+    /// What is asked for, or all that comes along.
+    fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
+        if let Some(file) = &self.network {
+            let network = networks::network(file, None)?;
+            return Ok(vec![Method::trained(network)]);
+        }
+        let mut methods: Vec<_> = (self.come_along().into_iter()).map(Method::trained).collect();
+        if self.layers.is_none_or(|layers| layers == 0) {
+            methods.push(Method::Sweep(Sweep::for_display(&target.display)));
+        }
+        // What a GPU is judged by, unless it comes along.
+        let random = match self.layers {
+            Some(layers) => Some(layers).filter(|&layers| layers > 0),
+            None => on_gpu.then_some(DEEPEST),
+        };
+        if let Some(layers) = random
+            && (self.precision).is_none_or(|p| p.precision() == Precision::Float32)
+            && methods.is_empty()
+        {
+            methods.push(Method::Network(bench::random::network(layers)?));
+        }
+        if methods.is_empty() {
+            return Err(Error::Input(
+                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do"
+                    .into(),
+            ));
+        }
+        Ok(methods)
+    }
+
+    fn on_cpu(
+        &self,
+        methods: &[Method],
+        sizes: &[(usize, usize)],
+        (target, encoder): (&Target, &Encoder),
+        threads: Option<usize>,
+        budget: Duration,
+        json: bool,
+    ) -> Result<()> {
+        let machine = Machine::this();
+        let threads = match threads {
+            Some(threads) => vec![threads],
+            None if machine.cores == 1 => vec![1],
+            None => vec![1, machine.cores],
+        };
+        let mut cases = Vec::new();
+        for method in methods {
+            for &size in sizes {
+                cases.extend(threads.iter().map(|&threads| Case {
+                    method,
+                    size,
+                    threads,
+                    encoder: &encoder.options,
+                }));
+            }
+        }
+        let bar = progress_bar(cases.len() as u64, "combinations");
+        let mut rows = Vec::new();
+        for case in &cases {
+            rows.push(bench::measure(case, target, budget)?);
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        if let Some(path) = &self.plot {
+            plot::write_bars(path, &title(&machine, &encoder.describe(), &rows[0]), &bars(&rows))?;
+        }
+        terminal::print(
+            json,
+            &json!({"machine": machine, "encoder": encoder.describe(), "rows": rows}),
+            as_table(&machine, &encoder.describe(), &rows),
+        );
+        Ok(())
+    }
+
+    /// The networks that come along, of the layers and numbers that are asked for.
+    fn come_along(&self) -> Vec<Arc<Network>> {
+        let precisions = [Precision::Float32, Precision::Int8];
+        let wanted = |precision: &Precision| (self.precision).is_none_or(|asked| asked.precision() == *precision);
+        let networks = phasefront_models::NETWORKS.iter().flat_map(|model| {
+            let precisions = precisions.iter().filter(|p| wanted(p));
+            precisions.filter_map(|precision| model.network(*precision))
+        });
+        let deep = |network: &Arc<Network>| self.layers.is_none_or(|n| n == network.layers());
+        networks.filter(deep).collect()
+    }
+
+    /// The same on a GPU, each network in the numbers that it has: f32 networks in f16 too.
+    fn on_gpu(
+        &self,
+        methods: &[Method],
+        sizes: &[(usize, usize)],
+        (target, encoder): (&Target, &Encoder),
+        options: &DeviceOptions,
+        budget: Duration,
+        json: bool,
+    ) -> Result<()> {
+        let device = Arc::new(Device::open(options)?);
+        let fusions = match self.fusion {
+            Some(FusionName::Layers) => vec![Fusion::Layers],
+            Some(FusionName::Pairs) => vec![Fusion::Pairs],
+            None => vec![Fusion::Layers, Fusion::Pairs],
+        };
+        let mut rows = Vec::new();
+        for method in methods {
+            let network = match method {
+                Method::Network(network) | Method::Seeded(network) => Some(network),
+                _ => None,
+            };
+            let floats = match network.map(|network| network.precision()) {
+                Some(network::Precision::F32) if device.has_half() => vec![Float::F16, Float::F32],
+                _ => vec![Float::F32],
+            };
+            // A sweep by itself has no layers.
+            let fusions = match network {
+                Some(_) => &fusions[..],
+                None => &[Fusion::Layers],
+            };
+            for &size in sizes {
+                for &float in &floats {
+                    for &fusion in fusions {
+                        let case = GpuCase {
+                            method,
+                            size,
+                            encoder: &encoder.options,
+                            chain: ChainOptions { float, fusion },
+                        };
+                        rows.push(bench::gpu::measure(&case, &device, target, budget)?);
+                    }
+                }
+            }
+        }
+        gpu::keep_programs(&device);
+        terminal::print(
+            json,
+            &json!({"machine": device.name(), "encoder": encoder.describe(), "rows": rows}),
+            as_gpu_table(&device, &encoder.describe(), &rows),
+        );
+        Ok(())
+    }
+}
+
+fn as_gpu_table(device: &Device, encoder: &str, rows: &[GpuRow]) -> String {
+    let mut text = format!("{}; {encoder}\n\n", device.name());
+    text += "| method | layers | numbers | kernels | size | input ms | method ms | propagate ms | encode ms | frame ms (least–most) | in flight ms | GMAC/s | % of peak | % of bandwidth | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    for row in rows {
+        let stage = |name| row.stage_ms.get(name).copied().unwrap_or(f64::NAN);
+        text += &format!(
+            "\n| {} | {} | {} | {} | {}×{} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} ({:.2}–{:.2}) | {:.2} | {} | {} | {} | {} |",
+            row.method,
+            row.layers,
+            row.precision,
+            row.kernels,
+            row.width,
+            row.height,
+            stage("input"),
+            stage(row.method),
+            stage("propagate"),
+            stage("encode"),
+            row.total_ms,
+            row.spread_ms[0],
+            row.spread_ms[1],
+            row.flying_ms,
+            whole(row.gmac_per_s),
+            whole(row.peak_percent),
+            whole(row.bandwidth_percent),
+            tenths(row.table_percent),
+        );
+    }
+    text
+}
+
+fn as_table(machine: &Machine, encoder: &str, rows: &[Row]) -> String {
+    let mut text = format!("{}, {} cores; {encoder}\n\n", machine.cpu, machine.cores);
+    text += "| method | layers | precision | kernels | size | threads | method ms | propagate ms | encode ms | frame ms (least–most) | GMAC/s | % of peak | memory MB | table % |\n";
+    text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|";
+    for row in rows {
+        let stage = |name| row.stage_ms.get(name).copied().unwrap_or(0.0);
+        text += &format!(
+            "\n| {} | {} | {} | {} | {}×{} | {} | {:.1} | {:.1} | {:.1} | {:.1} ({:.1}–{:.1}) | {} | {} | {} | {} |",
+            row.method,
+            row.layers,
+            row.precision,
+            row.kernels,
+            row.width,
+            row.height,
+            row.threads,
+            stage(row.method),
+            stage("propagate"),
+            stage("encode"),
+            row.total_ms,
+            row.spread_ms[0],
+            row.spread_ms[1],
+            whole(row.gmac_per_s),
+            whole(row.peak_percent),
+            whole(row.peak_memory_mb),
+            tenths(row.table_percent),
+        );
+    }
+    text
+}
+
+fn tenths(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value:.1}"))
+}
+
+fn title(machine: &Machine, encoder: &str, row: &Row) -> String {
+    format!(
+        "{}, {} cores: ms a frame, offset {} mm, {encoder}",
+        machine.cpu, machine.cores, row.offset_mm
+    )
+}
+
+fn bars(rows: &[Row]) -> Vec<Bar> {
+    let bar = |row: &Row| Bar {
+        label: format!(
+            "{} {}×{}, {} thr.",
+            match row.layers {
+                0 => row.method.to_owned(),
+                layers => format!("{layers} layers {}", row.precision),
+            },
+            row.width,
+            row.height,
+            row.threads
+        ),
+        // Bars of one picture name their parts alike, whatever makes the hologram.
+        parts: [
+            ("hologram", row.method),
+            ("propagate", "propagate"),
+            ("encode", "encode"),
+        ]
+        .map(|(part, stage)| (part, row.stage_ms.get(stage).copied().unwrap_or(0.0)))
+        .to_vec(),
+    };
+    rows.iter().map(bar).collect()
+}
+
+fn whole(value: Option<f64>) -> String {
+    value.map_or("–".into(), |value| format!("{value:.0}"))
+}

@@ -1,0 +1,334 @@
+//! `phasefront judge`: methods and encoders side by side, on one's own image and display.
+
+use crate::flags::encoder::EncoderFlags;
+use crate::flags::frame::FrameFlags;
+use crate::flags::method::CoreMethod;
+use crate::make::{HologramRequest, HologramResult, Image, Method, infos};
+use clap::Args;
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::EncoderOptions;
+use phasefront::unstable::depth::sharpness;
+use phasefront_cli::viewer::{self, Depth, Scene};
+use phasefront_command::flags::{DisplayFlags, EncoderName};
+use phasefront_command::networks;
+use phasefront_command::terminal::{self, progress_bar};
+use phasefront_exact::truth::{self, Figures};
+use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::Hologram;
+use phasefront_io::ldi::Ldi;
+use phasefront_io::{Error, Result, output};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// Judge methods and encoders on an image and a display: what is shown, and what it takes
+///
+/// With a layered depth image the truth is its exact wave. With an RGB-D image there is none: where depth is sharp, the
+/// exact wave of what is visible and of the hidden surfaces that the sweep finds takes its place, else the largest
+/// network's. The answer says which.
+#[derive(Args)]
+pub(crate) struct Judge {
+    #[command(flatten)]
+    frame: FrameFlags,
+    /// Folder of a layered depth image
+    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
+    ldi: Option<PathBuf>,
+    /// Methods [default: sweep and, where one was trained for the display, network]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    method: Vec<CoreMethod>,
+    /// Encoders, each as published, corrected as is usual, and corrected for a still
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"])]
+    encoder: Vec<EncoderName>,
+    /// Planes of the exact wave
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u16).range(1..))]
+    planes: u16,
+    /// Pixels at the border that do not count: into an image at an offset light comes from outside
+    #[arg(long, value_name = "PX", default_value_t = 0)]
+    margin: usize,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// A page to look at them all in
+    #[arg(short, value_name = "OUT.html")]
+    output: Option<PathBuf>,
+}
+
+/// Views of a page.
+const PAGE_VIEWS: usize = 9;
+/// Bytes of all views of a page.
+const PAGE_BYTES: usize = 4_000_000;
+/// What corrects a still.
+const STILL_STEPS: usize = 3;
+
+/// One way to a hologram.
+struct Way {
+    method: CoreMethod,
+    encoder: EncoderFlags,
+    /// Of the pairs, whose encoder is their own.
+    network: Option<&'static str>,
+}
+
+/// A way, judged.
+struct Row {
+    method: &'static str,
+    encoder: String,
+    figures: Figures,
+    wave: Duration,
+    encode: Duration,
+    made: HologramResult,
+}
+
+impl Judge {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        if let Some(path) = &self.output {
+            output::file(path, &["html"])?;
+        }
+        let file = self.display.read()?;
+        let display = &file.target.display;
+        let layers = self.ldi.as_deref().map(Ldi::read).transpose()?;
+        let frame = match &layers {
+            Some(ldi) => truth::visible_frame(ldi, display)?,
+            None => self.frame.read(display, self.display.is_given())?,
+        };
+        let (height, width) = frame.shape();
+        if 2 * self.margin >= height.min(width) {
+            return Err(Error::Input(format!(
+                "--margin {} leaves nothing of {width}×{height} pixels",
+                self.margin
+            )));
+        }
+        let sharp = sharpness::measure(&frame).is_sharp();
+        let image = Image::Rgbd(frame);
+        let mut request = HologramRequest::of(self.display.clone());
+        let (truth, what) = self.truth(&file, &image, layers.as_ref(), sharp, &mut request)?;
+        let z_m = truth::judged_z_m(display);
+        let wanted = truth.views_on(&file, &z_m)?;
+        let ways = self.ways(display);
+        let bar = progress_bar(ways.len() as u64, "ways");
+        let mut rows = Vec::new();
+        for way in ways {
+            request.set_method(Method::Core(way.method), way.network.map(str::to_owned), way.encoder);
+            let made = request.make(&file, &image)?;
+            let (info, _) = infos(&file, &made);
+            let shown = made.hologram(info).views_on(&file, &z_m)?;
+            let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
+            rows.push(Row {
+                method: if way.network.is_some() {
+                    "pair"
+                } else {
+                    way.method.name()
+                },
+                encoder: made.encoder.describe(),
+                figures: truth::judge(&shown, &wanted, self.margin)?,
+                wave: times[..times.len() - 1].iter().sum(),
+                encode: times[times.len() - 1],
+                made,
+            });
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        if let Some(path) = &self.output {
+            write_page(path, &file, &truth, &what, &image, &rows)?;
+        }
+        let value = json!({
+            "truth": what, "width": width, "height": height, "output": self.output.as_ref().map(|path| path.display().to_string()),
+            "rows": rows.iter().map(Row::json).collect::<Vec<_>>(),
+        });
+        terminal::print(json, &value, table(&rows, &what));
+        Ok(())
+    }
+
+    /// What ways are judged by: a field at the modulator, and what it is.
+    fn truth(
+        &self,
+        file: &DisplayFile,
+        image: &Image,
+        layers: Option<&Ldi>,
+        sharp: bool,
+        request: &mut HologramRequest,
+    ) -> Result<(Hologram, String)> {
+        let display = &file.target.display;
+        let best = "15";
+        let trained = networks::network(best, Some(networks::Precision::Float32))?
+            .check_display(display)
+            .is_ok();
+        request.keeps_field = true;
+        let (made, what) = match (layers, image) {
+            (Some(ldi), _) => {
+                let what = format!("the exact wave of its {} layers: the truth", ldi.layers.len());
+                (self.exact(request, file, ldi)?, what)
+            }
+            (None, Image::Rgbd(frame)) if sharp || !trained => {
+                let filled = truth::filled(frame, display)?;
+                let what = "the exact wave of what is visible and of hidden surfaces as the sweep finds them, for there is no truth";
+                (self.exact(request, file, &filled)?, what.to_owned())
+            }
+            _ => {
+                request.set_method(
+                    Method::Core(CoreMethod::Network),
+                    Some(best.into()),
+                    EncoderFlags::default(),
+                );
+                request.in_float32();
+                let made = request.make(file, image)?;
+                let what = "the wave of the network of 15 layers, for depth is ragged and there is no truth";
+                (made, what.to_owned())
+            }
+        };
+        request.keeps_field = false;
+        let (_, info) = infos(file, &made);
+        let field: Array3<Complex32> = made.field.expect("kept for this");
+        Ok((Hologram::Complex(field, info), what))
+    }
+
+    fn exact(&self, request: &mut HologramRequest, file: &DisplayFile, ldi: &Ldi) -> Result<HologramResult> {
+        request.set_method(Method::Layers, None, EncoderFlags::default());
+        request.with_planes(self.planes.into());
+        request.make(file, &Image::Layers(ldi.clone()))
+    }
+
+    fn ways(&self, display: &phasefront::Display) -> Vec<Way> {
+        let trained = phasefront_models::default_network(display).is_some();
+        let usual = match trained {
+            true => vec![CoreMethod::Sweep, CoreMethod::Network],
+            false => vec![CoreMethod::Sweep],
+        };
+        let methods = if self.method.is_empty() {
+            usual
+        } else {
+            self.method.clone()
+        };
+        let mut ways = Vec::new();
+        for &method in &methods {
+            for &encoder in &self.encoder {
+                let steps = EncoderOptions::default().local_steps;
+                let corrections = [
+                    (0.0, 0, 0),
+                    (EncoderOptions::DARK_THRESHOLD, steps, 0),
+                    (EncoderOptions::DARK_THRESHOLD, steps, STILL_STEPS),
+                ];
+                ways.extend(corrections.map(|(dark, local, midpoint)| Way {
+                    method,
+                    encoder: EncoderFlags::of(encoder, dark, local, midpoint),
+                    network: None,
+                }));
+            }
+        }
+        let pair = phasefront_models::pair_for(display, networks::Precision::Int8).is_some();
+        if pair && methods.contains(&CoreMethod::Network) {
+            ways.push(Way {
+                method: CoreMethod::Network,
+                encoder: EncoderFlags::default(),
+                network: Some(networks::DEEP),
+            });
+        }
+        ways
+    }
+}
+
+impl Row {
+    fn name(&self) -> String {
+        format!("{}, {}", self.method, self.encoder)
+    }
+
+    fn json(&self) -> serde_json::Value {
+        let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        json!({
+            "method": self.method, "encoder": self.encoder, "psnr_db": self.figures.amplitude_psnr,
+            "ssim": self.figures.amplitude_ssim, "stack_psnr_db": self.figures.focal_psnr,
+            "stack_ssim": self.figures.focal_ssim, "brightness": self.figures.brightness,
+            "wave_ms": ms(self.wave), "encode_ms": ms(self.encode),
+        })
+    }
+}
+
+fn table(rows: &[Row], what: &str) -> String {
+    let wide = rows
+        .iter()
+        .map(|row| row.encoder.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(7);
+    let mut text = format!(
+        "{:8}  {:wide$}  PSNR dB   SSIM  stack PSNR dB  stack SSIM  brightness  wave ms  encode ms",
+        "method", "encoder"
+    );
+    for row in rows {
+        let Figures {
+            amplitude_psnr,
+            amplitude_ssim,
+            focal_psnr,
+            focal_ssim,
+            brightness,
+            ..
+        } = row.figures;
+        text += &format!(
+            "\n{:8}  {:wide$}  {amplitude_psnr:7.2}  {amplitude_ssim:5.3}  {focal_psnr:13.2}  {focal_ssim:10.3}  {brightness:10.3}  {:7.1}  {:9.1}",
+            row.method,
+            row.encoder,
+            1e3 * row.wave.as_secs_f64(),
+            1e3 * row.encode.as_secs_f64(),
+        );
+    }
+    text + &format!("\nJudged by {what}. Times are of one run, after no warm-up.")
+}
+
+/// A page with what each way shows, and what it is judged by.
+fn write_page(
+    path: &std::path::Path,
+    file: &DisplayFile,
+    truth: &Hologram,
+    what: &str,
+    image: &Image,
+    rows: &[Row],
+) -> Result<()> {
+    let last = (PAGE_VIEWS - 1) as f64;
+    let z_m: Vec<f64> = (0..PAGE_VIEWS)
+        .map(|i| file.target.display.z_of_depth(i as f64 / last))
+        .collect();
+    let budget = PAGE_BYTES / (rows.len() + 1);
+    let Image::Rgbd(frame) = image else {
+        return Err(Error::Input("a page needs an RGB-D image".into()));
+    };
+    let depth = Depth::known(&frame.depth().to_owned(), |d| (f64::from(d) * last).round() as u8);
+    let scene = |title: String, hologram: &Hologram, figures: Vec<(String, String)>| -> Result<Scene> {
+        let (height, width) = hologram.shape();
+        let views = hologram.views_on(file, &z_m)?;
+        let views: Vec<_> = (views.iter()).map(|view| viewer::picture(view.view())).collect();
+        Ok(Scene {
+            title,
+            width,
+            height,
+            z_mm: z_m.iter().map(|z| z * 1e3).collect(),
+            frames: 1,
+            shown: viewer::pack(&views, budget)?,
+            field: Vec::new(),
+            phase: None,
+            depth: depth.clone(),
+            figures,
+        })
+    };
+    let mut scenes = vec![scene(format!("Judged by {what}"), truth, Vec::new())?];
+    for row in rows {
+        let Figures {
+            amplitude_psnr,
+            amplitude_ssim,
+            brightness,
+            ..
+        } = row.figures;
+        let figures = vec![
+            (
+                "At the middle".into(),
+                format!("{amplitude_psnr:.2} dB, SSIM {amplitude_ssim:.3}"),
+            ),
+            (
+                "Over depths".into(),
+                format!("{:.2} dB, SSIM {:.3}", row.figures.focal_psnr, row.figures.focal_ssim),
+            ),
+            ("Brightness".into(), format!("{brightness:.3} of what it is judged by")),
+        ];
+        let (info, _) = infos(file, &row.made);
+        scenes.push(scene(row.name(), &row.made.hologram(info), figures)?);
+    }
+    viewer::write(path, &scenes).map(|_| ())
+}

@@ -1,0 +1,86 @@
+//! `phasefront link`: whether pixels reach the modulator as they are.
+
+use clap::{Args, Subcommand};
+use phasefront_cli::link;
+use phasefront_command::flags::parse_size;
+use phasefront_command::terminal;
+use phasefront_io::hologram::packed;
+use phasefront_io::{Error, Result, output};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Find out whether the cable sends limited range, YCbCr or scaled pixels, all of which ruin phase
+#[derive(Subcommand)]
+pub(crate) enum Link {
+    Pattern(Pattern),
+    Read(Read),
+}
+
+/// Write the pattern to show
+#[derive(Args)]
+pub(crate) struct Pattern {
+    /// Size of the screen
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
+    size: (usize, usize),
+    /// The pattern
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+/// Read a capture of the pattern: as a frame grabber in the modulator's place saves it, or a screenshot
+#[derive(Args)]
+pub(crate) struct Read {
+    /// The captured image, PNG or BMP
+    capture: PathBuf,
+    /// Size of the pattern that was shown
+    #[arg(long, value_name = "WxH", value_parser = parse_size, default_value = "1920x1080")]
+    size: (usize, usize),
+}
+
+impl Link {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        match self {
+            Link::Pattern(command) => command.run(json),
+            Link::Read(command) => command.run(json),
+        }
+    }
+}
+
+fn checked((width, height): (usize, usize)) -> Result<(usize, usize)> {
+    match width >= 512 && height >= 24 {
+        true => Ok((height, width)),
+        false => Err(Error::Input(format!(
+            "a pattern of {width}×{height}; its 256 steps and six bands need at least 512×24"
+        ))),
+    }
+}
+
+impl Pattern {
+    fn run(self, json: bool) -> Result<()> {
+        output::file(&self.output, &["png"])?;
+        let (height, width) = checked(self.size)?;
+        link::pattern((height, width)).write(&self.output)?;
+        let text = format!("{}: {width}×{height}", terminal::name(&self.output));
+        terminal::print(
+            json,
+            &json!({ "output": self.output, "width": width, "height": height }),
+            text,
+        );
+        Ok(())
+    }
+}
+
+impl Read {
+    fn run(self, json: bool) -> Result<()> {
+        let capture = packed::Image::read(&self.capture)?;
+        let (height, width) = capture.shape;
+        checked((width, height)).map_err(|e| Error::file(&self.capture, e))?;
+        let reading = link::read(&capture, checked(self.size)?);
+        let text = match reading.faults.is_empty() {
+            true => "every pixel arrives as it is".into(),
+            false => reading.faults.join("\n"),
+        };
+        terminal::print(json, &json!(reading), text);
+        Ok(())
+    }
+}

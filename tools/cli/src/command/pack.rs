@@ -1,0 +1,139 @@
+//! `phasefront pack` and `phasefront unpack`: holograms to what a modulator's input takes, and back.
+
+use clap::Args;
+use phasefront::device::Packing;
+use phasefront_command::flags::{DisplayFlags, parse_size};
+use phasefront_command::terminal;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::{self, Hologram, HologramInfo, packed};
+use phasefront_io::{Error, Result, output};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Put a hologram into the frame that a modulator's input takes
+#[derive(Args)]
+pub(crate) struct Pack {
+    /// A hologram PNG; several for one frame of bit planes, shown one after another
+    #[arg(required = true)]
+    holograms: Vec<PathBuf>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Of several holograms the colour that is shown; not for one laser
+    #[arg(long, value_parser = packed::COLOURS)]
+    colour: Option<String>,
+    /// The frame: one PNG, or FRAME-red.png, FRAME-green.png and FRAME-blue.png
+    #[arg(short, value_name = "FRAME.png")]
+    output: PathBuf,
+}
+
+impl Pack {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let display = self.display.read()?;
+        packed::declare(&self.output, &display)?;
+        let images = match (&self.holograms[..], &self.colour) {
+            ([hologram], None) => {
+                packed::pack(&hologram::read_hologram(hologram)?, &display).map_err(|e| Error::file(hologram, e))?
+            }
+            (_, Some(colour)) => {
+                let colour = packed::colour(colour, display.device.display.colours())?;
+                vec![self.planes(&display, colour)?]
+            }
+            (_, None) if display.device.display.colours() == 1 => vec![self.planes(&display, 0)?],
+            (_, None) => {
+                return Err(Error::Input(
+                    "several holograms in one frame need --colour, which of theirs is shown".into(),
+                ));
+            }
+        };
+        let written = packed::write(&self.output, &images)?;
+        let names: Vec<_> = written.iter().map(|path| path.display().to_string()).collect();
+        let (height, width) = images[0].shape;
+        let text: Vec<_> = written.iter().map(|path| terminal::name(path)).collect();
+        let text = format!("{}: {width}×{height}", text.join(", "));
+        terminal::print(
+            json,
+            &json!({ "output": names, "width": width, "height": height }),
+            text,
+        );
+        Ok(())
+    }
+
+    /// One colour of all holograms, one after another in the planes of a frame.
+    fn planes(&self, display: &DisplayFile, colour: usize) -> Result<packed::Image> {
+        let Packing::BitPlanes(cells) = &display.device.packing else {
+            return Err(Error::Input(
+                "several holograms in one frame are for modulators whose frames are bit planes; this one's are not"
+                    .into(),
+            ));
+        };
+        let mut maps = Vec::new();
+        for path in &self.holograms {
+            let hologram = hologram::read_hologram(path)?;
+            hologram.check_display(&display).map_err(|e| Error::file(path, e))?;
+            let Hologram::PhaseOnly(levels, _) = hologram else {
+                return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
+            };
+            maps.push(levels.index_axis(ndarray::Axis(0), colour).to_owned());
+        }
+        let plan = packed::bit_planes(display, maps[0].dim(), cells)?;
+        if let Some((path, map)) = (self.holograms.iter().zip(&maps)).find(|(_, map)| map.dim() != maps[0].dim()) {
+            let (height, width) = map.dim();
+            return Err(Error::file(
+                path,
+                format!("is {width}×{height}; the first has another size"),
+            ));
+        }
+        let maps: Vec<&[u8]> = maps
+            .iter()
+            .map(|map| map.as_slice().expect("standard layout"))
+            .collect();
+        packed::pack_maps(&plan, &maps)
+    }
+}
+
+/// Read the levels back from the frame that a modulator's input takes: the inverse of `pack`
+#[derive(Args)]
+pub(crate) struct Unpack {
+    /// The frame: one PNG or BMP, or one each of red, green and blue
+    #[arg(required = true, num_args = 1..=3)]
+    frames: Vec<PathBuf>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Size of the hologram in the modulator's middle [default: the modulator's]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(usize, usize)>,
+    /// The hologram: a PNG of modulator levels
+    #[arg(short, value_name = "OUT.png")]
+    output: PathBuf,
+}
+
+impl Unpack {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        output::file(&self.output, &["png"])?;
+        let display = self.display.read()?;
+        let modulator = &display.target.display;
+        let (width, height) = self.size.unwrap_or((modulator.width(), modulator.height()));
+        let images = self.frames.iter().map(|path| packed::Image::read(path));
+        let levels = packed::unpack(&images.collect::<Result<Vec<_>>>()?, &display, (height, width))?;
+        let info = HologramInfo {
+            display: modulator.clone(),
+            encoder: None,
+            scale: None,
+            lut: display.lut.map(Vec::from),
+            levels_turns: display.target.panel.levels_turns.clone(),
+            calibrated: display.calibrated(true),
+        };
+        let levels = match modulator.bits() {
+            0..=8 => hologram::Levels::Bytes(levels.mapv(|level| level as u8)),
+            _ => hologram::Levels::Words(levels),
+        };
+        hologram::write_hologram(&self.output, &levels.hologram(info))?;
+        let text = format!("{}: {width}×{height}", terminal::name(&self.output));
+        terminal::print(
+            json,
+            &json!({ "output": self.output, "width": width, "height": height }),
+            text,
+        );
+        Ok(())
+    }
+}

@@ -1,0 +1,481 @@
+//! `phasefront video`: RGB-D frames to phase maps and previews, one after another or as a live stream.
+
+mod sink;
+mod source;
+
+use crate::flags::backend::BackendFlags;
+use crate::flags::depth::DepthFlags;
+use crate::flags::encoder::EncoderFlags;
+use crate::flags::frame::{SeenDepthFlags, warn_of_size};
+use crate::flags::method::{CoreMethod, Parts};
+use crate::record::{Before, RunRecord};
+use clap::{Args, ValueEnum};
+use phasefront::input::DepthRange;
+use phasefront::session::{Backend, Event, Quality, SessionHandle, Statistics};
+use phasefront::target::Panel;
+use phasefront::{Brightness, Hologram, LiveSession, SessionOptions, Sweep, Target, VideoSession};
+use phasefront_cli::gpu;
+use phasefront_command::flags::{DisplayFlags, PrecisionName, parse_size};
+use phasefront_command::terminal;
+use phasefront_io::hologram::HologramInfo;
+use phasefront_io::{Error, Result, film};
+use serde_json::json;
+use sink::Sink;
+use source::Source;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, mpsc};
+use std::time::{Duration, Instant};
+
+/// Make phase maps and previews of RGB-D video
+#[derive(Args)]
+pub(crate) struct Video {
+    /// Folder of color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …, of folders rgb and depth with equal names,
+    /// or as TUM's and Redwood's data sets are laid; a film (.mp4, by ffmpeg); or - for raw frames on stdin. All frames
+    /// have one size
+    input: PathBuf,
+    /// Names of a folder's colour and depth files, whose * stand for the same: 'left_*.png,left_*_z.png'
+    #[arg(long, value_name = "COLOUR,DEPTH")]
+    pairs: Option<String>,
+    /// Depth of a film: another film, in grey
+    #[arg(long, value_name = "FILE")]
+    depth_video: Option<PathBuf>,
+    /// Depth of a film: the right half of its pictures, in grey
+    #[arg(long, conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
+    depth_beside: bool,
+    #[command(flatten)]
+    seen: SeenDepthFlags,
+    /// Raw frames on stdin: size of their colour, rows of RGB bytes
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    raw: Option<(usize, usize)>,
+    /// Raw frames on stdin: size of their depth, rows of 16-bit little-endian numbers [default: the colour's]
+    #[arg(long, value_name = "WxH", value_parser = parse_size, requires = "raw")]
+    raw_depth: Option<(usize, usize)>,
+    #[command(flatten)]
+    depth: DepthFlags,
+    /// How the holograms are made
+    #[arg(long, value_enum, default_value_t = CoreMethod::Network)]
+    method: CoreMethod,
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
+    #[arg(long, value_name = "NAME|FILE")]
+    network: Option<String>,
+    /// Numbers that a bundled network computes in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
+    #[command(flatten)]
+    encoder: EncoderFlags,
+    /// Size of the holograms [default: the first frame's colour]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(usize, usize)>,
+    #[command(flatten)]
+    display: DisplayFlags,
+    #[command(flatten)]
+    backend: BackendFlags,
+    /// Which amplitude full light stands for
+    #[arg(long, value_enum, default_value_t = BrightnessName::Smoothed)]
+    brightness: BrightnessName,
+    /// Frames a second of the input [default: a film's own; else 30]
+    #[arg(long, value_name = "N")]
+    rate: Option<f64>,
+    /// Submit frames at that rate and drop those for which there is no time
+    #[arg(long)]
+    live: bool,
+    /// Let a live stream step down to half and a quarter of the resolution where it cannot hold the rate
+    #[arg(long, requires = "live")]
+    adaptive: bool,
+    /// Show the frames of a folder so many times
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    repeat: u32,
+    /// Write a preview of each hologram too, focused at this z
+    #[arg(long, value_name = "MM", allow_negative_numbers = true, requires = "output")]
+    preview_mm: Option<f64>,
+    /// Go on where an earlier run with the same flags and input was left
+    #[arg(long, requires = "output", conflicts_with_all = ["live", "overwrite"])]
+    resume: bool,
+    /// Replace what an earlier run made
+    #[arg(long, requires = "output")]
+    overwrite: bool,
+    /// Folder of what comes out: phase_000000.png …, preview_000000.png …, request.json, statistics.json; for NAME.mp4
+    /// the folder NAME, with a film of the previews and NAME-phases.mp4, without loss, beside it. It is needed but for
+    /// --live and --json, which report without it
+    #[arg(short, value_name = "DIR|NAME.mp4")]
+    output: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum BrightnessName {
+    /// What all but one pixel of a thousand stay under, smoothed over time
+    Smoothed,
+    /// Each frame's largest
+    Max,
+}
+
+/// Warms a session up whose options asked for the backend `asked`. Warns where the GPU was asked for and does not
+/// serve; where it does, keeps what was compiled for it.
+fn warm_up(session: &SessionHandle, asked: Backend) -> Result<()> {
+    session.warm_up()?;
+    match session.gpu() {
+        Some(device) => gpu::keep_programs(&device),
+        None if asked == Backend::Gpu => {
+            log::warn!("on the CPU: {}", session.statistics().backend.why);
+        }
+        None => {}
+    }
+    Ok(())
+}
+
+impl Video {
+    pub(crate) fn run(self, threads: Option<NonZeroUsize>, json: bool) -> Result<()> {
+        if self.output.is_none() && !self.live && !json {
+            return Err(Error::Input(
+                "no output is asked for: -o DIR writes the holograms; --json alone reports how long they took".into(),
+            ));
+        }
+        let rate = self.rate_hz()?;
+        let before = Before::of_flags(self.resume, self.overwrite);
+        let (mut source, (height, width)) = Source::open(&self)?;
+        let (options, info) = self.options(height, width, threads, rate)?;
+        let preview_mm = self.preview_mm();
+        let record = self.record(&info.display, rate)?;
+        let mut sink = Sink::new(
+            self.output.as_deref(),
+            preview_mm.map(|mm| mm / 1e3),
+            info,
+            before,
+            record,
+        )?;
+        let bar = source.progress();
+        let start = Instant::now();
+        let memory = memory_mb();
+        let statistics = match self.live {
+            true => self.live(options, &mut source, &mut sink, &bar, rate)?,
+            false => self.one_by_one(options, &mut source, &mut sink, &bar, rate)?,
+        };
+        let seconds = start.elapsed().as_secs_f64();
+        bar.finish_and_clear();
+        sink.finish(rate)?;
+        self.report(json, &statistics, seconds, &sink, [memory, memory_mb()])
+    }
+
+    /// z of the previews; a film is made of them.
+    fn preview_mm(&self) -> Option<f64> {
+        let film = self.output.as_deref().filter(|path| film::is_film(path));
+        self.preview_mm.or(film.map(|_| 0.0))
+    }
+
+    /// All flags that decide what is written, but for what frames are of: each is recognised by itself.
+    fn record(&self, display: &phasefront::Display, rate: f64) -> Result<RunRecord> {
+        let Video {
+            input: _,
+            pairs: _,
+            depth_video: _,
+            depth_beside: _,
+            seen,
+            raw: _,
+            raw_depth: _,
+            depth,
+            method,
+            network,
+            precision,
+            encoder,
+            size: _, // It is the display's.
+            display: flags,
+            backend,
+            brightness,
+            rate: _,
+            live,
+            adaptive,
+            repeat: _,
+            preview_mm: _,
+            resume: _,
+            overwrite: _,
+            output: _,
+        } = self;
+        let mut record = RunRecord::new("video");
+        seen.record(&mut record)?;
+        depth.record(&mut record);
+        record.choice("--method", Some(method));
+        record.name_or_file("--network", network.as_deref())?;
+        record.choice("--precision", Some(&precision.unwrap_or_default()));
+        encoder.record(&mut record)?;
+        record.display(flags.name(), display)?;
+        backend.record(&mut record);
+        record.choice("--brightness", Some(brightness));
+        record.set("--rate", Some(rate));
+        record.switch("--live", *live);
+        record.switch("--adaptive", *adaptive);
+        record.set("--preview-mm", self.preview_mm());
+        Ok(record)
+    }
+
+    /// Frames a second of the input.
+    fn rate_hz(&self) -> Result<f64> {
+        let films = || film::is_film(&self.input).then(|| film::about(&self.input)).flatten();
+        let rate = self.rate.or_else(|| Some(films()?.rate_hz)).unwrap_or(30.0);
+        match rate.is_finite() && rate > 0.0 && rate <= 1000.0 {
+            true => Ok(rate),
+            false => Err(Error::Input(format!(
+                "--rate {rate}: it must lie above 0 and up to 1000"
+            ))),
+        }
+    }
+
+    fn options(
+        &self,
+        height: usize,
+        width: usize,
+        threads: Option<NonZeroUsize>,
+        rate: f64,
+    ) -> Result<(SessionOptions, HologramInfo)> {
+        let file = self.display.read()?;
+        let modulator = &file.target.display;
+        if self.size.is_none() {
+            let size = format!("--size {}x{}", modulator.width(), modulator.height());
+            warn_of_size((height, width), modulator, self.display.is_given(), &size);
+        }
+        let (width, height) = self.size.unwrap_or((width, height));
+        if let Some(light) = &file.target.illumination
+            && (height, width) != (modulator.height(), modulator.width())
+        {
+            let (rows, columns) = light.nodes();
+            return Err(Error::Input(format!(
+                "the display's laser map ({columns}×{rows} nodes) is for {}×{} pixels, the frames are {width}×{height}; give --size or leave the map out",
+                modulator.width(),
+                modulator.height()
+            )));
+        }
+        let target = file.corrected()?;
+        let target = Target {
+            display: target.display.with_size(height, width)?,
+            response: target.response.centred(height, width)?,
+            panel: Panel {
+                flatness: (target.panel.flatness.as_ref())
+                    .map(|map| map.centred(height, width))
+                    .transpose()?,
+                ..target.panel
+            },
+            ..target
+        };
+        let display = target.display.clone();
+        let (method, encoder) = self.method.of(&Parts {
+            network: self.network.as_deref(),
+            precision: self.precision,
+            display: &display,
+            sweep: Sweep::for_display(&display),
+            encoder: &self.encoder,
+        })?;
+        let mut options = SessionOptions::new(target, method);
+        options.encoder = encoder.options;
+        options.encoder.brightness = match self.brightness {
+            BrightnessName::Smoothed => Brightness::Smoothed,
+            BrightnessName::Max => Brightness::FrameMax,
+        };
+        options.depth.range = match self.depth.range()? {
+            None => DepthRange::Percentiles,
+            Some((near_m, far_m)) => DepthRange::Fixed { near_m, far_m },
+        };
+        if let Some(device) = self.backend.device()? {
+            options.backend = Backend::Gpu;
+            options.gpu.device = device;
+        }
+        options.threads = threads;
+        options.quality = Quality::Fixed(0);
+        if self.adaptive {
+            options.quality = Quality::Adaptive;
+            options.target_rate_hz = Some(rate);
+            for part in [2, 4] {
+                let mut quality_level = options.quality_levels[0].clone();
+                quality_level.height = (height / part).max(1);
+                quality_level.width = (width / part).max(1);
+                options.quality_levels.push(quality_level);
+            }
+        }
+        let info = HologramInfo {
+            display,
+            encoder: Some(encoder.name.into()),
+            scale: None,
+            lut: file.lut.map(Vec::from),
+            levels_turns: file.target.panel.levels_turns.clone(),
+            calibrated: file.calibrated(true),
+        };
+        Ok((options, info))
+    }
+
+    /// Every frame answered.
+    fn one_by_one(
+        &self,
+        options: SessionOptions,
+        source: &mut Source,
+        sink: &mut Sink,
+        bar: &indicatif::ProgressBar,
+        rate: f64,
+    ) -> Result<Statistics> {
+        let midpoint_steps = options.encoder.midpoint_steps;
+        let backend = options.backend;
+        let session = VideoSession::new(options)?;
+        warm_up(&session, backend)?;
+        let mut resuming = sink.resumes();
+        let mut frame = 0;
+        while let Some(read) = source.next()? {
+            let named = |e: phasefront::Error| Error::Input(format!("{}: {e}", source.name(frame)));
+            let image = read.camera_frame(timestamp_ns(frame, rate))?;
+            let written = if resuming { sink.written(&read)? } else { None };
+            resuming = written.is_some();
+            match written {
+                // These remember more than a replay tells them, so that their frames are made again.
+                Some(scale) if self.method == CoreMethod::Auto || midpoint_steps > 0 => {
+                    session.process(&image).map_err(named)?;
+                    sink.skip(scale);
+                }
+                Some(scale) => {
+                    session.replay(&image, scale).map_err(named)?;
+                    sink.skip(scale);
+                }
+                None => sink.take(&session.process(&image).map_err(named)?, Some(&read))?,
+            }
+            frame += 1;
+            bar.inc(1);
+        }
+        Ok(session.statistics())
+    }
+
+    /// Frames at their rate, as a camera gives them.
+    fn live(
+        &self,
+        options: SessionOptions,
+        source: &mut Source,
+        sink: &mut Sink,
+        bar: &indicatif::ProgressBar,
+        rate: f64,
+    ) -> Result<Statistics> {
+        // Results are written beside the session's thread; where writing is too slow, it waits and drops frames.
+        let (sender, results) = mpsc::sync_channel::<Hologram>(2);
+        let failure = Arc::new(Mutex::new(None));
+        let listener = {
+            let (bar, failure) = (bar.clone(), failure.clone());
+            move |event| match event {
+                Event::Processed(hologram) => {
+                    bar.inc(1);
+                    // The writer ends only when this thread does.
+                    let _ = sender.send(hologram);
+                }
+                Event::Dropped { .. } => bar.inc(1),
+                Event::Failed { timestamp_ns, error } => {
+                    bar.inc(1);
+                    let mut failure = failure.lock().unwrap_or_else(|e| e.into_inner());
+                    failure.get_or_insert((timestamp_ns, error));
+                }
+                Event::QualityChanged { change, .. } => bar.println(format!(
+                    "quality level {} to {}: {:?}",
+                    change.from, change.to, change.reason
+                )),
+                _ => {}
+            }
+        };
+        let backend = options.backend;
+        let session = LiveSession::new(options, listener)?;
+        warm_up(&session, backend)?;
+        let (submitted, written) = std::thread::scope(|scope| {
+            let writer = scope.spawn(move || {
+                let mut result = Ok(());
+                for hologram in results {
+                    if result.is_ok() {
+                        result = sink.take(&hologram, None);
+                    }
+                }
+                result
+            });
+            let submitted = submit_all(&session, source, rate);
+            session.close();
+            let statistics = session.statistics();
+            // The listener, and with it the channel, goes with the session.
+            drop(session);
+            let written = writer.join();
+            (submitted.map(|()| statistics), written)
+        });
+        written.map_err(|_| Error::Input("the writer of results panicked".into()))??;
+        let statistics = submitted?;
+        if let Some((timestamp_ns, error)) = failure.lock().unwrap_or_else(|e| e.into_inner()).take() {
+            let frame = (timestamp_ns as f64 * rate / 1e9).round() as usize;
+            log::warn!(
+                "{} frames failed, the first {}: {error}",
+                statistics.failed,
+                source.name(frame)
+            );
+        }
+        Ok(statistics)
+    }
+
+    fn report(
+        &self,
+        json: bool,
+        statistics: &Statistics,
+        seconds: f64,
+        sink: &Sink,
+        memory_mb: [Option<f64>; 2],
+    ) -> Result<()> {
+        let ms = |time: Duration| (time.as_secs_f64() * 1e5).round() / 100.0;
+        let stages: serde_json::Map<_, _> = (statistics.times.stages().into_iter())
+            .map(|(stage, time)| (stage.to_owned(), json!(ms(time))))
+            .collect();
+        let s = statistics;
+        let scales = &sink.scales;
+        let change = scales.windows(2).map(|pair| f64::from(pair[1] / pair[0] - 1.0).powi(2));
+        let change = (change.sum::<f64>() / (scales.len().max(2) - 1) as f64).sqrt();
+        let result = json!({
+            "output": self.output.as_ref().map(|path| path.display().to_string()), "submitted": s.submitted, "processed": s.processed, "failed": s.failed,
+            "refused": s.refused,
+            "dropped": {
+                "superseded": s.dropped.superseded, "above_target_rate": s.dropped.above_target_rate,
+                "paused": s.dropped.paused, "reset": s.dropped.reset, "closed": s.dropped.closed,
+            },
+            "seconds": seconds, "rate_hz": s.processed as f64 / seconds, "recent_rate_hz": s.rate_hz,
+            "stage_ms": stages, "total_ms": ms(s.times.total()), "backend": s.backend.name,
+            "backend_reason": s.backend.why, "quality_level": s.quality_level, "scale_change": change, "memory_mb": memory_mb,
+        });
+        sink.write_report(&result)?;
+        terminal::print(
+            json,
+            &result,
+            format!(
+                "{} of {} frames in {seconds:.1} s, {:.1} a second; {} dropped, {} failed; {:.1} ms a frame",
+                s.processed,
+                s.submitted,
+                s.processed as f64 / seconds,
+                s.dropped.total(),
+                s.failed,
+                ms(s.times.total())
+            ),
+        );
+        Ok(())
+    }
+}
+
+fn timestamp_ns(frame: usize, rate_hz: f64) -> u64 {
+    (frame as f64 * 1e9 / rate_hz) as u64
+}
+
+fn submit_all(session: &LiveSession, source: &mut Source, rate_hz: f64) -> Result<()> {
+    let paced = source.is_stored();
+    let start = Instant::now();
+    let mut frame = 0;
+    while let Some(image) = source.next()? {
+        let timestamp = timestamp_ns(frame, rate_hz);
+        if paced {
+            // A pipe's own rate is a camera's; files come when they are due.
+            let due = start + Duration::from_nanos(timestamp);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+        session.submit(&image.camera_frame(timestamp)?)?;
+        frame += 1;
+    }
+    Ok(())
+}
+
+/// Memory in use, MB; None where the system does not say.
+fn memory_mb() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    let kb: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some((kb / 1024.0).round())
+}

@@ -1,0 +1,189 @@
+//! Writes what comes out, and takes up where it was left.
+
+use crate::record::{Before, Claim, RunRecord, already, names_of};
+use ndarray::{Array3, ArrayView3};
+use phasefront::Hologram;
+use phasefront_io::film::video::VideoFrame;
+use phasefront_io::film::{self, Quality};
+use phasefront_io::hologram::{self, HologramInfo};
+use phasefront_io::{Error, Result, output, picture};
+use std::path::{Path, PathBuf};
+
+/// The report of a run, in its folder.
+const STATISTICS: &str = "statistics.json";
+
+/// Writes what comes out, and keeps what the report needs.
+pub(super) struct Sink {
+    folder: Option<PathBuf>,
+    /// Of what is seen, and of the phases.
+    films: Option<[PathBuf; 2]>,
+    preview_z_m: Option<f64>,
+    info: HologramInfo,
+    record: RunRecord,
+    claim: Option<Claim>,
+    pub(super) scales: Vec<f32>,
+}
+
+impl Sink {
+    /// Into `output`, a folder, or a film beside the folder of its name.
+    pub(super) fn new(
+        output: Option<&Path>,
+        preview_z_m: Option<f64>,
+        info: HologramInfo,
+        before: Before,
+        record: RunRecord,
+    ) -> Result<Self> {
+        let films = match output.filter(|path| film::is_film(path)) {
+            Some(path) => {
+                film::check(path)?;
+                let name = format!("{}-phases.mp4", path.file_stem().unwrap_or_default().display());
+                let films = [path.to_owned(), path.with_file_name(name)];
+                for path in &films {
+                    output::file(path, &["mp4"])?;
+                }
+                Some(films)
+            }
+            None => None,
+        };
+        let folder = match &films {
+            Some([path, _]) => Some(path.with_extension("")),
+            None => output.map(Path::to_owned),
+        };
+        let film = films.iter().flatten().find(|path| path.exists());
+        if let (Some(path), Before::Refuse) = (film, before) {
+            return Err(already(path));
+        }
+        let mut claim = None;
+        if let Some(folder) = &folder {
+            output::folder(folder, before.holding())?;
+            let new = Claim::new(folder, &record, before, |name| is_frame(name) || name == STATISTICS)?;
+            // Films beside a folder without frames are not of an earlier run.
+            if let (Some(path), Before::Resume, false) = (film, before, new.resumes) {
+                return Err(already(path));
+            }
+            if before == Before::Overwrite {
+                remove_made(folder)?;
+            }
+            claim = Some(new);
+        }
+        Ok(Sink {
+            folder,
+            films,
+            preview_z_m,
+            info,
+            record,
+            claim,
+            scales: Vec::new(),
+        })
+    }
+
+    /// Whether frames of an earlier run may be there.
+    pub(super) fn resumes(&self) -> bool {
+        self.claim.as_ref().is_some_and(|claim| claim.resumes)
+    }
+
+    fn phase(&self, folder: &Path, index: usize) -> PathBuf {
+        folder.join(format!("phase_{index:06}.png"))
+    }
+
+    fn preview(&self, folder: &Path, index: usize) -> PathBuf {
+        folder.join(format!("preview_{index:06}.png"))
+    }
+
+    /// The scale of the next frame's hologram where it is written already, of `frame`.
+    pub(super) fn written(&self, frame: &VideoFrame) -> Result<Option<f32>> {
+        let Some(folder) = &self.folder else { return Ok(None) };
+        let path = self.phase(folder, self.scales.len());
+        let seen = self.preview_z_m.is_none() || self.preview(folder, self.scales.len()).exists();
+        if !path.exists() || !seen {
+            return Ok(None);
+        }
+        match hologram::read_made_of(&path)? {
+            Some((made_of, Some(scale))) if made_of == self.made_of(frame) => Ok(Some(scale)),
+            _ => Err(Error::file(
+                path,
+                "was made of another frame than this run has there; --resume needs the same input, --overwrite begins anew",
+            )),
+        }
+    }
+
+    /// By what the hologram of `frame` is recognised.
+    fn made_of(&self, frame: &VideoFrame) -> String {
+        let mut all = self.record.fingerprint();
+        frame.fingerprint(&mut all);
+        all.to_string()
+    }
+
+    /// Counts a frame that was written before.
+    pub(super) fn skip(&mut self, scale: f32) {
+        self.scales.push(scale);
+    }
+
+    /// Writes the next hologram, made of `frame`, which a live stream does not know any more: it is not resumed.
+    pub(super) fn take(&mut self, hologram: &Hologram, frame: Option<&VideoFrame>) -> Result<()> {
+        let index = self.scales.len();
+        self.scales.push(hologram.scale());
+        let Some(folder) = &self.folder else {
+            return Ok(());
+        };
+        let (height, width) = hologram.shape();
+        if let Some(z_m) = self.preview_z_m {
+            let mut rgba = vec![0; 4 * height * width];
+            hologram.preview(z_m, height, width, &mut rgba)?;
+            picture::write_rgba(&self.preview(folder, index), width, height, &rgba)?;
+        }
+        let shape = (hologram.colours(), height, width);
+        let info = HologramInfo {
+            scale: Some(hologram.scale()),
+            ..self.info.clone()
+        };
+        let path = self.phase(folder, index);
+        match frame {
+            None => {
+                let levels = ArrayView3::from_shape(shape, hologram.levels());
+                hologram::write_phase_only(&path, levels.map_err(|e| Error::Input(e.to_string()))?, &info)
+            }
+            Some(frame) => {
+                let levels = Array3::from_shape_vec(shape, hologram.levels().to_vec());
+                let levels = levels.map_err(|e| Error::Input(e.to_string()))?;
+                let made_of = self.made_of(frame);
+                hologram::write_made_of(&path, &hologram::Hologram::PhaseOnly(levels, info), &made_of)
+            }
+        }
+    }
+
+    /// Makes the films, where they are asked for: what is seen, and without loss the phases.
+    pub(super) fn finish(&self, rate_hz: f64) -> Result<()> {
+        let (Some([seen, phases]), Some(folder)) = (&self.films, &self.folder) else {
+            return Ok(());
+        };
+        film::write(seen, folder, "preview_%06d.png", rate_hz, Quality::Seen)?;
+        film::write(phases, folder, "phase_%06d.png", rate_hz, Quality::Lossless)
+    }
+
+    /// Writes the report.
+    pub(super) fn write_report(&self, report: &serde_json::Value) -> Result<()> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        output::write_atomically(&folder.join(STATISTICS), |file| {
+            serde_json::to_writer_pretty(&mut *file, report)?;
+            std::io::Write::write_all(file, b"\n")
+        })
+    }
+}
+
+fn is_frame(name: &str) -> bool {
+    let number = name.strip_prefix("phase_").or(name.strip_prefix("preview_"));
+    let digits = number.and_then(|rest| rest.strip_suffix(".png"));
+    digits.is_some_and(|n| n.len() >= 6 && n.bytes().all(|b| b.is_ascii_digit()))
+}
+
+/// Removes what an earlier run made, and nothing else.
+fn remove_made(folder: &Path) -> Result<()> {
+    for name in names_of(folder)? {
+        if is_frame(&name) || name == STATISTICS {
+            let path = folder.join(name);
+            std::fs::remove_file(&path).map_err(|e| Error::file(path, format!("cannot be removed: {e}")))?;
+        }
+    }
+    Ok(())
+}

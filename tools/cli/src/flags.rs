@@ -1,0 +1,7 @@
+//! Flags that several commands share.
+
+pub(crate) mod backend;
+pub(crate) mod depth;
+pub(crate) mod encoder;
+pub(crate) mod frame;
+pub(crate) mod method;

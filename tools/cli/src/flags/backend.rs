@@ -1,0 +1,44 @@
+//! The flags of where frames are made.
+
+use crate::record::RunRecord;
+use clap::{Args, ValueEnum};
+use phasefront::unstable::gpu::DeviceOptions;
+use phasefront_cli::gpu;
+use phasefront_io::{Error, Result};
+
+/// Where frames are made.
+#[derive(Default, Args)]
+pub(crate) struct BackendFlags {
+    /// Where frames are made
+    #[arg(long, value_enum, default_value_t = BackendName::Cpu)]
+    backend: BackendName,
+    /// A part of the GPU's name [default: the fastest; drivers in software are taken by name only]
+    #[arg(long, value_name = "NAME")]
+    gpu: Option<String>,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
+enum BackendName {
+    /// The processor
+    #[default]
+    Cpu,
+    /// The graphics processor, by Vulkan, Metal or DirectX 12
+    Gpu,
+}
+
+impl BackendFlags {
+    pub(crate) fn record(&self, record: &mut RunRecord) {
+        let BackendFlags { backend, gpu } = self;
+        record.choice("--backend", Some(backend));
+        record.set("--gpu", gpu.as_ref());
+    }
+
+    /// Which GPU, if one is wanted.
+    pub(crate) fn device(&self) -> Result<Option<DeviceOptions>> {
+        match (self.backend, &self.gpu) {
+            (BackendName::Gpu, name) => Ok(Some(gpu::options(name.as_deref()))),
+            (BackendName::Cpu, None) => Ok(None),
+            (BackendName::Cpu, Some(_)) => Err(Error::Input("--gpu needs --backend gpu".into())),
+        }
+    }
+}

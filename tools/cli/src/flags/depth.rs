@@ -1,0 +1,88 @@
+//! The flags of what the numbers of a depth image mean.
+
+use crate::record::RunRecord;
+use clap::{Args, ValueEnum};
+use phasefront::unstable::depth::DepthUnit;
+use phasefront_command::flags::check_used;
+use phasefront_io::frame::DepthOptions;
+use phasefront_io::{Error, Result};
+
+/// What the numbers of a depth image mean, and which are shown where.
+#[derive(Default, Args)]
+pub(crate) struct DepthFlags {
+    /// What the depth's numbers mean; 0 and NaN are no reading, but for normalized depth [default: normalized]
+    #[arg(long, value_enum)]
+    depth_unit: Option<UnitName>,
+    /// Units in a metre, for --depth-unit raw
+    #[arg(long, value_name = "N", required_if_eq("depth_unit", "raw"))]
+    depth_scale: Option<f64>,
+    /// Metres shown nearest, whatever the unit of the depth's numbers [default: the 1st percentile]
+    #[arg(long, value_name = "M")]
+    near: Option<f32>,
+    /// Metres shown farthest, whatever the unit of the depth's numbers [default: the 99th percentile]
+    #[arg(long, value_name = "M")]
+    far: Option<f32>,
+}
+
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
+enum UnitName {
+    #[default]
+    /// 0 nearest to the largest number farthest
+    Normalized,
+    /// Metres
+    M,
+    /// Millimetres
+    Mm,
+    /// Inverse metres
+    Disparity,
+    /// --depth-scale units a metre
+    Raw,
+}
+
+impl DepthFlags {
+    pub(crate) fn record(&self, record: &mut RunRecord) {
+        let DepthFlags {
+            depth_unit,
+            depth_scale,
+            near,
+            far,
+        } = self;
+        record.choice("--depth-unit", Some(&depth_unit.unwrap_or_default()));
+        record.set("--depth-scale", *depth_scale);
+        record.set("--near", *near);
+        record.set("--far", *far);
+    }
+
+    /// --near and --far of video, metres.
+    pub(crate) fn range(&self) -> Result<Option<(f32, f32)>> {
+        match (self.near, self.far) {
+            (None, None) => Ok(None),
+            (Some(near), Some(far)) => Ok(Some((near, far))),
+            _ => Err(Error::Input("video needs both --near and --far, or neither".into())),
+        }
+    }
+
+    pub(crate) fn options(&self) -> Result<DepthOptions> {
+        let unit = self.depth_unit.unwrap_or_default();
+        check_used(&[(
+            "--depth-scale",
+            self.depth_scale.is_some(),
+            unit == UnitName::Raw,
+            "--depth-unit raw",
+        )])?;
+        let unit = match unit {
+            UnitName::Normalized => DepthUnit::Normalized,
+            UnitName::M => DepthUnit::Metres,
+            UnitName::Mm => DepthUnit::Millimetres,
+            UnitName::Disparity => DepthUnit::Disparity,
+            UnitName::Raw => DepthUnit::Raw {
+                units_per_m: self.depth_scale.unwrap_or(f64::NAN),
+            },
+        };
+        Ok(DepthOptions {
+            unit,
+            near_m: self.near,
+            far_m: self.far,
+        })
+    }
+}

@@ -1,0 +1,145 @@
+//! The flags of how a field becomes phases.
+
+use crate::record::RunRecord;
+use clap::Args;
+use phasefront::{Display, EncoderOptions, Encoding, Network};
+use phasefront_command::flags::EncoderName;
+use phasefront_command::networks::{self, Precision};
+use phasefront_io::{Error, Result};
+use std::path::Path;
+use std::sync::Arc;
+
+/// How the field becomes phases.
+#[derive(Default, Args)]
+pub(crate) struct EncoderFlags {
+    /// How the field becomes phases [default: anti-alias; deep with --network ddpm-8]
+    #[arg(long, value_enum)]
+    encoder: Option<EncoderName>,
+    /// ONNX file of the pre-filter of --encoder deep, trained for the offset [default: the one of --network ddpm-8]
+    #[arg(long, value_name = "FILE")]
+    prefilter: Option<String>,
+    /// Share of full light, 0 to 1, below which phases are drawn to 0, against speckle in the dark [default: 0.4; 0
+    /// with --encoder deep]
+    #[arg(long, value_name = "D")]
+    dark_threshold: Option<f32>,
+    /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
+    #[arg(long, value_name = "N")]
+    local_steps: Option<usize>,
+    /// Steps of correction at the midpoint after them, for stills; 1 brings most at the midpoint, 10 all
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    midpoint_steps: usize,
+}
+
+/// How a field becomes phases, and what it is called.
+#[derive(Clone)]
+pub(crate) struct Encoder {
+    pub(crate) options: EncoderOptions,
+    pub name: &'static str,
+}
+
+impl Encoder {
+    pub(crate) fn describe(&self) -> String {
+        let EncoderOptions {
+            dark_threshold,
+            local_steps,
+            midpoint_steps,
+            ..
+        } = &self.options;
+        let last = match midpoint_steps {
+            0 => String::new(),
+            steps => format!(", midpoint steps {steps}"),
+        };
+        format!("{}, dark {dark_threshold}, local steps {local_steps}{last}", self.name)
+    }
+}
+
+impl EncoderFlags {
+    pub(crate) fn of(encoder: EncoderName, dark_threshold: f32, local_steps: usize, midpoint_steps: usize) -> Self {
+        EncoderFlags {
+            encoder: Some(encoder),
+            prefilter: None,
+            dark_threshold: Some(dark_threshold),
+            local_steps: Some(local_steps),
+            midpoint_steps,
+        }
+    }
+
+    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
+        let EncoderFlags {
+            encoder,
+            prefilter,
+            dark_threshold,
+            local_steps,
+            midpoint_steps,
+        } = self;
+        record.choice("--encoder", encoder.as_ref());
+        record.file("--prefilter", prefilter.as_ref().map(Path::new))?;
+        record.set("--dark-threshold", *dark_threshold);
+        record.set("--local-steps", *local_steps);
+        record.set("--midpoint-steps", Some(*midpoint_steps));
+        Ok(())
+    }
+
+    /// For fields that no network of a pair makes.
+    pub(crate) fn read(&self) -> Result<Encoder> {
+        let prefilter = match &self.prefilter {
+            Some(file) => Some(networks::network(file, None)?),
+            None => None,
+        };
+        let usual = if prefilter.is_some() {
+            EncoderName::DEEP
+        } else {
+            EncoderName::ANTI_ALIAS
+        };
+        let name = self.encoder.unwrap_or(usual);
+        Ok(self.encoder(name.encoding(prefilter)?, name))
+    }
+
+    fn encoder(&self, encoding: Encoding, name: EncoderName) -> Encoder {
+        let usual = EncoderOptions::from(encoding);
+        Encoder {
+            options: EncoderOptions {
+                dark_threshold: self.dark_threshold.unwrap_or(usual.dark_threshold),
+                local_steps: self.local_steps.unwrap_or(usual.local_steps),
+                midpoint_steps: self.midpoint_steps,
+                ..usual
+            },
+            name: name.name(),
+        }
+    }
+
+    /// Whether the pre-filter is asked for by name.
+    pub(crate) fn is_deep(&self) -> bool {
+        self.encoder == Some(EncoderName::DEEP)
+    }
+
+    /// The network called `network`, and the encoder that belongs to it or is asked for: the bundled pair for
+    /// `display` by its name or for --encoder deep, else 8 layers.
+    pub(crate) fn with_network(
+        &self,
+        network: Option<&str>,
+        precision: Option<Precision>,
+        display: &Display,
+    ) -> Result<(Arc<Network>, Encoder)> {
+        let by_name = network == Some(networks::DEEP);
+        let deep = self.is_deep() || (by_name && self.encoder.is_none());
+        if deep && self.prefilter.is_none() && (by_name || network.is_none()) {
+            let Some(pair) = phasefront_models::pair_for(display, precision.unwrap_or_default()) else {
+                let offsets = phasefront_models::PAIRS.iter().map(|pair| pair.offset_mm.to_string());
+                return Err(Error::Input(format!(
+                    "networks for the deep encoder are bundled for offsets of {} mm and the default display; train a pair for this one, or take --network 8 --encoder anti-alias",
+                    offsets.collect::<Vec<_>>().join(", ")
+                )));
+            };
+            let encoder = self.encoder(Encoding::Deep(pair.prefilter), EncoderName::DEEP);
+            return Ok((pair.hologram, encoder));
+        }
+        if by_name {
+            return Err(Error::Input(format!(
+                "--network {} brings its own --encoder, deep, and --prefilter; leave them out",
+                networks::DEEP
+            )));
+        }
+        Ok((networks::network(network.unwrap_or("8"), precision)?, self.read()?))
+    }
+}

@@ -1,0 +1,317 @@
+//! The flags of an RGB-D image: from two files, from a photo with depth inside, or from any picture by a network that
+//! sees depth; and how it lies on the modulator.
+
+use crate::flags::depth::DepthFlags;
+use crate::record::RunRecord;
+use clap::{Args, ValueEnum};
+use ndarray::{Array2, Array3};
+use phasefront::{Display, RgbdFrame};
+use phasefront_cli::depth_network::{Colours, DepthNetwork};
+use phasefront_io::film::sequence;
+use phasefront_io::frame::fit::{Fit, Placement};
+use phasefront_io::input::decode::{COLOUR_FORMATS, DEPTH_FORMATS};
+use phasefront_io::picture::{self, photo};
+use phasefront_io::{Error, Result, frame};
+use std::path::{Path, PathBuf};
+
+/// An RGB-D image, what its depth means, and how it lies on the modulator.
+#[derive(Default, Args)]
+pub(crate) struct FrameFlags {
+    #[arg(long, value_name = "FILE", conflicts_with = "photo", help = format!("Colour image: {COLOUR_FORMATS}; or a folder of them"))]
+    rgb: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "rgb",
+        conflicts_with = "depth_network",
+        help = format!("Depth image: {DEPTH_FORMATS}; or a folder of them, with the names of those of --rgb")
+    )]
+    depth: Option<PathBuf>,
+    /// A phone's JPEG with depth inside (GDepth or Dynamic Depth); or a folder of them
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale"])]
+    photo: Option<PathBuf>,
+    #[command(flatten)]
+    seen: SeenDepthFlags,
+    /// How the image lies on the modulator, which is then the hologram's size [default: as it is; contain with
+    /// --photo]. An image of another size than the modulator's is told of: with --display any, without it one that is
+    /// larger than the default display
+    #[arg(long, value_enum)]
+    fit: Option<FitName>,
+    #[command(flatten)]
+    depth_numbers: DepthFlags,
+}
+
+/// Depth that a network sees, and which way depth goes.
+#[derive(Clone, Default, Args)]
+pub(crate) struct SeenDepthFlags {
+    /// ONNX file of a network that sees relative inverse depth in colour alone (docs/depth.md)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["depth_unit", "depth_scale", "near", "far"])]
+    depth_network: Option<PathBuf>,
+    /// Numbers that the colours are for --depth-network
+    #[arg(long, value_enum, default_value_t = ColoursName::Imagenet, requires = "depth_network")]
+    depth_network_colours: ColoursName,
+    /// Take near for far: for depth that is larger where it is nearer, and for --depth-network that gives distance
+    #[arg(long)]
+    invert: bool,
+}
+
+impl SeenDepthFlags {
+    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
+        let SeenDepthFlags {
+            depth_network,
+            depth_network_colours,
+            invert,
+        } = self;
+        record.file("--depth-network", depth_network.as_deref())?;
+        record.choice("--depth-network-colours", Some(depth_network_colours));
+        record.switch("--invert", *invert);
+        Ok(())
+    }
+
+    pub(crate) fn network(&self) -> Option<&Path> {
+        self.depth_network.as_deref()
+    }
+
+    pub(crate) fn invert(&self) -> bool {
+        self.invert
+    }
+
+    /// What `network` sees in `rgb`, larger where it is farther.
+    pub(crate) fn farther(&self, network: &DepthNetwork, rgb: &Array3<f32>) -> Result<Array2<f32>> {
+        let seen = network.see(rgb.view(), self.depth_network_colours.colours())?;
+        Ok(match self.invert {
+            true => seen,
+            false => seen.mapv(|v| -v),
+        })
+    }
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+enum ColoursName {
+    #[default]
+    /// Of ImageNet's mean and spread: MiDaS, DPT, Depth Anything
+    Imagenet,
+    /// From 0 to 1
+    Unit,
+    /// From -1 to 1
+    Signed,
+}
+
+impl ColoursName {
+    fn colours(self) -> Colours {
+        match self {
+            ColoursName::Imagenet => Colours::Imagenet,
+            ColoursName::Unit => Colours::Unit,
+            ColoursName::Signed => Colours::Signed,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum FitName {
+    /// The whole image, in the middle of black
+    Contain,
+    /// As much of it as fills the modulator
+    Cover,
+    /// Pixel for pixel, in the middle
+    Centre,
+}
+
+impl FitName {
+    fn fit(self) -> Fit {
+        match self {
+            FitName::Contain => Fit::Contain,
+            FitName::Cover => Fit::Cover,
+            FitName::Centre => Fit::Centre,
+        }
+    }
+}
+
+/// A picture of a folder.
+pub(crate) struct Picture {
+    /// Its file's name without what follows the last dot.
+    pub name: String,
+    /// Colour, and depth where that is a file of its own; one of them alone where the other is missing.
+    pub(crate) files: Vec<PathBuf>,
+    pub(crate) is_whole: bool,
+}
+
+fn of_one_folder(folder: &Path) -> Result<Vec<Picture>> {
+    let found = sequence::images(folder)?.into_iter().map(|(name, path)| Picture {
+        name: name.text,
+        files: vec![path],
+        is_whole: true,
+    });
+    Ok(found.collect())
+}
+
+fn of_two_folders(colour: &Path, depth: &Path) -> Result<Vec<Picture>> {
+    let found = sequence::by_name(colour, depth)?;
+    let pairs = found.pairs.into_iter().map(|(name, colour, depth)| Picture {
+        name,
+        files: vec![colour, depth],
+        is_whole: true,
+    });
+    let alone = found.alone.into_iter().map(|path| Picture {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        files: vec![path],
+        is_whole: false,
+    });
+    Ok(pairs.chain(alone).collect())
+}
+
+/// Says that a hologram of (H, W) pixels is not the size of its modulator, which `flag` would make it. A display that
+/// nobody `named` is a stand-in, in whose middle any smaller hologram may lie.
+pub(crate) fn warn_of_size((height, width): (usize, usize), display: &Display, named: bool, flag: &str) {
+    let (rows, columns) = (display.height(), display.width());
+    let larger = height > rows || width > columns;
+    if larger || named && (height, width) != (rows, columns) {
+        let whose = if named { "modulator" } else { "default modulator" };
+        log::warn!(
+            "the hologram is {width}×{height} as the image is, the {whose} {columns}×{rows}: {flag} makes the whole modulator's"
+        );
+    }
+}
+
+impl FrameFlags {
+    /// The names of the flags, for what takes their place.
+    pub(crate) const NAMES: [&str; 11] = [
+        "rgb",
+        "depth",
+        "photo",
+        "depth_network",
+        "depth_network_colours",
+        "invert",
+        "fit",
+        "depth_unit",
+        "depth_scale",
+        "near",
+        "far",
+    ];
+
+    /// Notes all but which picture it is.
+    pub(crate) fn record(&self, record: &mut RunRecord) -> Result<()> {
+        let FrameFlags {
+            rgb: _,
+            depth: _,
+            photo: _,
+            seen,
+            fit,
+            depth_numbers,
+        } = self;
+        seen.record(record)?;
+        record.choice("--fit", fit.as_ref());
+        depth_numbers.record(record);
+        Ok(())
+    }
+
+    /// The pictures of the folders that --rgb and --depth, or --photo, name; `None` where they name files.
+    pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
+        let is_folder = |path: &Option<PathBuf>| path.as_ref().is_some_and(|path| path.is_dir());
+        let (rgb, depth) = (is_folder(&self.rgb), is_folder(&self.depth));
+        if let Some(folder) = self.photo.as_deref().filter(|path| path.is_dir()) {
+            return of_one_folder(folder).map(Some);
+        }
+        match (&self.rgb, &self.depth) {
+            (Some(colour), Some(depths)) if rgb && depth => of_two_folders(colour, depths).map(Some),
+            (Some(colour), None) if rgb => of_one_folder(colour).map(Some),
+            (Some(_), Some(_)) if rgb || depth => Err(Error::Input(
+                "--rgb and --depth name two files, or two folders of files with equal names".into(),
+            )),
+            _ => Ok(None),
+        }
+    }
+
+    /// The folders that [`Self::pictures`] reads.
+    pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
+        [&self.rgb, &self.depth, &self.photo]
+            .into_iter()
+            .filter_map(|path| path.as_deref())
+    }
+
+    /// The same for one picture of a folder.
+    pub(crate) fn take(&mut self, picture: &Picture) {
+        let mut files = picture.files.iter().cloned();
+        if self.photo.is_some() {
+            self.photo = files.next();
+        } else {
+            self.rgb = files.next();
+            self.depth = files.next();
+        }
+    }
+
+    /// The file of the picture.
+    pub(crate) fn source(&self) -> Option<&Path> {
+        self.photo.as_deref().or(self.rgb.as_deref())
+    }
+
+    /// The frame for `display`, in the colours of its lasers; `named` where the display was asked for.
+    pub(crate) fn read(&self, display: &Display, named: bool) -> Result<RgbdFrame> {
+        let frame = match (&self.rgb, &self.depth, &self.photo) {
+            (Some(rgb), Some(depth), _) => {
+                let frame = frame::read(rgb, depth, self.depth_numbers.options()?)?;
+                let frame = self.inverted(frame)?;
+                let placement = self.placement(frame.shape(), display);
+                placement.frame(placement.colour(frame.rgb()), placement.depth(frame.depth()))
+            }
+            (Some(rgb), None, _) => self.by_network(&picture::read_rgb(rgb)?, display),
+            (None, _, Some(path)) => {
+                let photo = photo::read(path)?;
+                match self.seen.network() {
+                    Some(_) => self.by_network(&photo.rgb, display),
+                    None => self.inverted(self.of_photo(path, &photo, display)?),
+                }
+            }
+            _ => Err(Error::Input(
+                "an image is needed: --rgb with --depth or --depth-network, or --photo".into(),
+            )),
+        }?;
+        warn_of_size(frame.shape(), display, named, "--fit contain, cover or centre");
+        Ok(frame.for_display(display))
+    }
+
+    fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {
+        let usual = self.photo.is_some().then_some(Fit::Contain);
+        match self.fit.map(FitName::fit).or(usual) {
+            Some(fit) => Placement::new(picture, (display.height(), display.width()), fit),
+            None => Placement::as_is(picture),
+        }
+    }
+
+    fn inverted(&self, frame: RgbdFrame) -> Result<RgbdFrame> {
+        match self.seen.invert {
+            true => Ok(RgbdFrame::new(frame.rgb().to_owned(), frame.depth().mapv(|d| 1.0 - d))?),
+            false => Ok(frame),
+        }
+    }
+
+    /// The frame of a photo: by its distances where --near or --far ask for them, else d_n as it is.
+    fn of_photo(&self, path: &Path, photo: &photo::Photo, display: &Display) -> Result<RgbdFrame> {
+        let options = self.depth_numbers.options()?;
+        let depth = match (options.near_m, options.far_m, photo.metres()) {
+            (None, None, _) => frame::relative(photo.depth.view(), None, None),
+            (near, far, Some(metres)) => frame::relative(metres.view(), near, far),
+            _ => {
+                return Err(Error::file(
+                    path,
+                    "does not say its depth's range in metres; leave out --near and --far",
+                ));
+            }
+        };
+        let depth = depth.map_err(|e| Error::file(path, e))?;
+        let (_, height, width) = photo.rgb.dim();
+        frame::refined(&photo.rgb, &depth, &self.placement((height, width), display))
+    }
+
+    fn by_network(&self, rgb: &Array3<f32>, display: &Display) -> Result<RgbdFrame> {
+        let Some(path) = self.seen.network() else {
+            return Err(Error::Input(
+                "--rgb needs --depth, or --depth-network that sees it".into(),
+            ));
+        };
+        let (_, height, width) = rgb.dim();
+        let farther = self.seen.farther(&DepthNetwork::open(path, (height, width))?, rgb)?;
+        let depth = frame::relative(farther.view(), None, None).map_err(|e| Error::file(path, e))?;
+        frame::refined(rgb, &depth, &self.placement((height, width), display))
+    }
+}

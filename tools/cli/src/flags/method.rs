@@ -1,0 +1,69 @@
+//! The methods of the core, by the names that the commands have for them.
+
+use crate::flags::encoder::{Encoder, EncoderFlags};
+use clap::ValueEnum;
+use phasefront::{Display, Method, Sweep};
+use phasefront_command::flags::{PrecisionName, check_used};
+use phasefront_command::networks;
+use phasefront_io::Result;
+
+/// A method on RGB-D images.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+pub(crate) enum CoreMethod {
+    /// A trained network on the RGB-D image
+    Network,
+    /// The plane sweep on the RGB-D image: waves by short filters, any display
+    Sweep,
+    /// The plane sweep where depth is sharp, a network where it is ragged
+    Auto,
+}
+
+/// What a method is made of, besides its name.
+pub(crate) struct Parts<'a> {
+    /// --network.
+    pub(crate) network: Option<&'a str>,
+    /// --precision.
+    pub(crate) precision: Option<PrecisionName>,
+    pub(crate) display: &'a Display,
+    pub(crate) sweep: Sweep,
+    pub(crate) encoder: &'a EncoderFlags,
+}
+
+impl CoreMethod {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            CoreMethod::Network => "network",
+            CoreMethod::Sweep => "sweep",
+            CoreMethod::Auto => "auto",
+        }
+    }
+
+    /// The method, and how its fields become phases.
+    pub(crate) fn of(self, parts: &Parts<'_>) -> Result<(Method, Encoder)> {
+        let Parts {
+            network,
+            precision,
+            display,
+            sweep,
+            encoder,
+        } = *parts;
+        let trained = self != CoreMethod::Sweep;
+        let with = "a --method with a network, not with sweep";
+        check_used(&[
+            ("--network", network.is_some(), trained, with),
+            ("--precision", precision.is_some(), trained, with),
+        ])?;
+        let precision = precision.map(PrecisionName::precision);
+        Ok(match self {
+            CoreMethod::Network => {
+                let (network, encoder) = encoder.with_network(network, precision, display)?;
+                (Method::trained(network), encoder)
+            }
+            CoreMethod::Sweep => (Method::Sweep(sweep), encoder.read()?),
+            CoreMethod::Auto => {
+                let network = networks::network(network.unwrap_or("8"), precision)?;
+                (Method::Auto(sweep, network), encoder.read()?)
+            }
+        })
+    }
+}

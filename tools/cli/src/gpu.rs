@@ -1,0 +1,41 @@
+//! GPUs for the command: which one, and what was compiled for it, kept from run to run.
+
+use phasefront::unstable::file;
+use phasefront::unstable::gpu::{Device, DeviceOptions};
+use std::io::Write;
+use std::path::PathBuf;
+
+/// The GPU whose name has `name` in it, or the fastest, with the programs of earlier runs.
+pub fn options(name: Option<&str>) -> DeviceOptions {
+    DeviceOptions {
+        name: name.map(str::to_owned),
+        programs: programs().and_then(|path| file::read(&path, file::MOST_TARGET).ok()),
+    }
+}
+
+/// Keeps what was compiled for the next run. A cache that cannot be written costs time and nothing else.
+pub fn keep_programs(device: &Device) {
+    if let Some(why) = device.programs_refused() {
+        log::info!("the programs of earlier runs were not taken: {why}");
+    }
+    if let (Some(path), Some(programs)) = (programs(), device.programs()) {
+        let write = || -> std::io::Result<()> {
+            let folder = path.parent().unwrap_or(&path);
+            std::fs::create_dir_all(folder)?;
+            let mut file = tempfile::NamedTempFile::new_in(folder)?;
+            file.write_all(&programs)?;
+            file.persist(&path)?;
+            Ok(())
+        };
+        if let Err(why) = write() {
+            log::info!("{}: {why}", path.display());
+        }
+    }
+}
+
+/// Where compiled programs are kept.
+fn programs() -> Option<PathBuf> {
+    let of = |name: &str| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let folder = of("XDG_CACHE_HOME").or_else(|| Some(of("HOME")?.join(".cache")))?;
+    Some(folder.join("phasefront/gpu-programs"))
+}

@@ -1,0 +1,124 @@
+//! Makes a hologram: from a request to the levels of the modulator. [`HologramRequest::make`] chooses the CPU or a GPU.
+//! `hologram`, `view` and `judge` make theirs here.
+
+mod cpu;
+mod gpu;
+mod judged;
+mod layers;
+mod levels;
+mod request;
+
+pub(crate) use judged::{Judged, judge};
+pub(crate) use request::{HologramRequest, Image, Method};
+
+use crate::flags::encoder::Encoder;
+use crate::flags::method::{CoreMethod, Parts};
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::RgbdFrame;
+use phasefront::unstable::depth::sharpness;
+use phasefront_command::flags::sweep_for;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::hologram::{self, HologramInfo};
+use phasefront_io::ldi::{Ldi, LdiLayer};
+use phasefront_io::{Error, Result};
+use phasefront_models::default_network;
+use std::time::Duration;
+
+impl HologramRequest {
+    /// Makes the hologram of `image` for `display`.
+    pub(crate) fn make(&self, display: &DisplayFile, image: &Image) -> Result<HologramResult> {
+        let method = self.method();
+        let device = self.backend.device()?;
+        if device.is_some()
+            && (matches!(method, Method::Layers | Method::Points) || self.keeps_field || self.ldi.is_some())
+        {
+            return Err(Error::Input(
+                "--backend gpu runs --method network, sweep and auto on RGB-D, without --complex and --judge; the rest is the CPU's"
+                    .into(),
+            ));
+        }
+        match (method, image) {
+            (Method::Core(method), Image::Rgbd(frame)) => {
+                let chosen = match method {
+                    CoreMethod::Auto => self.by_sharpness(frame, &display.target.display)?,
+                    method => method,
+                };
+                // Where depth is sharp, auto leaves its network alone.
+                let trained = method == chosen || chosen == CoreMethod::Network;
+                let method = chosen;
+                let (core, encoder) = method.of(&Parts {
+                    network: self.network.as_deref().filter(|_| trained),
+                    precision: self.precision.filter(|_| trained),
+                    display: &display.target.display,
+                    sweep: sweep_for(&display.target.display, self.planes, self.taps),
+                    encoder: &self.encoder,
+                })?;
+                let stage = method.name();
+                match &device {
+                    Some(options) => self.on_gpu(stage, core, frame, display, encoder, options),
+                    None => self.on_cpu(stage, core, frame, display, encoder),
+                }
+            }
+            (method, Image::Rgbd(frame)) => {
+                let ldi = Ldi::new(vec![LdiLayer::from(frame)])?;
+                self.by_layers(method, &ldi, display, self.encoder.read()?)
+            }
+            (method, Image::Layers(ldi)) => self.by_layers(method, ldi, display, self.encoder.read()?),
+        }
+    }
+
+    /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
+    fn by_sharpness(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
+        let trained = self.network.is_some() || default_network(display).is_some();
+        Ok(match trained && !sharpness::measure(frame).is_sharp() {
+            true => CoreMethod::Network,
+            false => CoreMethod::Sweep,
+        })
+    }
+}
+
+/// A field at the modulator, its levels, and how long each stage took.
+pub(crate) struct HologramResult {
+    pub(crate) method: &'static str,
+    pub(crate) field: Option<Array3<Complex32>>,
+    pub(crate) levels: Array3<u8>,
+    /// Of over 8 bits, of which `levels` are then the upper ones.
+    pub(crate) words: Option<Array3<u16>>,
+    pub(crate) encoder: Encoder,
+    pub(crate) scale: f32,
+    /// The last is the encoder's.
+    pub(crate) stages: Vec<(&'static str, Duration)>,
+    pub(crate) engine: Option<String>,
+}
+
+impl HologramResult {
+    /// The levels with all their bits.
+    pub(crate) fn hologram(&self, info: HologramInfo) -> hologram::Hologram {
+        match &self.words {
+            Some(words) => hologram::Hologram::Words(words.clone(), info),
+            None => hologram::Hologram::PhaseOnly(self.levels.clone(), info),
+        }
+    }
+}
+
+/// What files of the levels and of the field say.
+pub(crate) fn infos(display: &DisplayFile, made: &HologramResult) -> (HologramInfo, HologramInfo) {
+    let levels = HologramInfo {
+        calibrated: display.calibrated(true),
+        display: display.target.display.clone(),
+        encoder: Some(made.encoder.name.into()),
+        scale: Some(made.scale),
+        lut: display.lut.map(Vec::from),
+        levels_turns: display.target.panel.levels_turns.clone(),
+    };
+    let field = HologramInfo {
+        encoder: None,
+        scale: None,
+        lut: None,
+        levels_turns: None,
+        calibrated: display.calibrated(false),
+        ..levels.clone()
+    };
+    (levels, field)
+}

@@ -1,0 +1,56 @@
+//! The core's methods on an RGB-D image, on a GPU.
+
+use super::{HologramRequest, HologramResult};
+use crate::flags::encoder::Encoder;
+use ndarray::Array3;
+use phasefront::RgbdFrame;
+use phasefront::unstable::gpu::{Device, DeviceOptions, Frame, GpuPipeline, Job, probe};
+use phasefront_cli::gpu;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::{Error, Result};
+use std::sync::Arc;
+
+impl HologramRequest {
+    /// On a GPU that was tried out before.
+    pub(super) fn on_gpu(
+        &self,
+        stage: &'static str,
+        method: phasefront::Method,
+        frame: &RgbdFrame,
+        display: &DisplayFile,
+        encoder: Encoder,
+        options: &DeviceOptions,
+    ) -> Result<HologramResult> {
+        if display.target.display.bits() > 8 {
+            return Err(Error::Input(
+                "--backend gpu makes levels of up to 8 bits; those of over 8 are the CPU's".into(),
+            ));
+        }
+        let (height, width) = frame.shape();
+        let mut job = Job::new((height, width), method, display.corrected()?);
+        job.encoder = self.encoder_options(&encoder.options);
+        let device = Arc::new(Device::open(options)?);
+        probe(&device, &job)?;
+        let mut pipeline = GpuPipeline::new(&device, &job)?;
+        let mut levels = Array3::zeros((3, height, width));
+        let bytes = levels.as_slice_mut().expect("standard layout");
+        let report = pipeline.process(&Frame::of(frame), bytes)?;
+        gpu::keep_programs(&device);
+        let times = report.times.unwrap_or_default();
+        Ok(HologramResult {
+            method: stage,
+            field: None,
+            levels,
+            words: None,
+            encoder,
+            scale: report.scale,
+            stages: vec![
+                ("input", times.input),
+                (stage, times.method),
+                ("propagate", times.propagate),
+                ("encode", times.encode),
+            ],
+            engine: Some(pipeline.describe()),
+        })
+    }
+}

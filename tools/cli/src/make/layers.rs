@@ -1,0 +1,142 @@
+//! The methods for layered depth images, on the CPU.
+
+use super::levels::{Out, described, levels_by, stack};
+use super::{HologramRequest, HologramResult, Method};
+use crate::flags::encoder::Encoder;
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::network::InputKind;
+use phasefront::{Display, Network};
+use phasefront_command::flags::PrecisionName;
+use phasefront_command::networks;
+use phasefront_command::terminal::progress_bar;
+use phasefront_exact::corrected::{self, Correction, spatial};
+use phasefront_exact::{point_based, sm_lbm};
+use phasefront_io::display::DisplayFile;
+use phasefront_io::display::calibration::AberrationFile;
+use phasefront_io::ldi::Ldi;
+use phasefront_io::{Error, Result};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Planes of the methods of exact waves.
+const DEFAULT_PLANES: usize = 256;
+
+/// A field that a method made.
+struct Wave {
+    stage: &'static str,
+    field: Array3<Complex32>,
+    engine: Option<String>,
+}
+
+impl HologramRequest {
+    /// Makes a hologram of `ldi` by a method for layered depth images.
+    pub(super) fn by_layers(
+        &self,
+        method: Method,
+        ldi: &Ldi,
+        file: &DisplayFile,
+        encoder: Encoder,
+    ) -> Result<HologramResult> {
+        let (height, width) = ldi.shape();
+        // A correction that is one for all depths is part of the offset; others are SM-LBM's work.
+        let (target, varying) = match (method, file.corrected()) {
+            (_, Ok(target)) => (target, None),
+            (Method::Layers, Err(_)) => (file.target.clone(), file.aberration.as_ref()),
+            (_, Err(e)) => return Err(e),
+        };
+        let display = &target.display;
+        let options = self.encoder_options(&encoder.options);
+        let modulator = Modulator::new((height, width), &target, &options)?;
+        let mut scratch = modulator.scratch();
+        let start = Instant::now();
+        let Wave {
+            stage,
+            mut field,
+            engine,
+        } = self.wave(method, ldi, display, varying)?;
+        let waved = Instant::now();
+        let shape = field.dim();
+        let values = field.as_slice_mut().expect("standard layout");
+        modulator.propagate(values, &mut scratch);
+        let propagate = waved.elapsed();
+        let kept = self.keeps_field.then(|| values.to_vec());
+        let (levels, words, modulation) = levels_by(display, (height, width), |out| match out {
+            Out::Bytes(bytes) => modulator.modulate(values, bytes, &mut scratch),
+            Out::Words(phases, words) => modulator.modulate_words(values, phases, words, &mut scratch),
+        });
+        Ok(HologramResult {
+            method: stage,
+            field: kept.map(|values| stack(values, shape)),
+            levels,
+            words,
+            encoder,
+            scale: modulation.scale,
+            stages: vec![
+                (stage, waved - start),
+                ("propagate", propagate),
+                ("encode", modulation.encode),
+            ],
+            engine,
+        })
+    }
+
+    /// The field that `method` makes of `ldi`, corrected for an aberration that varies over depth or over the frame.
+    fn wave(&self, method: Method, ldi: &Ldi, display: &Display, varying: Option<&AberrationFile>) -> Result<Wave> {
+        let (height, width) = ldi.shape();
+        let planes = self.planes.unwrap_or(DEFAULT_PLANES);
+        let bar = progress_bar(0, "");
+        let progress = |done: usize, total: usize| {
+            bar.set_length(total as u64);
+            bar.set_position(done as u64);
+        };
+        let mut engine = None;
+        let (stage, field) = match method {
+            Method::Core(_) => {
+                let plan = self.network_for_layers(display)?.plan_for(height, width, display)?;
+                let mut field = Array3::zeros((display.colours(), height, width));
+                let values = field.as_slice_mut().expect("standard layout");
+                plan.field(ldi, values, &mut plan.scratch())?;
+                engine = Some(described(plan.engine()));
+                ("network", field)
+            }
+            Method::Points => {
+                bar.set_message("rows");
+                let occlusion = self.occlusion.unwrap_or_default().occlusion();
+                let field = point_based::hologram(ldi, display, planes, occlusion, &progress)?;
+                ("points", field)
+            }
+            Method::Layers => {
+                bar.set_message("planes");
+                let field = match varying {
+                    None => sm_lbm::hologram(ldi, display, planes, &progress)?,
+                    Some(AberrationFile::Uniform(all)) => {
+                        let correction = Correction::of_aberrations(all, (height, width), planes, display)?;
+                        corrected::hologram(ldi, display, planes, &correction, &progress)?
+                    }
+                    Some(AberrationFile::Spatial(all)) => spatial::hologram(ldi, display, planes, all, &progress)?,
+                };
+                ("layers", field)
+            }
+        };
+        bar.finish_and_clear();
+        Ok(Wave { stage, field, engine })
+    }
+
+    /// The network of --network, which must take layers and be for `display`.
+    fn network_for_layers(&self, display: &Display) -> Result<Arc<Network>> {
+        let name = self.network.as_deref().ok_or_else(|| {
+            Error::Input("--method network with --ldi needs a --network for layered depth images".into())
+        })?;
+        let network = networks::network(name, self.precision.map(PrecisionName::precision))?;
+        if !matches!(network.input(), InputKind::Ldi { .. }) {
+            return Err(Error::Input(format!(
+                "--network {name} takes '{}'; for a layered depth image one for 'ldi2' to 'ldi9' is needed",
+                network.input()
+            )));
+        }
+        network.check_display(display)?;
+        Ok(network)
+    }
+}

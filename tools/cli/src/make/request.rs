@@ -1,0 +1,294 @@
+//! The request of a hologram: the flags that say of what it is made, and how.
+
+use crate::flags::backend::BackendFlags;
+use crate::flags::encoder::EncoderFlags;
+use crate::flags::frame::{FrameFlags, Picture};
+use crate::flags::method::CoreMethod;
+use crate::record::RunRecord;
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
+use phasefront::{Brightness, EncoderOptions, RgbdFrame};
+use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used};
+use phasefront_exact::point_based::Occlusion;
+use phasefront_io::display::DisplayFile;
+use phasefront_io::ldi::Ldi;
+use phasefront_io::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// What a hologram is made of, and how.
+#[derive(Args)]
+pub(crate) struct HologramRequest {
+    #[command(flatten)]
+    pub(super) frame: FrameFlags,
+    /// Folder of a layered depth image, for --method layers and points, and for a --network that takes layers
+    #[arg(long, value_name = "DIR", conflicts_with_all = FrameFlags::NAMES)]
+    pub(super) ldi: Option<PathBuf>,
+    /// How the midpoint hologram is made [default: auto; network with --network or --encoder deep, layers with --ldi
+    /// and no --network]
+    #[arg(long, value_enum)]
+    pub(super) method: Option<Method>,
+    /// A bundled network (`phasefront networks` lists them), or an ONNX file [default: 8]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(super) network: Option<String>,
+    /// Numbers that a bundled network computes in [default: int8]
+    #[arg(long, value_enum)]
+    pub(super) precision: Option<PrecisionName>,
+    /// Planes of --method layers and points [default: 256] and sweep [default: what suits the display]
+    #[arg(long, value_name = "N")]
+    pub(super) planes: Option<usize>,
+    /// Taps of the filter from plane to plane, for --method sweep [default: what suits planes and display]
+    #[arg(long, value_name = "N")]
+    pub(super) taps: Option<usize>,
+    /// What keeps light from where it should not go, for --method points [default: geometric]
+    #[arg(long, value_enum)]
+    pub(super) occlusion: Option<OcclusionName>,
+    #[command(flatten)]
+    pub(super) encoder: EncoderFlags,
+    /// The amplitude that full light stands for [default: the largest of the image]
+    #[arg(long, value_name = "A")]
+    pub(super) scale: Option<f32>,
+    #[command(flatten)]
+    pub(super) backend: BackendFlags,
+    #[command(flatten)]
+    pub(super) display: DisplayFlags,
+    /// Whether the field is asked for too.
+    #[arg(skip)]
+    pub(crate) keeps_field: bool,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Method {
+    Core(CoreMethod),
+    Layers,
+    Points,
+}
+
+impl ValueEnum for Method {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<Method>> = LazyLock::new(|| {
+            let core = CoreMethod::value_variants().iter().map(|method| Method::Core(*method));
+            core.chain([Method::Layers, Method::Points]).collect()
+        });
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Method::Core(method) => method.to_possible_value(),
+            Method::Layers => Some(PossibleValue::new("layers").help("Silhouette-mask layers: exact waves, slow")),
+            Method::Points => Some(PossibleValue::new("points").help("A sub-hologram for each point (Maimone et al.)")),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Default, ValueEnum)]
+pub(super) enum OcclusionName {
+    /// Nothing: every point of every layer lights its whole sub-hologram
+    None,
+    /// The image: only points of the front layer shine
+    Input,
+    /// Rays: every point shines where no nearer surface is in the way
+    #[default]
+    Geometric,
+}
+
+impl OcclusionName {
+    pub(super) fn occlusion(self) -> Occlusion {
+        match self {
+            OcclusionName::None => Occlusion::None,
+            OcclusionName::Input => Occlusion::Input,
+            OcclusionName::Geometric => Occlusion::Geometric,
+        }
+    }
+}
+
+/// What a hologram is made of.
+pub(crate) enum Image {
+    /// An RGB-D image.
+    Rgbd(RgbdFrame),
+    /// A layered depth image.
+    Layers(Ldi),
+}
+
+impl HologramRequest {
+    /// The names of the flags besides those of [`FrameFlags`] and the display, for what takes their place.
+    pub(crate) const NAMES: [&str; 15] = [
+        "ldi",
+        "method",
+        "network",
+        "precision",
+        "planes",
+        "taps",
+        "occlusion",
+        "encoder",
+        "prefilter",
+        "dark_threshold",
+        "local_steps",
+        "midpoint_steps",
+        "scale",
+        "backend",
+        "gpu",
+    ];
+
+    /// Of images that are read already, for `display`.
+    pub fn of(display: DisplayFlags) -> Self {
+        HologramRequest {
+            frame: FrameFlags::default(),
+            ldi: None,
+            method: None,
+            network: None,
+            precision: None,
+            planes: None,
+            taps: None,
+            occlusion: None,
+            encoder: EncoderFlags::default(),
+            scale: None,
+            backend: BackendFlags::default(),
+            display,
+            keeps_field: false,
+        }
+    }
+
+    /// The same image another way.
+    pub(crate) fn set_method(&mut self, method: Method, network: Option<String>, encoder: EncoderFlags) {
+        (self.method, self.network, self.encoder) = (Some(method), network, encoder);
+        (self.planes, self.precision) = (None, None);
+    }
+
+    /// With so many planes.
+    pub(crate) fn with_planes(&mut self, planes: usize) {
+        self.planes = Some(planes);
+    }
+
+    /// By a network in floating point.
+    pub(crate) fn in_float32(&mut self) {
+        self.precision = Some(PrecisionName::F32);
+    }
+
+    pub(crate) fn display(&self) -> Result<DisplayFile> {
+        self.display.read()
+    }
+
+    /// Notes all but which picture it is of.
+    pub(crate) fn record(&self, display: &phasefront::Display, record: &mut RunRecord) -> Result<()> {
+        let HologramRequest {
+            frame,
+            ldi: _, // It is one picture.
+            method,
+            network,
+            precision,
+            planes,
+            taps,
+            occlusion,
+            encoder,
+            scale,
+            backend,
+            display: flags,
+            keeps_field: _,
+        } = self;
+        frame.record(record)?;
+        record.choice("--method", method.as_ref());
+        record.name_or_file("--network", network.as_deref())?;
+        record.choice("--precision", Some(&precision.unwrap_or_default()));
+        record.set("--planes", *planes);
+        record.set("--taps", *taps);
+        record.choice("--occlusion", Some(&occlusion.unwrap_or_default()));
+        encoder.record(record)?;
+        record.set("--scale", *scale);
+        backend.record(record);
+        record.display(flags.name(), display)
+    }
+
+    /// The pictures of folders, where folders are given.
+    pub(crate) fn pictures(&self) -> Result<Option<Vec<Picture>>> {
+        self.frame.pictures()
+    }
+
+    /// The folders that pictures are from.
+    pub(crate) fn folders(&self) -> impl Iterator<Item = &Path> {
+        self.frame.folders()
+    }
+
+    /// Turns to one picture of a folder.
+    pub(crate) fn take(&mut self, picture: &Picture) {
+        self.frame.take(picture);
+    }
+
+    pub(crate) fn is_for_a_display(&self) -> bool {
+        self.display.is_given()
+    }
+
+    pub(crate) fn display_if_given(&self) -> Result<Option<DisplayFile>> {
+        self.display.read_if_given()
+    }
+
+    /// The file that the image is from.
+    pub(crate) fn source(&self) -> Option<&Path> {
+        self.ldi.as_deref().or(self.frame.source())
+    }
+
+    /// What the flags ask for.
+    pub(super) fn method(&self) -> Method {
+        self.method.unwrap_or(match (&self.ldi, &self.network) {
+            (Some(_), None) => Method::Layers,
+            (None, None) if !self.encoder.is_deep() => Method::Core(CoreMethod::Auto),
+            _ => Method::Core(CoreMethod::Network),
+        })
+    }
+
+    /// Refuses flags that the method does not take.
+    fn check_flags(&self) -> Result<()> {
+        use CoreMethod::{Auto, Network, Sweep};
+        let method = self.method();
+        let any = |of: &[CoreMethod]| matches!(method, Method::Core(core) if of.contains(&core));
+        let (sweeps, trained) = (any(&[Sweep, Auto]), any(&[Network, Auto]));
+        let planes = sweeps || matches!(method, Method::Layers | Method::Points);
+        let network = "--method network or auto";
+        check_used(&[
+            ("--network", self.network.is_some(), trained, network),
+            ("--precision", self.precision.is_some(), trained, network),
+            (
+                "--planes",
+                self.planes.is_some(),
+                planes,
+                "--method sweep, auto, layers or points",
+            ),
+            ("--taps", self.taps.is_some(), sweeps, "--method sweep or auto"),
+            (
+                "--occlusion",
+                self.occlusion.is_some(),
+                method == Method::Points,
+                "--method points",
+            ),
+        ])
+    }
+
+    /// The image for `display`.
+    pub(crate) fn image(&self, display: &DisplayFile) -> Result<Image> {
+        self.check_flags()?;
+        if let (Some(Method::Core(method)), Some(_)) = (self.method, &self.ldi)
+            && method != CoreMethod::Network
+        {
+            return Err(Error::Input(
+                "--method sweep and auto take --rgb and --depth; for a layered depth image use --method layers or points, or a --network for layers"
+                    .into(),
+            ));
+        }
+        match &self.ldi {
+            Some(dir) => Ok(Image::Layers(
+                Ldi::read(dir)?.for_display(&display.target.display).into_owned(),
+            )),
+            None => Ok(Image::Rgbd(
+                self.frame.read(&display.target.display, self.display.is_given())?,
+            )),
+        }
+    }
+
+    pub(super) fn encoder_options(&self, usual: &EncoderOptions) -> EncoderOptions {
+        EncoderOptions {
+            brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
+            ..usual.clone()
+        }
+    }
+}

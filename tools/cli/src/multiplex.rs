@@ -1,0 +1,235 @@
+//! Time multiplexing: several phase maps of one wave, shown so fast one after another that the eye sees their mean
+//! intensity.
+//!
+//! Maps differ in what an encoder may choose freely: which pixels of the checkerboard get φ + acos A (its parity), and
+//! a constant phase, by which levels round otherwise. With feedback each map is made for what the mean of those before
+//! it lacks: after k maps of intensities I₁ … I_k the next one is to show (k + 1)·I − ΣI_j at the midpoint, where I is
+//! the wave's, with the wave's phase.
+
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::unstable::encode::Encoder;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
+use phasefront::unstable::wave::aperture::Opening;
+use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront::{EncoderOptions, Target};
+use phasefront_exact::truth::{self, Figures};
+use phasefront_io::Result;
+use std::f32::consts::TAU;
+
+/// What differs from map to map.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Differ {
+    /// Parity and constant phase.
+    pub start: bool,
+    /// Each map is made for what the mean of those before it lacks.
+    pub feedback: bool,
+}
+
+/// Makes the maps of one wave after another.
+pub struct Multiplex<'a> {
+    shape: (usize, usize),
+    target: &'a Target,
+    encoder: Encoder,
+    /// From the modulator to the midpoint through the aperture, and back.
+    ways: [Vec<Propagator>; 2],
+}
+
+/// One phase map.
+#[derive(Debug, Clone)]
+pub struct Map {
+    /// Levels, (C, H, W).
+    pub levels: Array3<u8>,
+    /// The amplitude that full light stands for.
+    pub scale: f32,
+}
+
+/// How far feedback goes: what a map is to show is at most so many times the wave's intensity.
+const MOST: f32 = 4.0;
+
+impl<'a> Multiplex<'a> {
+    /// Plans maps of (C, H, W) = `shape` waves for `target`.
+    ///
+    /// # Errors
+    /// What the encoder refuses; an offset too far away.
+    pub fn new(shape: (usize, usize), target: &'a Target, options: &EncoderOptions) -> Result<Self> {
+        let display = &target.display;
+        let way = |distance_m: f64| {
+            let (pitch_m, wavelengths_m) = (display.pitch_m(), display.wavelengths_m());
+            Propagator::for_colours(shape.0, shape.1, pitch_m, wavelengths_m, distance_m, Padding::Reach)
+        };
+        Ok(Multiplex {
+            shape,
+            target,
+            encoder: Encoder::new(shape, target, options)?,
+            ways: [way(-display.offset_m())?, way(display.offset_m())?],
+        })
+    }
+
+    /// `count` maps of `wave`, (C, H, W), at the modulator.
+    pub fn maps(&self, wave: &Array3<Complex32>, count: usize, differ: Differ) -> Vec<Map> {
+        let wave = wave.as_slice().expect("standard layout");
+        let [there, back] = &self.ways;
+        let mut middle = wave.to_vec();
+        self.pass(there, &mut middle);
+        let mut scratch = self.encoder.scratch();
+        let mut phases = vec![0.0; wave.len()];
+        let (mut sum, mut scale) = (vec![0.0f32; wave.len()], None);
+        let mut maps = Vec::with_capacity(count);
+        for n in 0..count {
+            let mut field = match n {
+                _ if n == 0 || !differ.feedback => wave.to_vec(),
+                _ => {
+                    let mut field: Vec<Complex32> = (middle.iter().zip(&sum))
+                        .map(|(value, sum)| {
+                            let wanted = value.norm_sqr();
+                            let lacking = (wanted * (n + 1) as f32 - sum).clamp(0.0, MOST * wanted);
+                            value * (lacking / wanted.max(1e-12)).sqrt()
+                        })
+                        .collect();
+                    self.pass(back, &mut field);
+                    field
+                }
+            };
+            let (odd, turn) = match differ.start {
+                true => (n % 2 == 1, (n as f32 * GOLDEN).fract() * TAU),
+                false => (false, 0.0),
+            };
+            // Double phase of the conjugate, taken back, is double phase with the other parity.
+            if odd {
+                field.iter_mut().for_each(|value| *value = value.conj());
+            }
+            // The scale of the first, so that all maps are of one brightness.
+            let used = self.encoder.encode(&mut field, scale, &mut phases, &mut scratch);
+            scale = Some(used);
+            let response = &self.target.response;
+            let mut levels = Array3::zeros((there.len(), self.shape.0, self.shape.1));
+            for (at, (level, phase)) in levels.iter_mut().zip(&phases).enumerate() {
+                let phase = if odd { -phase } else { *phase };
+                *level = response.level((phase + turn).rem_euclid(TAU).min(TAU.next_down()), at);
+            }
+            let map = Map { levels, scale: used };
+            if differ.feedback && n + 1 < count {
+                let mut shown = self.shown(&map);
+                self.pass(there, &mut shown);
+                sum.iter_mut()
+                    .zip(&shown)
+                    .for_each(|(sum, value)| *sum += value.norm_sqr());
+            }
+            maps.push(map);
+        }
+        maps
+    }
+
+    /// The light behind the modulator.
+    fn shown(&self, map: &Map) -> Vec<Complex32> {
+        let mut field = vec![Complex32::ZERO; map.levels.len()];
+        let levels = map.levels.as_slice().expect("standard layout");
+        phase_only_field(levels, &self.target.response, map.scale, &mut field);
+        field
+    }
+
+    fn pass(&self, way: &[Propagator], field: &mut [Complex32]) {
+        let (mut scratch, radius) = (way[0].scratch(), self.target.display.aperture_radius());
+        for (way, plane) in way.iter().zip(field.chunks_exact_mut(self.shape.0 * self.shape.1)) {
+            way.propagate_through(plane, radius, &mut scratch);
+        }
+    }
+
+    /// What the eye sees of the first of `maps`, as many as each of `counts` says, against `wave` itself: the midpoint,
+    /// and a stack of four depths.
+    ///
+    /// # Errors
+    /// A depth too far away.
+    pub fn judge(&self, wave: &Array3<Complex32>, maps: &[Map], counts: &[usize]) -> Result<Vec<Figures>> {
+        let (height, width) = self.shape;
+        let display = &self.target.display;
+        let z_m = truth::judged_z_m(display);
+        let opening = Opening::centred(display.aperture_radius());
+        let plan = Refocus::new(height, width, display, &z_m, Some(opening))?;
+        let stack = |plan: &Refocus, field: &[Complex32]| -> Result<Vec<Array3<f32>>> {
+            let views = plan.focal_stack(field, &z_m)?.into_iter();
+            Ok(views
+                .map(|view| {
+                    Array3::from_shape_vec((display.colours(), height, width), view)
+                        .expect("a view of the wave's shape")
+                })
+                .collect())
+        };
+        let free = Refocus::new(height, width, display, &z_m, None)?;
+        let truth = stack(&free, wave.as_slice().expect("standard layout"))?;
+        let mut sums = vec![Array3::<f32>::zeros(wave.dim()); z_m.len()];
+        let mut figures = Vec::new();
+        for (n, map) in maps.iter().enumerate() {
+            let views = stack(&plan, &self.shown(map))?;
+            for (sum, view) in sums.iter_mut().zip(views) {
+                *sum += &(&view * &view);
+            }
+            if counts.contains(&(n + 1)) {
+                let seen: Vec<_> = sums
+                    .iter()
+                    .map(|sum| sum.mapv(|sum| (sum / (n + 1) as f32).sqrt()))
+                    .collect();
+                figures.push(truth::judge(&seen, &truth, 0)?);
+            }
+        }
+        Ok(figures)
+    }
+}
+
+/// Multiples of it lie evenly in a turn, however many there are.
+const GOLDEN: f32 = 0.618_034;
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use phasefront::{Display, Encoding};
+
+    /// A wave of smooth light with edges.
+    fn wave((height, width): (usize, usize)) -> Array3<Complex32> {
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+            let edge = if (x / 16 + y / 12 + c) % 2 == 0 { 0.8 } else { 0.25 };
+            let ripple = 0.1 * (x as f32 * 0.21 + c as f32).sin();
+            Complex32::from_polar(edge + ripple, 0.3 * (y as f32 * 0.1).sin())
+        })
+    }
+
+    #[test]
+    fn the_mean_of_maps_is_nearer_to_the_wave_than_one_map() {
+        let (height, width) = (48, 64);
+        let display = Display::from_toml("width = 64\nheight = 48\nbits = 4").unwrap();
+        let target = Target::from(display);
+        let options = EncoderOptions::from(Encoding::ANTI_ALIAS);
+        let plan = Multiplex::new((height, width), &target, &options).unwrap();
+        let wave = wave((height, width));
+        let alone = Differ {
+            start: false,
+            feedback: false,
+        };
+        let repeated = plan.maps(&wave, 2, alone);
+        assert_eq!(repeated[0].levels, repeated[1].levels);
+        for differ in [
+            Differ {
+                start: true,
+                feedback: false,
+            },
+            Differ {
+                start: true,
+                feedback: true,
+            },
+        ] {
+            let maps = plan.maps(&wave, 8, differ);
+            assert_eq!(maps[0].levels, repeated[0].levels);
+            assert!(maps[1..].iter().all(|map| map.levels != maps[0].levels));
+            let figures = plan.judge(&wave, &maps, &[1, 8]).unwrap();
+            assert_eq!(figures.len(), 2);
+            assert!(
+                figures[1].amplitude_psnr > figures[0].amplitude_psnr + 1.0,
+                "{differ:?}: {} {}",
+                figures[0].amplitude_psnr,
+                figures[1].amplitude_psnr
+            );
+        }
+    }
+}

@@ -1,0 +1,277 @@
+//! The record of a folder of holograms: all flags that decide what its files hold. It lies beside them, so that
+//! --resume does not mix the holograms of two requests.
+
+use clap::ValueEnum;
+use phasefront_io::fingerprint::Fingerprint;
+use phasefront_io::output::Holding;
+use phasefront_io::{Error, Result, display, input};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+use std::fs::{File, TryLockError};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// The file of the record in its folder.
+pub(crate) const FILE: &str = "request.json";
+/// Most bytes of the file: flags are short.
+const MOST_BYTES: u64 = 1 << 20;
+/// The key of the version that wrote a record, by which the file is recognised.
+const VERSION: &str = "phasefront";
+
+/// Flags by name, and what they are set to: a text, or whether a switch is given; null is a flag's default.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RunRecord(BTreeMap<String, Value>);
+
+impl RunRecord {
+    /// Of `command`, without flags.
+    pub(crate) fn new(command: &str) -> Self {
+        let mut record = RunRecord(BTreeMap::new());
+        record.set(VERSION, Some(env!("CARGO_PKG_VERSION")));
+        record.set("command", Some(command));
+        record
+    }
+
+    pub(crate) fn set(&mut self, flag: &str, value: Option<impl Display>) {
+        // Text, for numbers that are written and read may differ in their last bit.
+        let value = value.map(|value| value.to_string());
+        self.0.insert(flag.to_owned(), value.into());
+    }
+
+    pub(crate) fn switch(&mut self, flag: &str, is_given: bool) {
+        self.0.insert(flag.to_owned(), is_given.into());
+    }
+
+    pub(crate) fn choice(&mut self, flag: &str, value: Option<&impl ValueEnum>) {
+        let name = value.and_then(ValueEnum::to_possible_value);
+        self.set(flag, name.as_ref().map(|name| name.get_name()));
+    }
+
+    /// The display of --display, and the files that it is in.
+    pub(crate) fn display(&mut self, name: Option<&str>, display: &phasefront::Display) -> Result<()> {
+        self.set("--display", name.filter(|name| display::display_path(name).is_none()));
+        let values = serde_json::to_value(display).map_err(|e| Error::Input(e.to_string()))?;
+        for (key, value) in values.as_object().into_iter().flatten() {
+            self.set(&format!("display {key}"), Some(value));
+        }
+        let files = name.map(display_files).transpose()?.unwrap_or_default();
+        for (key, file) in files {
+            self.set(&format!("display {key}"), Some(file));
+        }
+        Ok(())
+    }
+
+    /// A file: its name without folders, and its content.
+    pub(crate) fn file(&mut self, flag: &str, path: Option<&Path>) -> Result<()> {
+        let value = path.map(described).transpose()?;
+        self.set(flag, value);
+        Ok(())
+    }
+
+    /// A name that a file may stand for, as --network has it.
+    pub(crate) fn name_or_file(&mut self, flag: &str, name: Option<&str>) -> Result<()> {
+        match name.map(Path::new).filter(|path| path.is_file()) {
+            Some(path) => self.file(flag, Some(path)),
+            None => {
+                self.set(flag, name);
+                Ok(())
+            }
+        }
+    }
+
+    /// By what holograms of this record are recognised.
+    pub(crate) fn fingerprint(&self) -> Fingerprint {
+        Fingerprint::of(self.text().as_bytes())
+    }
+
+    fn text(&self) -> String {
+        serde_json::to_string_pretty(&self.0).expect("keys are text") + "\n"
+    }
+
+    fn read(text: &str) -> Option<Self> {
+        let values: BTreeMap<String, Value> = serde_json::from_str(text).ok()?;
+        values.contains_key(VERSION).then_some(RunRecord(values))
+    }
+
+    /// What differs first between `earlier` and this record, said of both.
+    fn difference(&self, earlier: &Self) -> Option<[String; 2]> {
+        let flags = self.0.keys().chain(earlier.0.keys());
+        let differing = flags
+            .into_iter()
+            .find(|flag| self.0.get(*flag) != earlier.0.get(*flag))?;
+        Some([earlier, self].map(|record| said(differing, record.0.get(differing))))
+    }
+}
+
+/// A flag as the command line has it.
+fn said(flag: &str, value: Option<&Value>) -> String {
+    match value {
+        None | Some(Value::Null | Value::Bool(false)) => format!("no {flag}"),
+        Some(Value::Bool(true)) => flag.to_owned(),
+        Some(Value::String(text)) => format!("{flag} {text}"),
+        Some(value) => format!("{flag} {value}"),
+    }
+}
+
+fn described(path: &Path) -> Result<String> {
+    let content = Fingerprint::of(&input::read_file(path)?);
+    Ok(format!(
+        "{} ({content})",
+        path.file_name().unwrap_or_default().display()
+    ))
+}
+
+/// The files of a display: its TOML, and those that it names.
+fn display_files(name: &str) -> Result<BTreeMap<String, String>> {
+    let mut all = BTreeMap::new();
+    let Some(path) = display::display_path(name) else {
+        return Ok(all);
+    };
+    all.insert("file".to_owned(), described(&path)?);
+    let text = String::from_utf8_lossy(&input::read_file(&path)?).into_owned();
+    let table: toml::Table = toml::from_str(&text).unwrap_or_default();
+    let mut values: Vec<(String, toml::Value)> = table.into_iter().collect();
+    while let Some((key, value)) = values.pop() {
+        match value {
+            toml::Value::Table(table) => values.extend(table.into_iter().map(|(name, v)| (format!("{key}.{name}"), v))),
+            toml::Value::String(name) if path.with_file_name(&name).is_file() => {
+                all.insert(key, described(&path.with_file_name(name))?);
+            }
+            _ => {}
+        }
+    }
+    Ok(all)
+}
+
+/// What becomes of the holograms that lie in a folder already.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Before {
+    /// The command stops.
+    Refuse,
+    /// They stay, and what is missing is made.
+    Resume,
+    /// They are replaced.
+    Overwrite,
+}
+
+impl Before {
+    pub(crate) fn of_flags(resume: bool, overwrite: bool) -> Self {
+        match (resume, overwrite) {
+            (true, _) => Before::Resume,
+            (_, true) => Before::Overwrite,
+            _ => Before::Refuse,
+        }
+    }
+
+    /// What the folder may hold that is filled.
+    pub(crate) fn holding(self) -> Holding<'static> {
+        match self {
+            Before::Overwrite => Holding::Anything,
+            _ => Holding::RunOf(FILE),
+        }
+    }
+}
+
+/// A folder that one run at a time writes into.
+pub(crate) struct Claim {
+    /// Locked as long as the run lasts; a killed run's lock goes with it.
+    _request: File,
+    /// Whether an earlier run of the same record is resumed.
+    pub(crate) resumes: bool,
+}
+
+impl Claim {
+    /// Makes `folder`, and keeps other runs out of it. `is_made` knows the names of what a run makes there.
+    ///
+    /// # Errors
+    /// Another run in the folder; files of an earlier one, unless `before` allows them and the record is the same.
+    pub(crate) fn new(
+        folder: &Path,
+        record: &RunRecord,
+        before: Before,
+        is_made: impl Fn(&str) -> bool,
+    ) -> Result<Self> {
+        let path = folder.join(FILE);
+        let refuse = |e: std::io::Error| Error::file(&path, format!("cannot be written: {e}"));
+        std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, format!("cannot be made: {e}")))?;
+        if path.exists() && !path.is_file() {
+            return Err(Error::file(
+                path,
+                "is no regular file; give a folder of its own to what is made",
+            ));
+        }
+        let mut file = File::options()
+            .read(true)
+            .write(true)
+            .create(true)
+            .truncate(false)
+            .open(&path)
+            .map_err(refuse)?;
+        // A file system without locks lets every run in.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(Error::file(
+                folder,
+                "another run is writing there; wait for it, or give another folder",
+            ));
+        }
+        let mut text = String::new();
+        let readable = (&file).take(MOST_BYTES).read_to_string(&mut text).is_ok();
+        let earlier = RunRecord::read(&text);
+        if !(text.is_empty() || earlier.is_some()) || !readable {
+            return Err(Error::file(
+                path,
+                "is no request of phasefront; give another folder, or remove the file",
+            ));
+        }
+        // Not before the lock: another run may just have ended.
+        let made = names_of(folder)?.iter().any(|name| is_made(name));
+        let resumes = before == Before::Resume && made;
+        match before {
+            Before::Refuse if made => return Err(already(folder)),
+            Before::Resume if resumes => check(folder, record, earlier.as_ref())?,
+            _ => {
+                file.rewind().and_then(|()| file.set_len(0)).map_err(refuse)?;
+                file.write_all(record.text().as_bytes()).map_err(refuse)?;
+                file.sync_all().map_err(refuse)?;
+            }
+        }
+        Ok(Claim {
+            _request: file,
+            resumes,
+        })
+    }
+}
+
+/// Files that are there already.
+pub(crate) fn already(path: &Path) -> Error {
+    Error::file(
+        path,
+        "holds what an earlier run made; --resume goes on with it, --overwrite makes it anew",
+    )
+}
+
+fn check(folder: &Path, record: &RunRecord, earlier: Option<&RunRecord>) -> Result<()> {
+    let Some(earlier) = earlier else {
+        return Err(Error::file(
+            folder,
+            format!("holds an empty {FILE} beside what an earlier run made; --overwrite makes it anew"),
+        ));
+    };
+    match record.difference(earlier) {
+        None => Ok(()),
+        Some([earlier, now]) => Err(Error::file(
+            folder,
+            format!(
+                "was made with {earlier}, this run has {now}; --resume needs the same flags, --overwrite begins anew"
+            ),
+        )),
+    }
+}
+
+/// The names of the files in `folder`.
+pub(crate) fn names_of(folder: &Path) -> Result<Vec<String>> {
+    let refuse = |e: std::io::Error| Error::file(folder, format!("cannot be read: {e}"));
+    let entries = std::fs::read_dir(folder).map_err(refuse)?;
+    let name = |path: PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    entries.map(|entry| Ok(name(entry.map_err(refuse)?.path()))).collect()
+}

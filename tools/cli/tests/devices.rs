@@ -1,0 +1,383 @@
+//! From an image to what each modulator takes, and back; one line for each thing that is wrong.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../tests/folder.rs"]
+mod folder;
+
+use folder::Folder;
+use phasefront::device::{Device, Packing};
+use phasefront_io::hologram::packed::Image;
+use phasefront_io::hologram::{self, Hologram};
+use phasefront_io::picture;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+/// Writes `rgb.png` and `depth.png`.
+fn frame(folder: &Folder, (width, height): (u32, u32)) {
+    let rgb = image::RgbImage::from_fn(width, height, |x, y| image::Rgb([(x * 5) as u8, (y * 7) as u8, 90]));
+    rgb.save(folder.path("rgb.png")).unwrap();
+    let depth = image::GrayImage::from_fn(width, height, |x, _| {
+        image::Luma([if x < width / 2 { 30 } else { 220 }])
+    });
+    depth.save(folder.path("depth.png")).unwrap();
+}
+
+fn levels(path: &Path) -> Vec<u16> {
+    match hologram::read_hologram(path).unwrap() {
+        Hologram::PhaseOnly(levels, _) => levels.iter().map(|level| u16::from(*level)).collect(),
+        Hologram::Words(levels, _) => levels.iter().copied().collect(),
+        Hologram::Complex(..) => panic!("levels were written"),
+    }
+}
+
+#[test]
+fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
+    for name in Device::names() {
+        let device = Device::shipped(name).unwrap();
+        let folder = Folder::new();
+        // Cells need every pixel; elsewhere a small hologram stands in the middle.
+        let (size, fit) = match device.packing {
+            Packing::BitPlanes(_) => (
+                (device.display.width(), device.display.height()),
+                &["--fit", "cover"][..],
+            ),
+            _ => ((48, 32), &[][..]),
+        };
+        frame(&folder, (48, 32));
+        let size = format!("{}x{}", size.0, size.1);
+        let made = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "sweep",
+            "--planes",
+            "8",
+        ];
+        let to = ["--display", name, "--packed", "frame.png", "-o", "hologram.png"];
+        folder.succeeds(&[&made[..], fit, &to].concat());
+        let frames = match folder.path("frame.png").exists() {
+            true => vec!["frame.png"],
+            false => vec!["frame-red.png", "frame-green.png", "frame-blue.png"],
+        };
+        let back = ["--display", name, "--size", &size, "-o", "back.png"];
+        folder.succeeds(&[&["unpack"], &frames[..], &back].concat());
+        let hologram = levels(&folder.path("hologram.png"));
+        assert_eq!(levels(&folder.path("back.png")), hologram, "{name}");
+        let most = hologram.iter().max().unwrap();
+        let highest = (1u16 << device.display.bits()) - 1;
+        assert!(*most <= highest && *most > highest / 2, "{name}: {most}");
+        // By hand it is the same frame.
+        folder.succeeds(&["pack", "hologram.png", "--display", name, "-o", "frame_.png"]);
+        let again = frames[0].replace("frame", "frame_");
+        let [packed, again] = [frames[0], &again].map(|name| fs::read(folder.path(name)).unwrap());
+        assert_eq!(packed, again, "{name}");
+        folder.succeeds(&["refocus", "hologram.png", "--z-mm", "0", "-o", "view.png"]);
+    }
+}
+
+#[test]
+fn a_view_is_not_turned_by_what_the_panel_adds() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    let flat = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(x * 3 + y * y) as u8]));
+    flat.save(folder.path("flat.bmp")).unwrap();
+    let plain = "width = 64\nheight = 48\n";
+    fs::write(folder.path("plain.toml"), plain).unwrap();
+    let added = "carrier_mrad = [6.0, -2.0]\nlens_mm = 400\nflatness = \"flat.bmp\"\n";
+    fs::write(folder.path("added.toml"), format!("{plain}{added}")).unwrap();
+    fs::write(folder.path("over.toml"), format!("{plain}range_turns = 1.7\n")).unwrap();
+    let mut views = Vec::new();
+    for name in ["plain", "added", "over"] {
+        let (toml, hologram, view) = (
+            format!("{name}.toml"),
+            format!("{name}.png"),
+            format!("{name}-view.png"),
+        );
+        let frame = [
+            "hologram",
+            "--rgb",
+            "rgb.png",
+            "--depth",
+            "depth.png",
+            "--method",
+            "sweep",
+        ];
+        folder.succeeds(&[&frame[..], &["--display", &toml, "-o", &hologram]].concat());
+        folder.succeeds(&["refocus", &hologram, "--display", &toml, "--z-mm", "0", "-o", &view]);
+        views.push(picture::read_rgb(&folder.path(&view)).unwrap());
+    }
+    assert_ne!(levels(&folder.path("plain.png")), levels(&folder.path("added.png")));
+    assert!(
+        levels(&folder.path("over.png")).iter().any(|level| *level > 170),
+        "beyond one turn"
+    );
+    for other in &views[1..] {
+        let alike = phasefront_io::metrics::compare(other.view(), views[0].view()).unwrap();
+        assert!(alike.psnr_overall > 35.0, "{}", alike.psnr_overall);
+    }
+    // Without its file such a hologram cannot be looked at.
+    let errors = folder.fails(&["refocus", "added.png", "--z-mm", "0", "-o", "v.png"], 1);
+    assert!(errors.contains("--display"), "{errors}");
+}
+
+#[test]
+fn maps_of_one_image_become_bit_planes() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    let cells = "{ memory = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12], layout = [[2, 3], [0, 1]] }";
+    let toml = format!("width = 64\nheight = 48\nbits = 4\npacking = {cells}\n");
+    fs::write(folder.path("plm.toml"), toml).unwrap();
+    let image = [
+        "multiplex",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "--display",
+        "plm.toml",
+    ];
+    let more = [
+        "--maps",
+        "8",
+        "--packed",
+        "frame.png",
+        "--judge",
+        "--json",
+        "-o",
+        "maps",
+    ];
+    let told: serde_json::Value = serde_json::from_str(&folder.succeeds(&[&image[..], &more].concat())).unwrap();
+    let shown = told["shown"].as_array().unwrap();
+    assert_eq!(shown.len(), 4);
+    assert!(shown[3]["psnr_db"].as_f64() > shown[0]["psnr_db"].as_f64());
+    // The first plane of each channel is the first map of its colour, also by hand.
+    folder.succeeds(&["unpack", "frame.png", "--display", "plm.toml", "-o", "first.png"]);
+    assert_eq!(
+        levels(&folder.path("first.png")),
+        levels(&folder.path("maps/phase_000.png"))
+    );
+    let maps: Vec<String> = (0..8).map(|n| format!("maps/phase_{n:03}.png")).collect();
+    let maps: Vec<&str> = maps.iter().map(String::as_str).collect();
+    let green = ["--colour", "green", "--display", "plm.toml", "-o", "green.png"];
+    folder.succeeds(&[&["pack"], &maps[..], &green].concat());
+    assert_eq!(Image::read(&folder.path("green.png")).unwrap().shape, (96, 128));
+    let errors = folder.fails(&[&["pack"], &maps[..5], &green].concat(), 1);
+    assert!(errors.contains("24"), "{errors}");
+}
+
+#[test]
+fn what_is_wrong_is_one_line() {
+    let folder = Folder::new();
+    frame(&folder, (48, 32));
+    let files = [
+        ("key.toml", "widht = 48"),
+        ("bits.toml", "bits = 12"),
+        ("packing.toml", "packing = \"gray\""),
+        ("flat.toml", "width = 48\nheight = 32\nflatness = \"rgb.png\""),
+        ("size.toml", "width = 48\nheight = 33\nflatness = \"depth.png\""),
+        ("steep.toml", "width = 48\nheight = 32\ncarrier_mrad = [90, 0]"),
+        ("scale.toml", "width = 48\nheight = 32\nscale = [1, 2, 1]"),
+    ];
+    for (name, text) in files {
+        fs::write(folder.path(name), text).unwrap();
+    }
+    let hologram = [
+        "hologram",
+        "--rgb",
+        "rgb.png",
+        "--depth",
+        "depth.png",
+        "--method",
+        "sweep",
+        "-o",
+        "h.png",
+    ];
+    for (display, word) in [
+        ("key.toml", "widht"),
+        ("bits.toml", "bits is 12"),
+        ("packing.toml", "gray"),
+        ("flat.toml", "grey"),
+        ("size.toml", "48×33"),
+        ("steep.toml", "0.5"),
+        ("scale.toml", "scale"),
+        ("santec", "santec-slm-200"),
+        ("none.toml", "none.toml"),
+    ] {
+        let errors = folder.fails(&[&hologram[..], &["--display", display]].concat(), 1);
+        assert!(
+            errors.contains(word) && errors.lines().count() == 1,
+            "{display}: {errors}"
+        );
+        assert!(!folder.path("h.png").exists());
+    }
+    // A panel under 2π is encoded for what it can, and that is told.
+    fs::write(folder.path("short.toml"), "width = 48\nheight = 32\nrange_turns = 0.8").unwrap();
+    let output = folder.run(&[&hologram[..], &["--display", "short.toml"]].concat());
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && told.contains("reach 0.80 of 2π"), "{told}");
+    folder.succeeds(&[&hologram[..], &["--display", "holoeye-pluto"]].concat());
+    for (arguments, word) in [
+        (
+            &["pack", "h.png", "--display", "santec-slm-200", "-o", "f.png"][..],
+            "8 bits",
+        ),
+        (&["pack", "h.png", "--display", "ti-plm-p47", "-o", "f.png"], "bits"),
+        (
+            &["pack", "rgb.png", "--display", "holoeye-pluto", "-o", "f.png"],
+            "hologram",
+        ),
+        (
+            &["unpack", "rgb.png", "--display", "holoeye-gaea-2", "-o", "f.png"],
+            "3840×2160",
+        ),
+        (&["unpack", "rgb.png", "--display", "holoeye-pluto", "-o", "f.png"], "3"),
+        (&["link", "pattern", "--size", "100x100", "-o", "f.png"], "512"),
+        (&["link", "read", "rgb.png"], "512"),
+        (&["show", "none.png"], "none.png"),
+        (&["show", "rgb.png", "--rate", "0"], "--rate"),
+    ] {
+        let errors = folder.fails(arguments, 1);
+        assert!(
+            errors.contains(word) && errors.lines().count() == 1,
+            "{arguments:?}: {errors}"
+        );
+    }
+}
+
+/// Writes the files of a display and of displays that differ from it.
+fn write_displays(folder: &Folder) {
+    for (name, text) in [
+        ("own", ""),
+        ("near", "pitch_um = 8.000001\nwavelengths_nm = [638.000001, 520, 450]\n"),
+        ("fine", "pitch_um = 3.74\n"),
+        ("lasers", "wavelengths_nm = [660, 532, 450]\n"),
+        ("bits", "bits = 4\n"),
+        ("calibrated", "lut = \"lut.txt\"\ncarrier_mrad = [2, 0]\n"),
+    ] {
+        let toml = format!("width = 64\nheight = 48\n{text}");
+        fs::write(folder.path(&format!("{name}.toml")), toml).unwrap();
+    }
+    let levels: Vec<_> = (0..256).map(|level: u16| (255 - level).to_string()).collect();
+    fs::write(folder.path("lut.txt"), levels.join(" ")).unwrap();
+}
+
+#[test]
+fn a_hologram_is_for_the_display_that_it_was_made_for() {
+    let folder = Folder::new();
+    frame(&folder, (64, 48));
+    write_displays(&folder);
+    let make = "hologram --rgb rgb.png --depth depth.png --method sweep --planes 4 --display own.toml";
+    let call = |line: &str| line.split(' ').map(str::to_owned).collect::<Vec<_>>();
+    let succeeds = |line: &str| {
+        let call = call(line);
+        folder.succeeds(&call.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    succeeds(&format!("{make} --complex f.npy -o h.png"));
+    succeeds(&format!("{make} --offset-mm 3 -o moved.png"));
+    let commands = [
+        "pack h.png -o n.png",
+        "refocus h.png --z-mm 0 -o n.png",
+        "view h.png --views 2 -o n.html",
+    ];
+    for display in ["own", "near", "calibrated"] {
+        for command in commands {
+            succeeds(&format!("{command} --display {display}.toml"));
+        }
+    }
+    for name in ["n.png", "n.html"] {
+        fs::remove_file(folder.path(name)).unwrap();
+    }
+    for (display, theirs, ours) in [
+        ("fine.toml", "for a pitch of 8 µm", "has a pitch of 3.74 µm"),
+        (
+            "lasers.toml",
+            "for lasers of 638/520/450 nm",
+            "has lasers of 660/532/450 nm",
+        ),
+        ("bits.toml", "for levels of 8 bits", "has levels of 4 bits"),
+        (
+            "own.toml --offset-mm 3",
+            "for an offset of 0 mm",
+            "has an offset of 3 mm",
+        ),
+        (
+            "ti-plm-p47",
+            "levels of 8 bits, a pitch of 8 µm",
+            "levels of 4 bits, a pitch of 10.8 µm",
+        ),
+    ] {
+        for command in commands.into_iter().chain(["show h.png"]) {
+            let call = call(&format!("{command} --display {display}"));
+            let errors = folder.fails(&call.iter().map(String::as_str).collect::<Vec<_>>(), 1);
+            assert!(
+                errors.lines().count() == 1 && errors.contains("h.png: the hologram is "),
+                "{errors}"
+            );
+            assert!(errors.contains(theirs) && errors.contains(ours), "{call:?}: {errors}");
+            assert!(!folder.path("n.png").exists() && !folder.path("n.html").exists());
+        }
+    }
+    let planes = [
+        "pack",
+        "h.png",
+        "h.png",
+        "--colour",
+        "red",
+        "--display",
+        "ti-plm-p47",
+        "-o",
+        "n.png",
+    ];
+    assert!(folder.fails(&planes, 1).contains("levels of 4 bits"));
+    // A field has no levels, and an offset can be said.
+    succeeds("refocus f.npy --z-mm 0 --display bits.toml -o n.png");
+    succeeds("refocus moved.png --z-mm 0 --display own.toml --offset-mm 3 -o n.png");
+    // What a hologram needs a display for is not made up.
+    succeeds(&format!("{} -o c.png", make.replace("own", "calibrated")));
+    let errors = folder.fails(&["view", "c.png", "-o", "c.html"], 1);
+    assert!(
+        errors.contains("carrier_mrad") && errors.contains("--display"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn devices_are_listed_with_their_sources() {
+    let folder = Folder::new();
+    let text = folder.succeeds(&["devices"]);
+    for name in Device::names() {
+        assert!(text.contains(name), "{text}");
+    }
+    let one = folder.succeeds(&["devices", "ti-plm-p67"]);
+    assert!(one.contains("unconfirmed") && one.contains("width: "), "{one}");
+    // One of the user's stands beside them, before one of the same name.
+    fs::create_dir_all(folder.path("phasefront/devices")).unwrap();
+    fs::write(folder.path("phasefront/devices/mine.toml"), "width = 123\nheight = 99").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_phasefront"))
+        .args(["devices", "--json"])
+        .env("XDG_CONFIG_HOME", folder.0.path())
+        .output()
+        .unwrap();
+    let list: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&list[0]["name"], &list[0]["width"]), (&"mine".into(), &123.into()));
+}
+
+#[test]
+fn the_links_pattern_goes_through_files() {
+    let folder = Folder::new();
+    folder.succeeds(&["link", "pattern", "--size", "640x96", "-o", "pattern.png"]);
+    let read = ["link", "read", "pattern.png", "--size", "640x96"];
+    assert_eq!(folder.succeeds(&read), "every pixel arrives as it is\n");
+    // What a link of limited range makes of it.
+    let pattern = image::open(folder.path("pattern.png")).unwrap().into_rgb8();
+    let limited = image::RgbImage::from_fn(640, 96, |x, y| {
+        image::Rgb(pattern.get_pixel(x, y).0.map(|v| 16 + (u32::from(v) * 219 / 255) as u8))
+    });
+    limited.save(folder.path("limited.png")).unwrap();
+    let told = folder.succeeds(&["link", "read", "limited.png", "--size", "640x96"]);
+    assert!(told.starts_with("limited range"), "{told}");
+}

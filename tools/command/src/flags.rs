@@ -1,0 +1,222 @@
+//! Flags that commands of both programs have.
+
+use crate::networks::Precision;
+use clap::builder::PossibleValue;
+use clap::{Args, ValueEnum};
+use phasefront::{Display, Encoding, Network, Sweep};
+use phasefront_io::display::{self, DisplayFile};
+use phasefront_io::output::Holding;
+use phasefront_io::{Error, Result};
+use std::sync::{Arc, LazyLock};
+
+/// The display that a hologram is for.
+#[derive(Clone, Args)]
+pub struct DisplayFlags {
+    /// TOML file of the display, or a modulator's name as `phasefront devices` lists them [default: 1920×1080, 8 µm,
+    /// 638/520/450 nm, 6 mm]
+    #[arg(long, value_name = "FILE|NAME")]
+    display: Option<String>,
+    /// z of the hologram against the middle of the volume, mm, positive toward the viewer
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
+    offset_mm: Option<f64>,
+}
+
+impl DisplayFlags {
+    /// Whether a display is asked for.
+    pub fn is_given(&self) -> bool {
+        self.display.is_some()
+    }
+
+    /// The display's file or the modulator's name, if one is given.
+    pub fn name(&self) -> Option<&str> {
+        self.display.as_deref()
+    }
+
+    /// Of a command that knows red, green and blue alone, and no offset.
+    pub fn read_of_midpoint(&self) -> Result<DisplayFile> {
+        check_used(&[(
+            "--offset-mm",
+            self.offset_mm.is_some(),
+            false,
+            "holograms at the modulator",
+        )])?;
+        self.read_of_three()
+    }
+
+    /// Of a command that knows red, green and blue alone.
+    pub fn read_of_three(&self) -> Result<DisplayFile> {
+        let file = self.read()?;
+        match file.target.display.colours() {
+            3 => Ok(file),
+            _ => Err(Error::Input(
+                "this command is for displays of three lasers; --display has one".into(),
+            )),
+        }
+    }
+
+    /// Of a command that needs none.
+    pub fn read_if_given(&self) -> Result<Option<DisplayFile>> {
+        match (&self.display, self.offset_mm) {
+            (Some(_), _) => Ok(Some(self.read()?)),
+            (None, None) => Ok(None),
+            (None, Some(_)) => Err(Error::Input(
+                "--offset-mm goes with --display; a hologram file says its own offset".into(),
+            )),
+        }
+    }
+
+    pub fn read(&self) -> Result<DisplayFile> {
+        let mut file = match &self.display {
+            Some(name) => display::find_display(name)?,
+            None => Display::default().into(),
+        };
+        if let Some(mm) = self.offset_mm {
+            file.target.display = file.target.display.with_offset_m(mm / 1e3)?;
+            file.device.display = file.target.display.clone();
+        }
+        if let Some(turns) = &file.target.panel.levels_turns
+            && let Some(gap) = gap(turns)
+        {
+            log::warn!(
+                "the modulator's levels reach {:.2} of 2π; phases beyond become the nearest that they show, at most {:.2} rad away",
+                1.0 - gap,
+                gap * std::f64::consts::PI
+            );
+        }
+        Ok(file)
+    }
+}
+
+/// The part of a turn that levels of these phases do not reach, where it is wider than what they leave out elsewhere.
+fn gap(turns: &[f64]) -> Option<f64> {
+    let widest = turns.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+    let gap = 1.0 - turns.last()?;
+    (gap > 1.5 * widest).then_some(gap)
+}
+
+/// What the encoding with a pre-filter is called.
+const DEEP: &str = "deep";
+
+/// The name of an encoder: one of the core's, or [`Self::DEEP`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EncoderName(&'static str);
+
+impl ValueEnum for EncoderName {
+    fn value_variants<'a>() -> &'a [Self] {
+        static NAMES: LazyLock<Vec<EncoderName>> = LazyLock::new(|| {
+            let names = Encoding::BY_NAME.iter().map(|(name, ..)| *name);
+            names.chain([DEEP]).map(EncoderName).collect()
+        });
+        &NAMES
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let what = match self.known() {
+            Some((_, what, _)) => what,
+            None => "Double phase after a pre-filter network (DDPM)",
+        };
+        Some(PossibleValue::new(self.0).help(what))
+    }
+}
+
+impl EncoderName {
+    /// The encoding with a pre-filter.
+    pub const DEEP: Self = EncoderName(DEEP);
+    /// The default of fields that no pre-filter was trained for.
+    pub const ANTI_ALIAS: Self = EncoderName("anti-alias");
+
+    fn known(self) -> Option<&'static (&'static str, &'static str, Encoding)> {
+        Encoding::BY_NAME.iter().find(|(name, ..)| *name == self.0)
+    }
+
+    pub fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
+        Ok(match (self.known(), prefilter) {
+            (Some((.., encoding)), None) => encoding.clone(),
+            (None, Some(network)) => Encoding::Deep(network),
+            (None, None) => {
+                return Err(Error::Input("--encoder deep needs --prefilter".into()));
+            }
+            (Some((name, ..)), Some(_)) => {
+                return Err(Error::Input(format!(
+                    "--prefilter goes with --encoder deep, not with {name}"
+                )));
+            }
+        })
+    }
+
+    pub fn name(self) -> &'static str {
+        self.0
+    }
+}
+
+/// Refuses a flag that changes nothing: of each its name, whether it is given, whether it is used, and what it goes
+/// with.
+pub fn check_used(flags: &[(&str, bool, bool, &str)]) -> Result<()> {
+    match flags.iter().find(|(_, given, used, _)| *given && !*used) {
+        None => Ok(()),
+        Some((flag, .., with)) => Err(Error::Input(format!(
+            "{flag} goes with {with}; here it would change nothing, leave it out"
+        ))),
+    }
+}
+
+/// What becomes of files that an output's place holds already.
+#[derive(Default, Args)]
+pub struct OverwriteFlag {
+    /// Replace what an earlier run made; without it an output folder must be new or empty, a calibration's file absent
+    #[arg(long)]
+    overwrite: bool,
+}
+
+impl OverwriteFlag {
+    pub fn is_given(&self) -> bool {
+        self.overwrite
+    }
+
+    /// What an output folder may hold.
+    pub fn holding(&self) -> Holding<'static> {
+        Holding::by_flag(self.overwrite)
+    }
+}
+
+/// Width and height as 1920x1080.
+pub fn parse_size(text: &str) -> std::result::Result<(usize, usize), String> {
+    let parsed = text
+        .split_once(['x', '×'])
+        .and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match parsed {
+        Some((w, h)) if (1..=16384).contains(&w) && (1..=16384).contains(&h) => Ok((w, h)),
+        _ => Err("a size is written WxH, as 1920x1080, each up to 16384".into()),
+    }
+}
+
+/// The numbers of a network.
+#[derive(Clone, Copy, Default, PartialEq, ValueEnum)]
+pub enum PrecisionName {
+    #[default]
+    /// Whole numbers of 8 bits: the fastest
+    Int8,
+    /// Floating point
+    F32,
+}
+
+impl PrecisionName {
+    pub fn precision(self) -> Precision {
+        match self {
+            PrecisionName::Int8 => Precision::Int8,
+            PrecisionName::F32 => Precision::Float32,
+        }
+    }
+}
+
+/// The sweep that suits `display`, with these planes and taps where given.
+pub fn sweep_for(display: &Display, planes: Option<usize>, taps: Option<usize>) -> Sweep {
+    let usual = match planes {
+        Some(planes) => Sweep::of_planes(display, planes),
+        None => Sweep::for_display(display),
+    };
+    Sweep {
+        taps: taps.unwrap_or(usual.taps),
+        ..usual
+    }
+}

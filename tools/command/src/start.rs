@@ -1,0 +1,70 @@
+//! How a command starts: its threads, its log, its trace, and the exit code.
+
+use crate::trace;
+use clap::Args;
+use phasefront::unstable::error::Line;
+use phasefront_io::{Error, Result};
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// The flags of every command.
+#[derive(Debug, Args)]
+pub struct Common {
+    /// Threads to compute with; all cores if not given.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Print the result as JSON on stdout.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Write when each stage began and ended, for Perfetto (ui.perfetto.dev) or chrome://tracing.
+    #[arg(long, global = true, value_name = "FILE.json")]
+    trace: Option<PathBuf>,
+}
+
+impl Common {
+    /// The threads that are asked for.
+    pub fn threads(&self) -> Option<NonZeroUsize> {
+        NonZeroUsize::new(self.threads?.into())
+    }
+
+    /// Runs `command` with these flags, on the thread that calls this: a system opens windows on the main thread only.
+    pub fn run(&self, command: impl FnOnce() -> Result<()>) -> ExitCode {
+        log_to_stderr();
+        match self.traced(command) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(e) => {
+                // If even this cannot be printed, the exit code reports the failure.
+                let _ = writeln!(std::io::stderr(), "error: {e}");
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    fn traced(&self, command: impl FnOnce() -> Result<()>) -> Result<()> {
+        let mut pool = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = self.threads {
+            pool = pool.num_threads(threads.into());
+        }
+        pool.build_global()
+            .map_err(|e| Error::Input(format!("--threads: {e}")))?;
+        match &self.trace {
+            None => command(),
+            Some(path) => trace::traced(path, command),
+        }
+    }
+}
+
+fn log_to_stderr() {
+    env_logger::Builder::new()
+        .filter_level(log::LevelFilter::Warn)
+        // winit warns when a modulator's desktop lacks a size in millimetres.
+        .filter_module("winit", log::LevelFilter::Error)
+        .parse_default_env()
+        .format(|out, record| {
+            let level = record.level().as_str().to_lowercase();
+            writeln!(out, "{level}: {}", Line(&record.args().to_string()))
+        })
+        .init();
+}

@@ -1,0 +1,235 @@
+//! The silhouette-mask layer-based method (SM-LBM), Eq. 1–4: the hologram of a layered depth image
+//! by waves, plane by plane from the back to the front, each plane's silhouette blocking what
+//! comes from behind it.
+//!
+//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a point of depth d belongs to plane
+//! min(⌊d·N⌋, N − 1). The frame is padded once by the reach of light through the whole volume and
+//! periodic inside. Fields leave the carrier out, so a point's phase 2πz/λ (Eq. 1) is zero here,
+//! and the result at z = 0 is the paper's.
+//!
+//! What makes it cheap: a plane without points costs nothing, as two steps through empty space are
+//! one; a row without points stays in the frequency domain across its plane; and the field never
+//! leaves two buffers of (H', W').
+//!
+//! The silhouette (Eq. 3) is where the LDI has a hit, so that black surfaces occlude too.
+
+use ndarray::{Array3, ArrayView1, ArrayViewMut2, Axis};
+use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::unstable::wave::asm::{self, Padding, Transfer};
+use phasefront::unstable::wave::fft::{Fft2, Scratch};
+use phasefront_io::Result;
+use phasefront_io::ldi::Ldi;
+use std::ops::Range;
+
+/// One point of a scene, on its plane.
+#[derive(Clone, Copy)]
+pub(crate) struct Point {
+    pub(crate) y: u32,
+    pub(crate) x: u32,
+    pub(crate) rgb: [f32; 3],
+}
+
+/// A scene cut into planes.
+pub(crate) struct Planes {
+    /// All points: those of a plane together, by rows, and of two hits in one place the front one
+    /// last, so that it wins.
+    pub(crate) points: Vec<Point>,
+    /// The planes that hold points, back first: the index k, and where its points lie.
+    pub(crate) occupied: Vec<(usize, Range<usize>)>,
+}
+
+/// Most planes that a scene is cut into. Planes take memory also where they are empty.
+pub const MOST_PLANES: usize = 1_000_000;
+
+/// # Errors
+/// No planes, or more than [`MOST_PLANES`].
+pub(crate) fn check_planes(planes: usize) -> Result<()> {
+    if !(1..=MOST_PLANES).contains(&planes) {
+        return Err(phasefront::Error::Plan(format!(
+            "{planes} planes to cut the scene into; 1 to {MOST_PLANES} are right"
+        ))
+        .into());
+    }
+    Ok(())
+}
+
+/// The plane of a point of depth `d` among `planes`.
+pub fn plane_of_depth(d: f32, planes: usize) -> usize {
+    ((f64::from(d) * planes as f64) as usize).min(planes - 1)
+}
+
+/// z of plane `k` among `planes`, metres.
+pub fn plane_z_m(k: usize, planes: usize, display: &Display) -> f64 {
+    display.z_of_depth((k as f64 + 0.5) / planes as f64)
+}
+
+impl Planes {
+    /// By counting, so that no point is held twice.
+    pub(crate) fn of(ldi: &Ldi, planes: usize) -> Self {
+        let mut next = vec![0; planes];
+        for d in ldi.layers.iter().flat_map(|layer| &layer.depth) {
+            if !d.is_nan() {
+                next[plane_of_depth(*d, planes)] += 1;
+            }
+        }
+        let mut occupied = Vec::new();
+        let mut total = 0;
+        for (k, next) in next.iter_mut().enumerate() {
+            let count = std::mem::replace(next, total);
+            if count > 0 {
+                occupied.push((k, total..total + count));
+            }
+            total += count;
+        }
+        occupied.reverse();
+        let nowhere = Point {
+            y: 0,
+            x: 0,
+            rgb: [0.0; 3],
+        };
+        let mut points = vec![nowhere; total];
+        let (height, width) = ldi.shape();
+        for y in 0..height {
+            for layer in ldi.layers.iter().rev() {
+                for x in 0..width {
+                    let d = layer.depth[(y, x)];
+                    if !d.is_nan() {
+                        let place = &mut next[plane_of_depth(d, planes)];
+                        points[*place] = Point {
+                            y: y as u32,
+                            x: x as u32,
+                            rgb: std::array::from_fn(|c| layer.rgb[(c, y, x)]),
+                        };
+                        *place += 1;
+                    }
+                }
+            }
+        }
+        Planes { points, occupied }
+    }
+}
+
+/// The points of row `y` among the `points` of a plane.
+fn row_of(points: &[Point], y: usize) -> &[Point] {
+    let start = points.partition_point(|p| (p.y as usize) < y);
+    let length = points[start..].partition_point(|p| p.y as usize == y);
+    &points[start..start + length]
+}
+
+/// One step of the wave, whose transformed rows `scratch` holds: over `transfer`'s distance to a plane of
+/// `points`, where it is replaced by what they are (Eq. 3 and 4).
+pub(crate) fn cross(
+    fft: &Fft2,
+    scratch: &mut Scratch,
+    transfer: &Transfer,
+    points: &[Point],
+    content: impl Fn(&Point) -> Complex32 + Sync,
+) {
+    fft.columns(
+        &scratch.rows,
+        &mut scratch.columns,
+        |x, column| transfer.apply(x, column),
+        &mut scratch.work,
+    );
+    fft.rows_there_and_back(
+        &scratch.columns,
+        &mut scratch.rows,
+        &mut scratch.work,
+        |y| !row_of(points, y).is_empty(),
+        |y, row| {
+            for point in row_of(points, y) {
+                row[point.x as usize] = content(point);
+            }
+        },
+    );
+}
+
+/// `points` alone on a plane whose rows have `width` values.
+pub(crate) fn place(points: &[Point], plane: &mut [Complex32], width: usize, content: impl Fn(&Point) -> Complex32) {
+    plane.fill(Complex32::ZERO);
+    for point in points {
+        plane[point.y as usize * width + point.x as usize] = content(point);
+    }
+}
+
+/// The frame's part of padded `rows` of `width` values.
+pub(crate) fn crop(rows: &[Complex32], width: usize, mut frame: ArrayViewMut2<'_, Complex32>) {
+    let columns = frame.ncols();
+    for (mut out, row) in frame.rows_mut().into_iter().zip(rows.chunks_exact(width)) {
+        out.assign(&ArrayView1::from(&row[..columns]));
+    }
+}
+
+/// The complex midpoint hologram of `ldi`, (C, H, W), at z = 0, from `planes` planes. `progress` hears of
+/// the planes done, of all those that hold points in all colours.
+///
+/// Memory: two buffers of (H', W') complex numbers, 20 bytes a point, 8 bytes a plane, and the
+/// transfer functions, a quarter of a buffer each: one for neighbours, one for a wider gap.
+///
+/// # Errors
+/// No planes or over [`MOST_PLANES`], or a volume whose reach cannot be padded.
+pub fn hologram(
+    ldi: &Ldi,
+    display: &Display,
+    planes: usize,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Array3<Complex32>> {
+    check_planes(planes)?;
+    let (height, width) = ldi.shape();
+    let scene = Planes::of(&ldi.for_display(display), planes);
+    let longest = display.longest_wavelength_m();
+    let shape = asm::padded_shape(
+        height,
+        width,
+        display.pitch_m(),
+        longest,
+        display.volume_depth_m(),
+        Padding::Reach,
+    )?;
+    let (padded_height, padded_width) = shape;
+    let fft = Fft2::new(padded_height, padded_width, padded_height, padded_width);
+    let mut scratch = fft.scratch();
+    let mut hologram = Array3::zeros((display.colours(), height, width));
+    let total = display.colours() * scene.occupied.len();
+    let step_m = display.volume_depth_m() / planes as f64;
+    for (colour, &wavelength_m) in display.wavelengths_m().iter().enumerate() {
+        let transfer = |distance_m| Transfer::new(shape, display.pitch_m(), wavelength_m, distance_m, |_, _| true);
+        let neighbour = transfer(step_m);
+        let Some((back, points)) = scene.occupied.first() else {
+            break;
+        };
+        // The columns are not in use yet: their buffer holds the farthest plane.
+        let plane = &mut scratch.columns;
+        let content = |point: &Point| Complex32::from(point.rgb[colour]);
+        place(&scene.points[points.clone()], plane, padded_width, content);
+        fft.rows_forward(plane, &mut scratch.rows, &mut scratch.work);
+        let mut at = *back;
+        let done = colour * scene.occupied.len();
+        for (i, (k, points)) in scene.occupied.iter().enumerate().skip(1) {
+            let points = &scene.points[points.clone()];
+            let across;
+            let transfer = match at - k {
+                1 => &neighbour,
+                steps => {
+                    across = transfer(steps as f64 * step_m);
+                    &across
+                }
+            };
+            cross(&fft, &mut scratch, transfer, points, content);
+            at = *k;
+            progress(done + i, total);
+        }
+        let home = transfer(-plane_z_m(at, planes, display));
+        fft.columns(
+            &scratch.rows,
+            &mut scratch.columns,
+            |x, column| home.apply(x, column),
+            &mut scratch.work,
+        );
+        fft.rows_inverse(&scratch.columns, &mut scratch.rows, &mut scratch.work);
+        crop(&scratch.rows, padded_width, hologram.index_axis_mut(Axis(0), colour));
+        progress(done + scene.occupied.len(), total);
+    }
+    Ok(hologram)
+}

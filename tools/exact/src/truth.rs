@@ -1,0 +1,107 @@
+//! What a hologram is compared with, and how close it comes: the surfaces of a layered depth image, those that the
+//! sweep finds behind an RGB-D frame, and figures of views against the views of the exact wave.
+
+use ndarray::{Array2, Array3};
+use phasefront::unstable::sweep::hidden::{Hidden, NOTHING};
+use phasefront::unstable::sweep::hidden_reach;
+use phasefront::{Display, RgbdFrame};
+use phasefront_io::ldi::{Ldi, LdiLayer};
+use phasefront_io::{Result, metrics};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// The front layer's amplitudes, black where nothing is.
+pub fn visible_rgb(ldi: &Ldi) -> Array3<f32> {
+    let front = &ldi.layers[0];
+    Array3::from_shape_fn(front.rgb.dim(), |(c, y, x)| match front.depth[(y, x)].is_nan() {
+        true => 0.0,
+        false => front.rgb[(c, y, x)],
+    })
+}
+
+/// The front layer as a frame for `display`: black and farthest where nothing is.
+///
+/// # Errors
+/// Numbers that are no frame's.
+pub fn visible_frame(ldi: &Ldi, display: &Display) -> Result<RgbdFrame> {
+    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
+    Ok(RgbdFrame::new(visible_rgb(ldi), depth)?.for_display(display))
+}
+
+/// `frame` with its hidden surfaces, as the sweep finds them.
+///
+/// # Errors
+/// Never, for the layers are of one shape.
+pub fn filled(frame: &RgbdFrame, display: &Display) -> Result<Ldi> {
+    let (height, width) = frame.shape();
+    let size = height * width;
+    let front = LdiLayer::from(frame);
+    let hidden = Hidden::new(height, width, hidden_reach(display));
+    let mut sources = vec![0; 2 * size];
+    let values = front.depth.as_slice().expect("standard layout");
+    hidden.find(values, &mut sources, &mut hidden.scratch());
+    let behind = sources.chunks_exact(size).map(|sources| {
+        let of = |y: usize, x: usize| match sources[y * width + x] {
+            NOTHING => None,
+            source => Some((source as usize / width, source as usize % width)),
+        };
+        LdiLayer {
+            rgb: Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+                of(y, x).map_or(0.0, |(y, x)| front.rgb[(c, y, x)])
+            }),
+            depth: Array2::from_shape_fn((height, width), |(y, x)| {
+                of(y, x).map_or(f32::NAN, |at| front.depth[at])
+            }),
+        }
+    });
+    let behind: Vec<_> = behind.collect();
+    Ldi::new(std::iter::once(front).chain(behind).collect())
+}
+
+/// How close one scene's hologram comes to the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Figures {
+    /// Of the midpoint's amplitude, dB; infinite where it is the truth.
+    pub amplitude_psnr: f64,
+    /// Of the midpoint's amplitude.
+    pub amplitude_ssim: f64,
+    /// Mean over the focal stack, dB.
+    pub focal_psnr: f64,
+    /// Mean over the focal stack.
+    pub focal_ssim: f64,
+    /// Mean amplitude at the midpoint over the truth's.
+    pub brightness: f64,
+    /// Share of the modulator's light that passes the aperture; 1 for what is shown as the complex field it is.
+    pub light: f64,
+}
+
+/// z of what one hologram for `display` is judged by, metres: the midpoint, and a stack of four depths.
+pub fn judged_z_m(display: &Display) -> Vec<f64> {
+    let depths = (0..4).map(|i| (f64::from(i) + 0.5) / 4.0);
+    std::iter::once(0.0)
+        .chain(depths.map(|depth| display.z_of_depth(depth)))
+        .collect()
+}
+
+/// How close `views` come to `truth`, all light counted as shown: (C, H, W) each, the midpoint first, the focal stack
+/// after it, `margin` pixels at the border left out.
+///
+/// # Errors
+/// Views of different shapes.
+pub fn judge(views: &[Array3<f32>], truth: &[Array3<f32>], margin: usize) -> Result<Figures> {
+    let (_, height, width) = truth[0].dim();
+    let inner = ndarray::s![.., margin..height - margin, margin..width - margin];
+    let each = (views.iter().zip(truth))
+        .map(|(view, truth)| metrics::compare(view.slice(inner), truth.slice(inner)))
+        .collect::<Result<Vec<_>>>()?;
+    let (midpoint, stack) = (&each[0], &each[1..]);
+    let mean = |figure: fn(&metrics::Comparison) -> f64| stack.iter().map(figure).sum::<f64>() / stack.len() as f64;
+    Ok(Figures {
+        amplitude_psnr: midpoint.psnr_overall,
+        amplitude_ssim: midpoint.ssim_overall,
+        focal_psnr: mean(|c| c.psnr_overall),
+        focal_ssim: mean(|c| c.ssim_overall),
+        brightness: f64::from(views[0].slice(inner).sum() / truth[0].slice(inner).sum()),
+        light: 1.0,
+    })
+}

@@ -1,0 +1,249 @@
+//! Display files: the TOML of a display, and the files that it names.
+
+use crate::display::calibration::AberrationFile;
+use crate::output::has_extension;
+use crate::{Error, Result, input};
+use ndarray_npy::WriteNpyExt;
+use phasefront::device::Device;
+use phasefront::target::Response;
+use phasefront::unstable::keys;
+use phasefront::{Display, Target};
+use serde::{Deserialize, Serialize};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub mod calibration;
+mod panel;
+pub mod spatial;
+
+/// A display file and what it refers to.
+#[derive(Debug, Clone)]
+pub struct DisplayFile {
+    /// What it says but for aberrations.
+    pub target: Target,
+    /// The modulator, and how its input takes a hologram.
+    pub device: Device,
+    /// The modulator's table, where it is calibrated as a whole.
+    pub lut: Option<[u8; 256]>,
+    /// What corrects the display's aberrations.
+    pub aberration: Option<AberrationFile>,
+}
+
+impl From<Display> for DisplayFile {
+    fn from(display: Display) -> Self {
+        DisplayFile {
+            target: (&display).into(),
+            device: display.into(),
+            lut: None,
+            aberration: None,
+        }
+    }
+}
+
+impl DisplayFile {
+    /// The target with the correction that is one for all depths and the whole frame, where there is something to
+    /// correct.
+    ///
+    /// # Errors
+    /// Aberrations that change over depth or over the frame, which only SM-LBM corrects.
+    pub fn corrected(&self) -> Result<Target> {
+        let correction = match &self.aberration {
+            None => None,
+            Some(AberrationFile::Uniform(all)) if all.constant().is_some() => all.constant(),
+            Some(_) => {
+                return Err(Error::Input(
+                    "the display's aberration changes over depth or over the frame; --method layers corrects it, a network must be trained for it".into(),
+                ));
+            }
+        };
+        Ok(Target {
+            correction,
+            ..self.target.clone()
+        })
+    }
+
+    /// What of the calibration a hologram does not carry with it, by the names of this file's keys.
+    pub fn calibrated(&self, phase_only: bool) -> Vec<String> {
+        let keys = [
+            ("per_pixel", phase_only && self.target.response.shape().is_some()),
+            ("laser", phase_only && self.target.illumination.is_some()),
+            ("aberration", self.aberration.is_some()),
+            (
+                "carrier_mrad, lens_mm or flatness",
+                phase_only && self.target.panel.adds(),
+            ),
+        ];
+        let there = keys.into_iter().filter(|(_, there)| *there);
+        there.map(|(key, _)| key.to_owned()).collect()
+    }
+}
+
+/// The display of a file, or the device of that name: one that comes along, or one of the user's, a file in
+/// `phasefront/devices` of the folder for configurations.
+///
+/// # Errors
+/// As [`read_display`]; neither a file nor a name.
+pub fn find_display(name: &str) -> Result<DisplayFile> {
+    if let Some(path) = display_path(name) {
+        return read_display(&path);
+    }
+    let device = Device::shipped(name)
+        .map_err(|e| Error::Input(format!("--display {name}: no such file, and {}", one_line_of(&e))))?;
+    Ok(DisplayFile {
+        target: device.target()?,
+        device,
+        lut: None,
+        aberration: None,
+    })
+}
+
+/// The file that --display `name` reads, `None` where it is the name of a device that is no file.
+pub fn display_path(name: &str) -> Option<PathBuf> {
+    let path = Path::new(name);
+    if path.exists() || has_extension(path, "toml") {
+        return Some(path.to_owned());
+    }
+    own_devices()
+        .into_iter()
+        .find(|own| own.file_stem() == Some(name.as_ref()))
+}
+
+fn one_line_of(error: &phasefront::Error) -> String {
+    error.to_string().trim_start_matches("display: ").to_owned()
+}
+
+/// The files of the user's own devices, sorted.
+pub fn own_devices() -> Vec<PathBuf> {
+    let folder = std::env::var_os("XDG_CONFIG_HOME")
+        .map(PathBuf::from)
+        .or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".config")));
+    let entries = folder.and_then(|folder| std::fs::read_dir(folder.join("phasefront/devices")).ok());
+    let mut files: Vec<_> = (entries.into_iter().flatten().flatten())
+        .map(|entry| entry.path())
+        .filter(|path| has_extension(path, "toml"))
+        .collect();
+    files.sort();
+    files
+}
+
+/// Keys of a display's file that name other files.
+const NAMED: [&str; 4] = ["lut", "per_pixel", "laser", "aberration"];
+
+/// Keys each of which says what phase the levels show: a file has one of them at most.
+const PHASES: [&str; 4] = ["lut", "per_pixel", "levels_turns", "range_turns"];
+
+/// Checks the keys of the `table` of the display's file at `path`.
+fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
+    let known = [&keys::DISPLAY[..], &keys::DEVICE, &NAMED, &panel::KEYS].concat();
+    keys::check(table, &known).map_err(|e| Error::file(path, one_line_of(&e)))?;
+    let phases: Vec<_> = PHASES.into_iter().filter(|key| table.contains_key(*key)).collect();
+    match phases[..] {
+        [] | [_] => Ok(()),
+        _ => Err(Error::file(
+            path,
+            format!(
+                "{} each say what phase a level shows; give one of them",
+                phases.join(" and ")
+            ),
+        )),
+    }
+}
+
+/// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
+/// 256 levels, and those of [`crate::display::calibration`]. Others are those of [`Device`] and [`crate::display::panel`].
+///
+/// # Errors
+/// A file that is missing or says what cannot be.
+pub fn read_display(path: &Path) -> Result<DisplayFile> {
+    let text = input::text(path)?;
+    let mut table: toml::Table =
+        toml::from_str(&text).map_err(|e| Error::file(path, e.message().trim().replace('\n', " ")))?;
+    check_keys(path, &table)?;
+    let mut named = |key: &str| match table.remove(key) {
+        None => Ok(None),
+        Some(toml::Value::String(name)) => Ok(Some(path.with_file_name(name))),
+        Some(_) => Err(Error::file(path, format!("{key} must be the name of a file"))),
+    };
+    let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
+    let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
+    let panel = panel::take(path, &mut table)?;
+    let device = Device::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
+    let display = &device.display;
+    let lut = match lut_path {
+        None => None,
+        Some(path) => {
+            let levels: std::result::Result<Vec<u8>, _> =
+                input::text(&path)?.split_whitespace().map(str::parse).collect();
+            let levels = levels.map_err(|e| Error::file(&path, format!("holds what is no level of 0..=255: {e}")))?;
+            let lut = lut_of(&levels).map_err(|e| Error::file(&path, e))?;
+            let most = lut.into_iter().max().unwrap_or_default();
+            if u32::from(most) >> display.bits() != 0 {
+                return Err(Error::file(
+                    &path,
+                    format!(
+                        "holds a level of {most}, over the {} bits of the display",
+                        display.bits()
+                    ),
+                ));
+            }
+            Some(lut)
+        }
+    };
+    let per_pixel = match per_pixel_path {
+        None => None,
+        Some(path) => {
+            let table = calibration::read_per_pixel(&path)?;
+            let (height, width) = table.shape();
+            if (height, width) != (display.height(), display.width()) {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "is for {width}×{height} pixels, the display has {}×{}; calibrate this display",
+                        display.width(),
+                        display.height()
+                    ),
+                ));
+            }
+            Some(Arc::new(table))
+        }
+    };
+    let mut target = device.target()?;
+    let calibrated = match (per_pixel, lut) {
+        (Some(table), _) => Some(Response::PerPixel(table)),
+        (None, Some(lut)) => Some(Response::lut(lut)),
+        (None, None) => None,
+    };
+    if let Some(response) = calibrated {
+        target.response = response;
+    }
+    target.illumination = laser_path.map(|p| calibration::read_laser(&p)).transpose()?;
+    panel.onto(path, &mut target)?;
+    let aberration = match aberration_path {
+        None => None,
+        Some(path) => {
+            let aberration = calibration::read_aberrations(&path)?;
+            aberration.check(&target.display).map_err(|e| Error::file(path, e))?;
+            Some(aberration)
+        }
+    };
+    Ok(DisplayFile {
+        target,
+        device,
+        lut,
+        aberration,
+    })
+}
+
+/// The look-up table of these levels.
+///
+/// # Errors
+/// Other than 256 entries.
+pub(crate) fn lut_of(levels: &[u8]) -> Result<[u8; 256]> {
+    levels.try_into().map_err(|_| {
+        Error::Input(format!(
+            "the look-up table has {} entries; it must have 256",
+            levels.len()
+        ))
+    })
+}

@@ -1,0 +1,222 @@
+//! What a display's file says of its panel: a carrier, a lens, what makes it flat, and how colours are moved.
+//!
+//! ```toml
+//! carrier_mrad = [4.0, 0.0]              # right and down, the same for all colours
+//! lens_mm = 300.0                        # positive draws light together toward the viewer
+//! flatness = "CAL_LSH0802200_520nm.bmp"  # or one file for each colour
+//! shift_px = [[0.5, 0.0], [0.0, 0.0], [-0.25, 1.0]]   # red, green, blue, or the one laser: right and down
+//! scale = [1.001, 1.0, 0.998]
+//! ```
+//!
+//! A flatness file is a grey image of the modulator's size, whose full range is 2π, as makers give it (Hamamatsu's
+//! correction pattern), or a CSV of levels 0 to 1023 with a first row and column of coordinates (Santec). It is added
+//! to the phases, modulo 2π.
+
+use crate::input::{self, MOST_PICTURE};
+use crate::output::has_extension;
+use crate::picture::open_image;
+use crate::{Error, Result};
+use image::DynamicImage;
+use phasefront::Target;
+use phasefront::target::{Flatness, Registration};
+use phasefront::unstable::keys;
+use serde::Deserialize;
+use std::path::Path;
+
+/// The keys of a display's file that are read here.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PanelToml {
+    carrier_mrad: Option<[f64; 2]>,
+    lens_mm: Option<f64>,
+    flatness: Option<FlatnessToml>,
+    #[serde(default)]
+    shift_px: Vec<[f64; 2]>,
+    #[serde(default)]
+    scale: Vec<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum FlatnessToml {
+    One(String),
+    Colours([String; 3]),
+}
+
+/// Their names.
+pub(crate) const KEYS: [&str; 5] = ["carrier_mrad", "lens_mm", "flatness", "shift_px", "scale"];
+
+/// Takes the keys of the panel out of the `table` of the display's file at `path`.
+pub(crate) fn take(path: &Path, table: &mut toml::Table) -> Result<PanelToml> {
+    let own: toml::Table = (KEYS.iter())
+        .filter_map(|key| Some(((*key).to_owned(), table.remove(*key)?)))
+        .collect();
+    PanelToml::deserialize(own).map_err(|e| match e.message() {
+        message if message.contains("untagged") => Error::file(
+            path,
+            "flatness must be the name of a file, or of three, for red, green and blue",
+        ),
+        _ => Error::file(path, keys::message(&e)),
+    })
+}
+
+impl PanelToml {
+    /// Puts what the file at `path` says onto `target`.
+    pub(crate) fn onto(self, path: &Path, target: &mut Target) -> Result<()> {
+        let panel = &mut target.panel;
+        panel.carrier_rad = self.carrier_mrad.unwrap_or_default().map(|mrad| mrad / 1e3);
+        panel.lens_m = self.lens_mm.map(|mm| mm / 1e3);
+        let modulator = (target.display.height(), target.display.width());
+        let names = match self.flatness {
+            None => vec![],
+            Some(FlatnessToml::One(name)) => vec![name],
+            Some(FlatnessToml::Colours(names)) => names.into(),
+        };
+        if !names.is_empty() {
+            let maps = names
+                .iter()
+                .map(|name| read_flatness(&path.with_file_name(name), modulator));
+            let maps = maps.collect::<Result<Vec<_>>>()?.concat();
+            panel.flatness = Some(Flatness::new(modulator, maps)?);
+        }
+        target.registration = Registration {
+            shift_px: self.shift_px,
+            scale: self.scale,
+        };
+        Ok(())
+    }
+}
+
+/// A maker's flatness map for a modulator of (H, W) pixels, in turns of 2π/65536.
+///
+/// # Errors
+/// A file that is missing, of another kind or size.
+pub fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
+    let (shape, turns) = match has_extension(path, "csv") {
+        true => read_csv(path)?,
+        false => read_image(path)?,
+    };
+    if shape != (height, width) {
+        return Err(Error::file(
+            path,
+            format!(
+                "is a map of {}×{} pixels, the display has {width}×{height}; both must be of one size",
+                shape.1, shape.0
+            ),
+        ));
+    }
+    Ok(turns)
+}
+
+fn read_image(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
+    let image = open_image(path)?;
+    let shape = (image.height() as usize, image.width() as usize);
+    let turns = match image {
+        DynamicImage::ImageLuma16(grey) => grey.into_raw(),
+        DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(|v| u16::from(v) << 8).collect(),
+        // A BMP of grey is often one of RGB whose colours are equal.
+        DynamicImage::ImageRgb8(rgb) if rgb.pixels().all(|p| p.0[0] == p.0[1] && p.0[1] == p.0[2]) => {
+            rgb.pixels().map(|p| u16::from(p.0[0]) << 8).collect()
+        }
+        other => {
+            return Err(Error::file(
+                path,
+                format!(
+                    "holds {:?} pixels; a flatness map is grey, of 8 or 16 bits",
+                    other.color()
+                ),
+            ));
+        }
+    };
+    Ok((shape, turns))
+}
+
+fn read_csv(path: &Path) -> Result<((usize, usize), Vec<u16>)> {
+    let text =
+        String::from_utf8(input::bytes(path, MOST_PICTURE)?).map_err(|_| Error::file(path, "is not text in UTF-8"))?;
+    let mut turns = Vec::new();
+    let mut width = None;
+    let lines = text
+        .lines()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, line)| !line.trim().is_empty());
+    for (number, line) in lines {
+        let before = turns.len();
+        for value in line.split(',').skip(1) {
+            let level: u16 = (value.trim().parse().ok().filter(|level| *level < 1024))
+                .ok_or_else(|| Error::file(path, format!("line {}: {value:?} is no level of 0..=1023", number + 1)))?;
+            turns.push(level << 6);
+        }
+        let count = turns.len() - before;
+        if *width.get_or_insert(count) != count {
+            return Err(Error::file(
+                path,
+                format!(
+                    "line {} has {count} levels, the first has {}",
+                    number + 1,
+                    width.unwrap_or(0)
+                ),
+            ));
+        }
+    }
+    let width = width.filter(|width| *width > 0).ok_or_else(|| {
+        Error::file(
+            path,
+            "holds no levels; there must be a row of coordinates, then rows of levels 0 to 1023",
+        )
+    })?;
+    Ok(((turns.len() / width, width), turns))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn makers_maps_are_read_and_others_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let grey = image::GrayImage::from_fn(3, 2, |x, y| image::Luma([(10 * y + x) as u8]));
+        grey.save(path("grey.bmp")).unwrap();
+        DynamicImage::from(grey.clone())
+            .into_rgb8()
+            .save(path("rgb.bmp"))
+            .unwrap();
+        let want: Vec<u16> = [0, 1, 2, 10, 11, 12].map(|v| v << 8).into();
+        for name in ["grey.bmp", "rgb.bmp"] {
+            assert_eq!(read_flatness(&path(name), (2, 3)).unwrap(), want, "{name}");
+        }
+        let deep = image::ImageBuffer::from_fn(3, 2, |x, y| image::Luma([(1000 * y + x) as u16]));
+        deep.save(path("deep.png")).unwrap();
+        let read = read_flatness(&path("deep.png"), (2, 3)).unwrap();
+        assert_eq!(read, [0, 1, 2, 1000, 1001, 1002]);
+        std::fs::write(path("santec.csv"), "Y/X,0,1,2\n0,5,6,7\n1,1021,1022,1023\n").unwrap();
+        let read = read_flatness(&path("santec.csv"), (2, 3)).unwrap();
+        assert_eq!(read, [5, 6, 7, 1021, 1022, 1023].map(|v| v << 6));
+
+        image::RgbImage::from_pixel(3, 2, image::Rgb([1, 2, 3]))
+            .save(path("colour.png"))
+            .unwrap();
+        for (name, text) in [
+            ("high.csv", "y,0\n0,1024\n"),
+            ("ragged.csv", "y,0,1\n0,1,2\n1,3\n"),
+            ("empty.csv", "y,0\n"),
+        ] {
+            std::fs::write(path(name), text).unwrap();
+        }
+        for (name, word) in [
+            ("grey.bmp", "3×2"),
+            ("santec.csv", "3×2"),
+            ("colour.png", "grey"),
+            ("none.bmp", "read"),
+            ("high.csv", "1023"),
+            ("ragged.csv", "line 3"),
+            ("empty.csv", "no levels"),
+        ] {
+            let error = read_flatness(&path(name), (2, 4)).unwrap_err().to_string();
+            assert!(error.contains(word), "{name}: {error}");
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! RGB-D video: frames from a folder or a pipe, as a camera would give them.
+
+use crate::fingerprint::Fingerprint;
+use crate::input::decode::{self, Reading};
+use crate::picture::depth_map;
+use crate::{Error, Result, frame};
+use ndarray::Array2;
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::unstable::depth::DepthUnit;
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// One frame in memory: colour as rows of RGB bytes, depth as little-endian numbers of `format`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoFrame {
+    colour: Vec<u8>,
+    colour_shape: (usize, usize),
+    depth: Vec<u8>,
+    depth_shape: (usize, usize),
+    format: DepthFormat,
+}
+
+impl VideoFrame {
+    /// (H, W) of its colour.
+    pub fn shape(&self) -> (usize, usize) {
+        self.colour_shape
+    }
+
+    /// (h, w) of its depth.
+    pub fn depth_shape(&self) -> (usize, usize) {
+        self.depth_shape
+    }
+
+    /// Adds the frame to what `hasher` is of.
+    pub fn fingerprint(&self, hasher: &mut Fingerprint) {
+        let (colour, depth) = (self.colour_shape, self.depth_shape);
+        hasher.numbers(&[colour.0, colour.1, depth.0, depth.1]);
+        hasher.bytes(format!("{:?}", self.format).as_bytes());
+        hasher.bytes(&self.colour);
+        hasher.bytes(&self.depth);
+    }
+
+    /// Rows of RGB bytes, (H, W) = `colour_shape`, and of big-endian 16-bit numbers of `unit`, (h, w) = `depth_shape`.
+    pub fn of_big_endian(
+        colour_shape: (usize, usize),
+        colour: Vec<u8>,
+        depth_shape: (usize, usize),
+        depth: &[u8],
+        unit: DepthUnit,
+    ) -> Self {
+        let little = depth.as_chunks::<2>().0.iter().flat_map(|[high, low]| [*low, *high]);
+        let (format, depth) = of_numbers(little.collect(), unit);
+        VideoFrame {
+            colour,
+            colour_shape,
+            depth,
+            depth_shape,
+            format,
+        }
+    }
+
+    /// Colour in the left half of a picture, rows of RGB bytes, (H, W), and normalized depth in the right one.
+    ///
+    /// # Errors
+    /// A picture that has no two halves.
+    pub fn of_halves((height, width): (usize, usize), picture: &[u8]) -> Result<Self> {
+        let half = width / 2;
+        if half == 0 || width % 2 == 1 {
+            return Err(Error::Input(format!(
+                "a picture of {width}×{height} has no two halves for colour and depth beside it"
+            )));
+        }
+        let rows = || picture.chunks_exact(3 * width);
+        let colour = rows().flat_map(|row| &row[..3 * half]).copied().collect();
+        let depth = rows().flat_map(|row| row[3 * half..].as_chunks::<3>().0).map(|pixel| {
+            let sum: u32 = pixel.iter().map(|v| u32::from(*v)).sum();
+            (sum * 65535 / (3 * 255)) as u16
+        });
+        Ok(VideoFrame {
+            colour,
+            colour_shape: (height, half),
+            depth: depth.flat_map(u16::to_le_bytes).collect(),
+            depth_shape: (height, half),
+            format: DepthFormat::NormalizedU16,
+        })
+    }
+
+    /// Rows of RGB bytes, (H, W) = `colour_shape`, and normalized depth, (h, w).
+    pub fn normalized(colour_shape: (usize, usize), colour: Vec<u8>, depth: &Array2<f32>) -> Self {
+        let (format, bytes) = depth_bytes(depth, DepthUnit::Normalized);
+        VideoFrame {
+            colour,
+            colour_shape,
+            depth: bytes,
+            depth_shape: depth.dim(),
+            format,
+        }
+    }
+
+    /// Takes near for far.
+    ///
+    /// # Errors
+    /// Depth that is not normalized.
+    pub fn invert(&mut self) -> Result<()> {
+        if self.format != DepthFormat::NormalizedU16 {
+            return Err(Error::Input(
+                "--invert is for normalized depth; distances and disparities say which is near by --depth-unit".into(),
+            ));
+        }
+        self.depth.iter_mut().for_each(|byte| *byte = 255 - *byte);
+        Ok(())
+    }
+
+    /// The share of its readings that lie before `near_m` or beyond `far_m`.
+    pub fn beyond(&self, near_m: f32, far_m: f32) -> f64 {
+        let metres = self.depth.chunks_exact(self.format.pixel_bytes());
+        let (mut all, mut beyond) = (0usize, 0usize);
+        for metres in metres.map(|pixel| self.format.reading(pixel).0).filter(|m| !m.is_nan()) {
+            all += 1;
+            beyond += usize::from(!(near_m..=far_m).contains(&metres));
+        }
+        beyond as f64 / all.max(1) as f64
+    }
+
+    /// What a session takes.
+    ///
+    /// # Errors
+    /// Images that are too large.
+    pub fn camera_frame(&self, timestamp_ns: u64) -> Result<CameraFrame<'_>> {
+        let (height, width) = self.colour_shape;
+        let plane = Plane::new(&self.colour, 3 * width, 3);
+        let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[plane])?;
+        let (height, width) = self.depth_shape;
+        let pixel = self.format.pixel_bytes();
+        let plane = Plane::new(&self.depth, width * pixel, pixel);
+        let depth = DepthImage::new(self.format, width, height, plane)?;
+        Ok(CameraFrame::new(timestamp_ns, colour, depth))
+    }
+}
+
+/// The colour and depth files of a folder, in the order of their numbers: `color_7.jpg` or `rgb_007.png` belongs to
+/// `depth_7.png` or `depth_007.npy`.
+///
+/// # Errors
+/// A folder that cannot be read, without frames, or with colour or depth that has no partner.
+pub fn frames_of_folder(dir: &Path) -> Result<Vec<(PathBuf, PathBuf)>> {
+    let mut colours = BTreeMap::new();
+    let mut depths = BTreeMap::new();
+    let entries = std::fs::read_dir(dir).map_err(|e| Error::file(dir, e))?;
+    for entry in entries {
+        let path = entry.map_err(|e| Error::file(dir, e))?.path();
+        let Some(stem) = path.file_stem().and_then(|s| s.to_str()) else {
+            continue;
+        };
+        let number =
+            |prefix: &str| -> Option<u64> { stem.strip_prefix(prefix)?.trim_start_matches(['_', '-']).parse().ok() };
+        if let Some(number) = ["color", "colour", "rgb"].into_iter().find_map(number) {
+            colours.insert(number, path);
+        } else if let Some(number) = number("depth") {
+            depths.insert(number, path);
+        }
+    }
+    let alone = (colours.iter().find(|(number, _)| !depths.contains_key(number)))
+        .or_else(|| depths.iter().find(|(number, _)| !colours.contains_key(number)));
+    if let Some((number, path)) = alone {
+        return Err(Error::file(
+            path,
+            format!("has no partner; frame {number} needs both a color_{number} and a depth_{number}"),
+        ));
+    }
+    if colours.is_empty() {
+        return Err(Error::file(
+            dir,
+            "holds no frames; they are named color_0.jpg and depth_0.png, color_1.jpg and depth_1.png …",
+        ));
+    }
+    Ok(colours.into_values().zip(depths.into_values()).collect())
+}
+
+/// Reads a frame's files.
+///
+/// # Errors
+/// Files that cannot be read.
+pub fn read_frame(colour: &Path, depth: &Path, unit: DepthUnit) -> Result<VideoFrame> {
+    let (image, orientation) = decode::open_picture(colour, Reading::UPRIGHT)?;
+    let colour_shape = (image.height() as usize, image.width() as usize);
+    let bytes = image.into_rgb8().into_raw();
+    let normalized = unit == DepthUnit::Normalized;
+    let file = depth_map::read(depth, normalized)?;
+    frame::is_turned_alone(depth, &file, orientation, colour_shape)?;
+    let readings = file.depth;
+    if normalized && let Some(bad) = readings.iter().find(|d| !(0.0..=1.0).contains(*d)) {
+        return Err(Error::file(
+            depth,
+            format!("holds {bad}; normalized depth of video must lie in 0..=1"),
+        ));
+    }
+    let (format, depth_bytes) = depth_bytes(&readings, unit);
+    Ok(VideoFrame {
+        colour: bytes,
+        colour_shape,
+        depth: depth_bytes,
+        depth_shape: readings.dim(),
+        format,
+    })
+}
+
+fn depth_bytes(readings: &Array2<f32>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
+    match unit {
+        DepthUnit::Normalized => (
+            DepthFormat::NormalizedU16,
+            (readings.iter())
+                .flat_map(|d| ((d * 65535.0).round() as u16).to_le_bytes())
+                .collect(),
+        ),
+        unit => (
+            DepthFormat::MetresF32,
+            (readings.iter())
+                .flat_map(|d| unit.metres(*d).unwrap_or(f32::NAN).to_le_bytes())
+                .collect(),
+        ),
+    }
+}
+
+/// Little-endian 16-bit numbers of `unit` as a session takes them.
+fn of_numbers(depth: Vec<u8>, unit: DepthUnit) -> (DepthFormat, Vec<u8>) {
+    match unit {
+        DepthUnit::Millimetres => (DepthFormat::MillimetresU16, depth),
+        DepthUnit::Normalized => (DepthFormat::NormalizedU16, depth),
+        unit => {
+            let numbers = depth
+                .as_chunks::<2>()
+                .0
+                .iter()
+                .map(|n| f32::from(u16::from_le_bytes(*n)));
+            let metres = numbers.flat_map(|n| unit.metres(n).unwrap_or(f32::NAN).to_le_bytes());
+            (DepthFormat::MetresF32, metres.collect())
+        }
+    }
+}
+
+/// How raw frames follow each other in a pipe: rows of RGB bytes, then rows of 16-bit little-endian depth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RawVideo {
+    /// (H, W) of colour.
+    pub colour: (usize, usize),
+    /// (H, W) of depth.
+    pub depth: (usize, usize),
+    /// What the numbers of depth mean.
+    pub unit: DepthUnit,
+}
+
+impl RawVideo {
+    /// The next frame; None at the end.
+    ///
+    /// # Errors
+    /// A pipe that breaks or ends within a frame.
+    pub fn read(&self, from: &mut dyn Read) -> Result<Option<VideoFrame>> {
+        let mut colour = vec![0; 3 * self.colour.0 * self.colour.1];
+        let mut depth = vec![0; 2 * self.depth.0 * self.depth.1];
+        let got = fill(from, &mut colour)?;
+        if got == 0 {
+            return Ok(None);
+        }
+        let got = got
+            + if got == colour.len() {
+                fill(from, &mut depth)?
+            } else {
+                0
+            };
+        if got < colour.len() + depth.len() {
+            return Err(Error::Input(format!(
+                "the raw video ends {got} bytes into a frame of {}; is the size right?",
+                colour.len() + depth.len()
+            )));
+        }
+        let (format, depth) = of_numbers(depth, self.unit);
+        Ok(Some(VideoFrame {
+            colour,
+            colour_shape: self.colour,
+            depth,
+            depth_shape: self.depth,
+            format,
+        }))
+    }
+}
+
+/// Reads until `bytes` is full or the pipe ends; gives how much.
+fn fill(from: &mut dyn Read, bytes: &mut [u8]) -> Result<usize> {
+    let mut got = 0;
+    while got < bytes.len() {
+        match from.read(&mut bytes[got..]) {
+            Ok(0) => break,
+            Ok(n) => got += n,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(Error::Input(format!("the raw video cannot be read: {e}"))),
+        }
+    }
+    Ok(got)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn frames_of_a_folder_are_paired_in_the_order_of_their_numbers() {
+        let dir = tempfile::tempdir().unwrap();
+        let touch = |name: &str| std::fs::write(dir.path().join(name), "").unwrap();
+        let refused = || frames_of_folder(dir.path()).unwrap_err().to_string();
+        assert!(refused().contains("no frames"));
+        for name in [
+            "color_10.jpg",
+            "depth_10.png",
+            "rgb_2.png",
+            "depth_0002.npy",
+            "notes.txt",
+        ] {
+            touch(name);
+        }
+        let frames = frames_of_folder(dir.path()).unwrap();
+        let names: Vec<_> = frames.iter().map(|(c, d)| (c.file_name(), d.file_name())).collect();
+        assert_eq!(names[0], (Some("rgb_2.png".as_ref()), Some("depth_0002.npy".as_ref())));
+        assert_eq!(names[1], (Some("color_10.jpg".as_ref()), Some("depth_10.png".as_ref())));
+        touch("depth_11.png");
+        assert!(refused().contains("depth_11.png") && refused().contains("no partner"));
+    }
+
+    #[test]
+    fn raw_video_is_cut_into_frames_and_a_cut_frame_is_named() {
+        let raw = RawVideo {
+            colour: (2, 3),
+            depth: (1, 2),
+            unit: DepthUnit::Millimetres,
+        };
+        let bytes: Vec<u8> = (0..44).collect();
+        let mut pipe = &bytes[..];
+        let first = raw.read(&mut pipe).unwrap().unwrap();
+        assert_eq!((first.shape(), first.colour[17], first.depth[0]), ((2, 3), 17, 18));
+        assert_eq!(raw.read(&mut pipe).unwrap().unwrap().depth, [40, 41, 42, 43]);
+        assert_eq!(raw.read(&mut pipe).unwrap(), None);
+        let cut = raw.read(&mut &bytes[..30]).and_then(|_| raw.read(&mut &bytes[22..40]));
+        assert!(cut.unwrap_err().to_string().contains("18 bytes into a frame of 22"));
+        let units = RawVideo {
+            unit: DepthUnit::Raw { units_per_m: 5000.0 },
+            ..raw
+        };
+        let frame = units.read(&mut &bytes[..22]).unwrap().unwrap();
+        let metres = f32::from(u16::from_le_bytes([18, 19])) / 5000.0;
+        assert_eq!(frame.depth[..4], metres.to_le_bytes());
+    }
+}

@@ -1,0 +1,200 @@
+//! A picture onto a modulator of another size: the whole of it, as much as fills the modulator, or pixel for pixel.
+
+use crate::Result;
+use image::imageops::{self, FilterType};
+use image::{Rgb, Rgb32FImage};
+use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
+use phasefront::RgbdFrame;
+use phasefront::unstable::frame::Crop;
+
+/// How a picture lies on a modulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fit {
+    /// The whole picture, as large as it goes, in the middle of black.
+    Contain,
+    /// As much of the picture as fills the modulator.
+    Cover,
+    /// Pixel for pixel, in the middle: black around a smaller picture, a larger one cut.
+    Centre,
+}
+
+/// Where the pixels of a picture go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placement {
+    /// The part of the picture that is shown, in its pixels.
+    crop: Crop,
+    /// (H, W) of that part on the modulator.
+    inner: (usize, usize),
+    /// Its top left corner there, (row, column).
+    at: (usize, usize),
+    /// (H, W) of what comes out.
+    out: (usize, usize),
+}
+
+impl Placement {
+    /// The picture as it is.
+    pub fn as_is(picture: (usize, usize)) -> Self {
+        Placement {
+            crop: Crop::cover(picture, picture),
+            inner: picture,
+            at: (0, 0),
+            out: picture,
+        }
+    }
+
+    /// (H, W) = `picture` on (H, W) = `modulator`.
+    pub fn new(picture: (usize, usize), modulator: (usize, usize), fit: Fit) -> Self {
+        let whole = Crop::cover(picture, picture);
+        let (h, w) = (picture.0 as f64, picture.1 as f64);
+        let (crop, inner) = match fit {
+            Fit::Cover => (Crop::cover(picture, modulator), modulator),
+            Fit::Contain => {
+                let scale = (modulator.0 as f64 / h).min(modulator.1 as f64 / w);
+                let side = |n: f64, most: usize| ((n * scale).round() as usize).clamp(1, most);
+                (whole, (side(h, modulator.0), side(w, modulator.1)))
+            }
+            Fit::Centre => {
+                let inner = (picture.0.min(modulator.0), picture.1.min(modulator.1));
+                let crop = Crop {
+                    x: ((picture.1 - inner.1) / 2) as f64,
+                    y: ((picture.0 - inner.0) / 2) as f64,
+                    width: inner.1 as f64,
+                    height: inner.0 as f64,
+                };
+                (crop, inner)
+            }
+        };
+        Placement {
+            crop,
+            inner,
+            at: ((modulator.0 - inner.0) / 2, (modulator.1 - inner.1) / 2),
+            out: modulator,
+        }
+    }
+
+    /// (H, W) of the picture's part on the modulator.
+    pub fn inner(&self) -> (usize, usize) {
+        self.inner
+    }
+
+    /// The part of a depth image of (H, W) = `depth` that lies behind the shown part of a picture of (H, W) =
+    /// `picture` and the same field of view.
+    pub fn depth_crop(&self, depth: (usize, usize), picture: (usize, usize)) -> Crop {
+        (self.crop).scaled(depth.1 as f64 / picture.1 as f64, depth.0 as f64 / picture.0 as f64)
+    }
+
+    /// The shown part of `rgb`, (3, H, W), at its size on the modulator; means where it shrinks.
+    pub fn colour(&self, rgb: ArrayView3<'_, f32>) -> Array3<f32> {
+        let (_, height, width) = rgb.dim();
+        if *self == Self::as_is((height, width)) {
+            return rgb.to_owned();
+        }
+        let [x, y, w, h] = [self.crop.x, self.crop.y, self.crop.width, self.crop.height].map(|v| v.round() as u32);
+        let part = Rgb32FImage::from_fn(w, h, |i, j| {
+            let (row, column) = ((y + j) as usize, (x + i) as usize);
+            Rgb([0, 1, 2].map(|c| rgb[(c, row.min(height - 1), column.min(width - 1))]))
+        });
+        let (height, width) = self.inner;
+        let sized = match (h as usize, w as usize) == self.inner {
+            true => part,
+            false => imageops::resize(&part, width as u32, height as u32, FilterType::Triangle),
+        };
+        Array3::from_shape_fn((3, height, width), |(c, y, x)| {
+            sized.get_pixel(x as u32, y as u32).0[c].clamp(0.0, 1.0)
+        })
+    }
+
+    /// The shown part of `depth`, (H, W), of the picture's shape: nearest samples, for a mean across an edge would be a
+    /// depth where nothing is.
+    pub fn depth(&self, depth: ArrayView2<'_, f32>) -> Array2<f32> {
+        let (height, width) = depth.dim();
+        Array2::from_shape_fn(self.inner, |(y, x)| {
+            let at = |i: usize, from: f64, length: f64, out: usize, most: usize| {
+                ((from + (i as f64 + 0.5) * length / out as f64) as usize).min(most - 1)
+            };
+            let row = at(y, self.crop.y, self.crop.height, self.inner.0, height);
+            let column = at(x, self.crop.x, self.crop.width, self.inner.1, width);
+            depth[(row, column)]
+        })
+    }
+
+    /// The frame of the modulator's shape: black around `rgb`, (3, h, w), and the depth of the nearest pixel around
+    /// `depth`, (h, w), both of the shape of [`Self::inner`].
+    ///
+    /// # Errors
+    /// Numbers that are no frame's.
+    pub fn frame(&self, rgb: Array3<f32>, depth: Array2<f32>) -> Result<RgbdFrame> {
+        if self.inner == self.out {
+            return Ok(RgbdFrame::new(rgb, depth)?);
+        }
+        let ((top, left), (height, width)) = (self.at, self.inner);
+        let mut wide = Array3::zeros((3, self.out.0, self.out.1));
+        wide.slice_mut(s![.., top..top + height, left..left + width])
+            .assign(&rgb);
+        let deep = Array2::from_shape_fn(self.out, |(y, x)| {
+            let row = y.clamp(top, top + height - 1) - top;
+            let column = x.clamp(left, left + width - 1) - left;
+            depth[(row, column)]
+        });
+        Ok(RgbdFrame::new(wide, deep)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn picture(height: usize, width: usize) -> (Array3<f32>, Array2<f32>) {
+        let rgb = Array3::from_shape_fn((3, height, width), |(c, y, x)| (c + y + x) as f32 / 100.0);
+        let depth = Array2::from_shape_fn((height, width), |(y, x)| (y * width + x) as f32 / 1000.0);
+        (rgb, depth)
+    }
+
+    fn placed(shape: (usize, usize), modulator: (usize, usize), fit: Fit) -> RgbdFrame {
+        let (rgb, depth) = picture(shape.0, shape.1);
+        let placement = Placement::new(shape, modulator, fit);
+        let frame = placement
+            .frame(placement.colour(rgb.view()), placement.depth(depth.view()))
+            .unwrap();
+        assert_eq!(frame.shape(), modulator);
+        frame
+    }
+
+    #[test]
+    fn a_picture_pixel_for_pixel_lies_in_the_middle_or_is_cut() {
+        let (rgb, depth) = picture(4, 6);
+        let frame = placed((4, 6), (8, 8), Fit::Centre);
+        assert_eq!(frame.rgb().slice(s![.., 2..6, 1..7]), rgb);
+        assert_eq!(frame.depth().slice(s![2..6, 1..7]), depth);
+        assert_eq!(frame.rgb()[(0, 1, 3)], 0.0);
+        assert_eq!(frame.depth()[(0, 0)], depth[(0, 0)]);
+        assert_eq!(frame.depth()[(7, 7)], depth[(3, 5)]);
+        let cut = placed((4, 6), (2, 2), Fit::Centre);
+        assert_eq!(cut.rgb(), rgb.slice(s![.., 1..3, 2..4]));
+        assert_eq!(cut.depth(), depth.slice(s![1..3, 2..4]));
+    }
+
+    #[test]
+    fn a_picture_is_shown_whole_or_fills_the_modulator() {
+        let whole = placed((4, 6), (16, 12), Fit::Contain);
+        assert!(whole.rgb().slice(s![.., ..4, ..]).iter().all(|v| *v == 0.0));
+        assert!(whole.rgb().slice(s![1.., 4..12, ..]).iter().all(|v| *v > 0.0));
+        let full = placed((4, 6), (8, 8), Fit::Cover);
+        assert!(full.rgb().slice(s![1.., .., ..]).iter().all(|v| *v > 0.0));
+        // Of six columns the middle four are shown, each twice.
+        let (_, depth) = picture(4, 6);
+        assert_eq!(full.depth()[(0, 0)], depth[(0, 1)]);
+        assert_eq!(full.depth()[(7, 7)], depth[(3, 4)]);
+    }
+
+    #[test]
+    fn a_picture_as_it_is_stays() {
+        let (rgb, depth) = picture(5, 7);
+        let placement = Placement::as_is((5, 7));
+        let frame = placement
+            .frame(placement.colour(rgb.view()), placement.depth(depth.view()))
+            .unwrap();
+        assert_eq!((frame.rgb(), frame.depth()), (rgb.view(), depth.view()));
+    }
+}

@@ -1,0 +1,297 @@
+//! Holograms as the image files that a modulator's input takes, and back.
+//!
+//! A packing of all colours in one image is one PNG, and so is one laser's. One of a colour after the other is three,
+//! `NAME-red.png`, `NAME-green.png` and `NAME-blue.png`.
+
+use crate::display::DisplayFile;
+use crate::hologram::Hologram;
+use crate::output::{self, Pending};
+use crate::picture::{PngShape, open_image, pending_png};
+use crate::{Error, Result};
+use image::DynamicImage;
+use ndarray::Array3;
+use phasefront::device::Packing;
+use phasefront::output::{BitPlanes, Layout, Levels, Output, Placement};
+use std::path::{Path, PathBuf};
+
+/// The names of the colours, in their order.
+pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
+
+/// Which of `colours` is called `name`.
+///
+/// # Errors
+/// Those of a display of one laser, which has no red, green and blue.
+pub fn colour(name: &str, colours: usize) -> Result<usize> {
+    let known = COLOURS.iter().take(colours).position(|known| *known == name);
+    known.filter(|_| colours == COLOURS.len()).ok_or_else(|| {
+        Error::Input(format!(
+            "--colour {name}: the display has one laser, whose maps have no other colour; leave it out"
+        ))
+    })
+}
+
+/// The pixels of one image file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// (H, W).
+    pub shape: (usize, usize),
+    /// Rows of pixels, words big-endian.
+    pub bytes: Vec<u8>,
+    /// What a pixel is.
+    pub kind: Kind,
+}
+
+/// What a pixel of an image is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Red, green, blue, a byte each.
+    Rgb,
+    /// A byte.
+    Grey,
+    /// A word.
+    Grey16,
+}
+
+impl Image {
+    /// Writes it as a PNG.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        self.pending(path)?.place()
+    }
+
+    fn pending(&self, path: &Path) -> Result<Pending> {
+        let (color, depth) = match self.kind {
+            Kind::Rgb => (png::ColorType::Rgb, png::BitDepth::Eight),
+            Kind::Grey => (png::ColorType::Grayscale, png::BitDepth::Eight),
+            Kind::Grey16 => (png::ColorType::Grayscale, png::BitDepth::Sixteen),
+        };
+        let shape = PngShape {
+            width: self.shape.1,
+            height: self.shape.0,
+            color,
+            depth,
+        };
+        pending_png(path, shape, &self.bytes, &[])
+    }
+
+    /// Reads a PNG or BMP.
+    ///
+    /// # Errors
+    /// A file that is missing, cut short, or of another kind.
+    pub fn read(path: &Path) -> Result<Self> {
+        let image = open_image(path)?;
+        let shape = (image.height() as usize, image.width() as usize);
+        let (bytes, kind) = match image {
+            DynamicImage::ImageRgb8(rgb) => (rgb.into_raw(), Kind::Rgb),
+            DynamicImage::ImageLuma8(grey) => (grey.into_raw(), Kind::Grey),
+            DynamicImage::ImageLuma16(grey) => (
+                grey.into_raw().into_iter().flat_map(u16::to_be_bytes).collect(),
+                Kind::Grey16,
+            ),
+            other => {
+                return Err(Error::file(
+                    path,
+                    format!(
+                        "holds {:?} pixels; a frame has RGB of 8 bits, or grey of 8 or 16",
+                        other.color()
+                    ),
+                ));
+            }
+        };
+        Ok(Image { shape, bytes, kind })
+    }
+}
+
+fn kind(layout: Layout) -> Kind {
+    match layout {
+        Layout::Grey => Kind::Grey,
+        Layout::Grey16 => Kind::Grey16,
+        _ => Kind::Rgb,
+    }
+}
+
+/// Words the other way round, where an image has words: the core's are little-endian, a PNG's big-endian.
+fn swap(kind: Kind, bytes: &mut [u8]) {
+    if kind == Kind::Grey16 {
+        bytes.as_chunks_mut::<2>().0.iter_mut().for_each(|word| word.reverse());
+    }
+}
+
+fn output(display: &DisplayFile, shape: (usize, usize), layout: Layout) -> Result<Output> {
+    let placement = Placement {
+        flip_x: display.device.flip_x,
+        flip_y: display.device.flip_y,
+        ..Placement::centred(layout)
+    };
+    Ok(Output::new(&display.target, shape, placement)?)
+}
+
+/// The plan of a modulator of `cells`, whose every pixel a hologram of (H, W) covers.
+///
+/// # Errors
+/// A hologram of another size.
+pub fn bit_planes(
+    display: &DisplayFile,
+    shape: (usize, usize),
+    cells: &phasefront::output::Cells,
+) -> Result<BitPlanes> {
+    let modulator = (display.device.display.height(), display.device.display.width());
+    if shape != modulator {
+        return Err(Error::Input(format!(
+            "a hologram of {}×{} for a modulator of {}×{} pixels; for bit planes both must be of one size",
+            shape.1, shape.0, modulator.1, modulator.0
+        )));
+    }
+    let device = &display.device;
+    Ok(BitPlanes::new(cells, shape, device.flip_x, device.flip_y))
+}
+
+/// The images of a phase-only hologram: one, or one for each colour.
+///
+/// # Errors
+/// A complex hologram; one that is larger than the modulator, or was made for another display.
+pub fn pack(hologram: &Hologram, display: &DisplayFile) -> Result<Vec<Image>> {
+    hologram.check_display(display)?;
+    let shape = hologram.shape();
+    let colours = display.device.display.colours();
+    let levels = match hologram {
+        Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
+        Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
+        Hologram::Complex(..) => {
+            return Err(Error::Input(
+                "a complex hologram has no levels; give the PNG of `phasefront hologram`".into(),
+            ));
+        }
+    };
+    match (&display.device.packing, levels) {
+        (Packing::Images(layout), levels) => {
+            let output = output(display, shape, *layout)?;
+            (0..layout.images(colours))
+                .map(|image| {
+                    let mut bytes = vec![0; output.image_bytes()];
+                    output.write(levels, image, &mut bytes)?;
+                    swap(kind(*layout), &mut bytes);
+                    Ok(Image {
+                        shape: output.shape(),
+                        bytes,
+                        kind: kind(*layout),
+                    })
+                })
+                .collect()
+        }
+        (Packing::BitPlanes(cells), Levels::Bytes(levels)) => {
+            let plan = bit_planes(display, shape, cells)?;
+            let maps: Vec<&[u8]> = levels.chunks_exact(shape.0 * shape.1).collect();
+            Ok(vec![pack_maps(&plan, &maps)?])
+        }
+        _ => Err(Error::Input("levels of over 8 bits have no bit planes".into())),
+    }
+}
+
+/// The frame that shows `maps` of levels, (H, W) each, one after another.
+///
+/// # Errors
+/// A number of maps that does not divide 24.
+pub fn pack_maps(plan: &BitPlanes, maps: &[&[u8]]) -> Result<Image> {
+    let mut bytes = vec![0; plan.frame_bytes()];
+    plan.pack(maps, &mut bytes)?;
+    Ok(Image {
+        shape: plan.frame_shape(),
+        bytes,
+        kind: Kind::Rgb,
+    })
+}
+
+/// The levels, (C, H, W) = (C, `shape`), that `images` show in the middle of the modulator.
+///
+/// # Errors
+/// Images of another number, size or kind.
+pub fn unpack(images: &[Image], display: &DisplayFile, shape: (usize, usize)) -> Result<Array3<u16>> {
+    let colours = display.device.display.colours();
+    let mut levels = Array3::zeros((colours, shape.0, shape.1));
+    let values = levels.as_slice_mut().expect("standard layout");
+    let fits = |count: usize, shape: (usize, usize), kind: Kind| match images {
+        all if all.len() != count => Err(Error::Input(format!(
+            "{} images; the display's packing has {count}",
+            all.len()
+        ))),
+        all => all
+            .iter()
+            .find(|image| (image.shape, image.kind) != (shape, kind))
+            .map_or(Ok(()), |image| {
+                Err(Error::Input(format!(
+                    "a frame of {}×{} {:?}; the display's are {}×{} {kind:?}",
+                    image.shape.1, image.shape.0, image.kind, shape.1, shape.0
+                )))
+            }),
+    };
+    match &display.device.packing {
+        Packing::BitPlanes(cells) => {
+            let plan = bit_planes(display, shape, cells)?;
+            fits(1, plan.frame_shape(), Kind::Rgb)?;
+            let mut plane = vec![0; shape.0 * shape.1];
+            for (colour, values) in values.chunks_exact_mut(plane.len()).enumerate() {
+                plan.unpack(&images[0].bytes, 8 * colour, &mut plane)?;
+                values
+                    .iter_mut()
+                    .zip(&plane)
+                    .for_each(|(value, level)| *value = (*level).into());
+            }
+        }
+        Packing::Images(layout) => {
+            let output = output(display, shape, *layout)?;
+            fits(layout.images(colours), output.shape(), kind(*layout))?;
+            for (n, image) in images.iter().enumerate() {
+                let mut bytes = image.bytes.clone();
+                swap(image.kind, &mut bytes);
+                output.read(&bytes, n, values)?;
+            }
+        }
+        _ => return Err(Error::Input("a packing that is not known here".into())),
+    }
+    Ok(levels)
+}
+
+/// Writes `images` to `path`, or to the files of their colours beside it; gives their names.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write(path: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
+    let files = paths(path, images.len());
+    let pending = files.iter().zip(images).map(|(path, image)| image.pending(path));
+    // None takes its place before all are on the disk.
+    pending
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .try_for_each(Pending::place)?;
+    Ok(files)
+}
+
+/// Declares the files that a hologram for `display` is written to.
+///
+/// # Errors
+/// Those of [`output::file`].
+pub fn declare(path: &Path, display: &DisplayFile) -> Result<()> {
+    output::extension(path, &["png"])?;
+    let count = match &display.device.packing {
+        Packing::Images(layout) => layout.images(display.device.display.colours()),
+        _ => 1,
+    };
+    paths(path, count)
+        .iter()
+        .try_for_each(|path| output::file(path, &["png"]))
+}
+
+/// The files of `count` images: `path` for one, one of each colour for three.
+pub fn paths(path: &Path, count: usize) -> Vec<PathBuf> {
+    if count == 1 {
+        return vec![path.to_owned()];
+    }
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    (COLOURS.iter().take(count))
+        .map(|colour| path.with_file_name(format!("{stem}-{colour}.{extension}")))
+        .collect()
+}

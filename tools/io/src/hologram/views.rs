@@ -1,0 +1,170 @@
+//! Looking at hologram files: the amplitudes that an eye focused at z would see.
+
+use crate::display::DisplayFile;
+use crate::display::calibration::AberrationFile;
+use crate::hologram::{Hologram, HologramInfo};
+use crate::{Error, Result};
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::Display;
+use phasefront::output::Levels;
+use phasefront::target::Aberration;
+use phasefront::unstable::refocus::{Refocus, shown_field};
+use phasefront::unstable::wave::aperture::Opening;
+use phasefront::unstable::wave::asm::Propagator;
+
+/// Optics with an aberration that is one for all depths, for holograms of one shape.
+pub struct AberratedOptics(Vec<Propagator>);
+
+impl AberratedOptics {
+    /// Those that `correction` corrects.
+    ///
+    /// # Errors
+    /// An empty shape; a correction of other colours.
+    pub fn new((height, width): (usize, usize), display: &Display, correction: &Aberration) -> Result<Self> {
+        let pitch_m = display.pitch_m();
+        let plans = Propagator::for_colours_corrected(
+            height,
+            width,
+            pitch_m,
+            display.wavelengths_m(),
+            0.0,
+            &correction.reversed(),
+            pitch_m,
+        )?;
+        Ok(AberratedOptics(plans))
+    }
+
+    /// What becomes of `field`, (C, H, W), on its way through.
+    pub fn pass(&self, field: &mut [Complex32]) {
+        let mut scratch = self.0[0].scratch();
+        let area = field.len() / self.0.len();
+        for (plan, plane) in self.0.iter().zip(field.chunks_exact_mut(area)) {
+            plan.propagate(plane, &mut scratch);
+        }
+    }
+}
+
+impl Hologram {
+    /// (H, W).
+    pub fn shape(&self) -> (usize, usize) {
+        let (_, height, width) = match self {
+            Hologram::PhaseOnly(levels, _) => levels.dim(),
+            Hologram::Words(levels, _) => levels.dim(),
+            Hologram::Complex(field, _) => field.dim(),
+        };
+        (height, width)
+    }
+
+    /// What the file says of the hologram.
+    pub fn info(&self) -> &HologramInfo {
+        match self {
+            Hologram::PhaseOnly(_, info) | Hologram::Words(_, info) | Hologram::Complex(_, info) => info,
+        }
+    }
+
+    /// Checks that the hologram was made for the display of `file`: for its lasers, pitch and offset, and levels for its
+    /// bits.
+    ///
+    /// # Errors
+    /// What differs, of both.
+    pub fn check_display(&self, file: &DisplayFile) -> Result<()> {
+        let (theirs, ours) = (&self.info().display, &file.target.display);
+        let of_levels = !matches!(self, Hologram::Complex(..));
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-5 * b.abs();
+        let lasers = |display: &Display| {
+            let nm = display.wavelengths_m().iter().map(|m| rounded(m * 1e9));
+            format!("lasers of {} nm", nm.collect::<Vec<_>>().join("/"))
+        };
+        let pitch = |display: &Display| format!("a pitch of {} µm", rounded(display.pitch_m() * 1e6));
+        let offset = |display: &Display| format!("an offset of {} mm", rounded(display.offset_m() * 1e3));
+        let bits = |display: &Display| format!("levels of {} bits", display.bits());
+        let same_lasers = theirs.colours() == ours.colours()
+            && (theirs.wavelengths_m().iter().zip(ours.wavelengths_m())).all(|(a, b)| near(*a, *b));
+        let same_offset = (theirs.offset_m() - ours.offset_m()).abs() < 1e-8;
+        let differs = [
+            (of_levels && theirs.bits() != ours.bits(), bits(theirs), bits(ours)),
+            (!same_lasers, lasers(theirs), lasers(ours)),
+            (!near(theirs.pitch_m(), ours.pitch_m()), pitch(theirs), pitch(ours)),
+            (!same_offset, offset(theirs), offset(ours)),
+        ];
+        let (theirs, ours): (Vec<_>, Vec<_>) = differs
+            .into_iter()
+            .filter_map(|(differs, theirs, ours)| differs.then_some((theirs, ours)))
+            .unzip();
+        if theirs.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Input(format!(
+            "the hologram is for {}, the display has {}; make it with this --display, or give the display and the --offset-mm that it was made for",
+            theirs.join(", "),
+            ours.join(", ")
+        )))
+    }
+
+    /// The amplitudes at each of `z_m`, (C, H, W), against the middle of the volume, metres.
+    ///
+    /// # Errors
+    /// A z too far to be propagated to, a look-up table that is none, or a hologram for a calibrated display.
+    pub fn views(&self, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+        self.views_on(&self.info().display_file()?, z_m)
+    }
+
+    /// [`Self::views`] on a display with its calibration: by its own phase curves, under its laser, through its
+    /// aberration, which must be one for all depths.
+    ///
+    /// # Errors
+    /// As [`Self::views`]; a hologram that was made for another display; a table made for fewer pixels; an aberration
+    /// that changes over depth or over the frame.
+    pub fn views_on(&self, file: &DisplayFile, z_m: &[f64]) -> Result<Vec<Array3<f32>>> {
+        let shape = self.shape();
+        let (height, width) = shape;
+        let info = self.info();
+        self.check_display(file)?;
+        let (mut field, aperture) = match self {
+            Hologram::Complex(field, _) => (field.clone(), None),
+            _ => {
+                let opening = Opening::centred(file.target.display.aperture_radius());
+                (self.shown(file)?, Some(opening))
+            }
+        };
+        if let Some(AberrationFile::Uniform(all)) = &file.aberration
+            && let Some(correction) = all.constant()
+        {
+            let optics = AberratedOptics::new(shape, &info.display, &correction)?;
+            optics.pass(field.as_slice_mut().expect("standard layout"));
+        } else if file.aberration.is_some() {
+            return Err(Error::Input(
+                "the display's aberration changes over depth or over the frame; such views cannot be made yet, leave the aberration out of the display's file".into(),
+            ));
+        }
+        let plan = Refocus::new(height, width, &info.display, z_m, aperture)?;
+        let views = plan.focal_stack(field.as_slice().expect("standard layout"), z_m)?;
+        Ok(views
+            .into_iter()
+            .map(|view| {
+                Array3::from_shape_vec((info.display.colours(), height, width), view)
+                    .expect("a view of the hologram's shape")
+            })
+            .collect())
+    }
+
+    /// The light that its levels make behind the modulator of `file`.
+    fn shown(&self, file: &DisplayFile) -> Result<Array3<Complex32>> {
+        let (height, width) = self.shape();
+        let info = self.info();
+        let levels = match self {
+            Hologram::PhaseOnly(levels, _) => Levels::Bytes(levels.as_slice().expect("standard layout")),
+            Hologram::Words(levels, _) => Levels::Words(levels.as_slice().expect("standard layout")),
+            Hologram::Complex(..) => unreachable!("a complex hologram has no levels"),
+        };
+        let field = shown_field(levels, info.scale.unwrap_or(1.0), &file.target, (height, width))?;
+        let shape = (info.display.colours(), height, width);
+        Ok(Array3::from_shape_vec(shape, field).expect("a value for each level"))
+    }
+}
+
+/// A figure without the last digits of a float.
+fn rounded(value: f64) -> String {
+    ((value * 1e6).round() / 1e6).to_string()
+}

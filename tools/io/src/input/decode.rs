@@ -1,0 +1,391 @@
+//! Pictures and depth maps, decoded: all that the laboratory reads comes through [`decode`], which bounds their pixels,
+//! turns them upright as their Exif data say, and makes an error of a decoder's panic.
+
+use crate::input::{self, MOST_PICTURE, quiet};
+use crate::{Error, Result};
+use exr::meta::MetaData;
+use exr::meta::header::Header;
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader};
+use ndarray::{Array2, Axis};
+use std::io::{BufRead, Cursor, Read, Seek, SeekFrom};
+use std::path::Path;
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
+
+/// The kinds of colour pictures that are read, for texts that list them.
+pub const COLOUR_FORMATS: &str = "PNG, JPEG, WebP, TIFF or BMP, of 8 or 16 bits";
+/// The kinds of depth maps that are read, for texts that list them.
+pub const DEPTH_FORMATS: &str =
+    "grey PNG, TIFF, WebP, JPEG or BMP of 8 or 16 bits, TIFF or OpenEXR of floating point, or .npy";
+
+/// Most pixels of an image that is read, 8192²: over two 8K frames.
+pub const MOST_PIXELS: u64 = 1 << 26;
+
+/// What can be done with a HEIC or AVIF file, which no well-kept decoder in Rust reads.
+const HEIC: &str = "is HEIC, which is not read; `heif-convert --with-aux photo.heic photo.jpg` of libheif writes the photo and its disparity as two pictures: give these to --rgb and --depth with --invert";
+const AVIF: &str = "is AVIF, which is not read; save it as PNG or JPEG";
+
+/// How a picture is read.
+#[derive(Debug, Clone, Copy)]
+pub struct Reading {
+    /// Pixels that it may have.
+    pub most_pixels: u64,
+    /// Whether it is turned as its Exif data say.
+    pub upright: bool,
+}
+
+impl Reading {
+    /// A picture as people see it.
+    pub(crate) const UPRIGHT: Reading = Reading {
+        most_pixels: MOST_PIXELS,
+        upright: true,
+    };
+    /// A picture whose pixels stand where other numbers say, as textures do.
+    pub const AS_STORED: Reading = Reading {
+        upright: false,
+        ..Self::UPRIGHT
+    };
+}
+
+/// One channel of a depth map, (H, W), as its file holds it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Plane {
+    pub(crate) values: Array2<f32>,
+    /// The largest number that its type holds; none for floating point.
+    pub(crate) most: Option<f32>,
+}
+
+/// What a file holds.
+#[derive(Debug)]
+pub(crate) enum Pixels {
+    /// Whole numbers of 8 or 16 bits.
+    Image(DynamicImage),
+    /// Other numbers, of one channel.
+    Plane(Plane),
+}
+
+/// What a file holds, and how it was turned.
+#[derive(Debug)]
+pub(crate) struct Decoded {
+    pub(crate) pixels: Pixels,
+    /// What the file's Exif data say; done where [`Reading::upright`] asks for it.
+    pub(crate) orientation: Orientation,
+}
+
+type Said<T> = std::result::Result<T, String>;
+
+/// The picture or depth map that `from` holds.
+///
+/// # Errors
+/// Another kind of file, one that is broken or cut short, or too many pixels.
+pub(crate) fn decode<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
+    let mut head = Vec::new();
+    (from.by_ref().take(16).read_to_end(&mut head))
+        .and_then(|_| from.seek(SeekFrom::Start(0)))
+        .map_err(|e| format!("cannot be read: {e}"))?;
+    let decoded = quiet::caught(|| match kind(&head)? {
+        Kind::Tiff => tiff(from, how),
+        Kind::Exr => exr(from, how),
+        Kind::Image(format) => image(from, format, how),
+    });
+    let Decoded { pixels, orientation } = decoded.map_err(|why| broken(&why))??;
+    let pixels = if how.upright {
+        turned(pixels, orientation)
+    } else {
+        pixels
+    };
+    Ok(Decoded { pixels, orientation })
+}
+
+/// The picture in `bytes`, in colour or grey.
+///
+/// # Errors
+/// As [`decode`]; numbers that are no picture's.
+pub fn picture_of(bytes: &[u8], how: Reading) -> Said<(DynamicImage, Orientation)> {
+    picture(decode(Cursor::new(bytes), how)?)
+}
+
+/// The picture in the file at `path`, in colour or grey, and how it was turned.
+///
+/// # Errors
+/// As [`decode`]; a file that cannot be read, or numbers that are no picture's.
+pub fn open_picture(path: &Path, how: Reading) -> Result<(DynamicImage, Orientation)> {
+    let file = input::open(path, MOST_PICTURE)?;
+    decode(file, how).and_then(picture).map_err(|e| Error::file(path, e))
+}
+
+fn picture(decoded: Decoded) -> Said<(DynamicImage, Orientation)> {
+    match decoded.pixels {
+        Pixels::Image(image) => Ok((image, decoded.orientation)),
+        Pixels::Plane(_) => Err(format!(
+            "holds numbers of 32 bits or floating point, which are read as depth alone; a picture is {COLOUR_FORMATS}"
+        )),
+    }
+}
+
+enum Kind {
+    Tiff,
+    Exr,
+    Image(ImageFormat),
+}
+
+/// What can be done with a picture of phones that is not read, where `head` begins one.
+pub(crate) fn unread_container(head: &[u8]) -> Option<&'static str> {
+    let brand = head.get(8..12).filter(|_| head.get(4..8) == Some(b"ftyp"))?;
+    match brand {
+        b"avif" | b"avis" => Some(AVIF),
+        b"heic" | b"heix" | b"hevc" | b"heim" | b"mif1" | b"msf1" => Some(HEIC),
+        _ => None,
+    }
+}
+
+/// What a file is by its first bytes.
+fn kind(head: &[u8]) -> Said<Kind> {
+    if let Some(why) = unread_container(head) {
+        return Err(why.into());
+    }
+    if head.starts_with(b"\x76\x2f\x31\x01") {
+        return Ok(Kind::Exr);
+    }
+    match image::guess_format(head) {
+        Ok(ImageFormat::Tiff) => Ok(Kind::Tiff),
+        Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg | ImageFormat::Bmp | ImageFormat::WebP)) => {
+            Ok(Kind::Image(format))
+        }
+        // BigTIFF has another number in its head.
+        _ if head.starts_with(b"II\x2b\0") || head.starts_with(b"MM\0\x2b") => Ok(Kind::Tiff),
+        _ => Err(format!(
+            "is not a picture of a kind that is read: {COLOUR_FORMATS}; depth also as OpenEXR or .npy"
+        )),
+    }
+}
+
+fn broken(why: &dyn std::fmt::Display) -> String {
+    format!("is not a whole picture: {why}")
+}
+
+/// A small file may hold a large image.
+fn check(width: u64, height: u64, most: u64) -> Said<()> {
+    if width.saturating_mul(height) > most {
+        return Err(format!("has {width}×{height} pixels; {most} in all are the most"));
+    }
+    Ok(())
+}
+
+fn image<R: BufRead + Seek>(from: R, format: ImageFormat, how: Reading) -> Said<Decoded> {
+    let mut reader = ImageReader::with_format(from, format);
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(8 * how.most_pixels);
+    reader.limits(limits.clone());
+    let mut decoder = reader.into_decoder().map_err(|e| broken(&e))?;
+    let (width, height) = decoder.dimensions();
+    check(width.into(), height.into(), how.most_pixels)?;
+    decoder.set_limits(limits).map_err(|e| broken(&e))?;
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let image = DynamicImage::from_decoder(decoder).map_err(|e| broken(&e))?;
+    Ok(Decoded {
+        pixels: Pixels::Image(image),
+        orientation,
+    })
+}
+
+fn tiff<R: BufRead + Seek>(from: R, how: Reading) -> Said<Decoded> {
+    let broken = |e: tiff::TiffError| broken(&e);
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = (8 * how.most_pixels) as usize;
+    limits.intermediate_buffer_size = limits.decoding_buffer_size;
+    let mut decoder = Decoder::new(from).map_err(broken)?.with_limits(limits);
+    let (width, height) = decoder.dimensions().map_err(broken)?;
+    check(width.into(), height.into(), how.most_pixels)?;
+    let colours = decoder.colortype().map_err(broken)?;
+    let number = |decoder: &mut Decoder<R>, tag| decoder.find_tag_unsigned::<u16>(tag).map_err(broken);
+    let orientation = number(&mut decoder, Tag::Orientation)?
+        .and_then(|exif| Orientation::from_exif(exif.try_into().ok()?))
+        .unwrap_or(Orientation::NoTransforms);
+    if number(&mut decoder, Tag::PlanarConfiguration)? == Some(2) && !matches!(colours, ColorType::Gray(_)) {
+        return Err("is a TIFF that holds its colours one after the other; save it with interleaved colours".into());
+    }
+    let values = decoder.read_image().map_err(broken)?;
+    let pixels = tiff_pixels(values, colours, width, height).ok_or_else(|| {
+        format!("is a TIFF of {colours:?}; grey of 8 to 64 bits is read, grey with alpha, RGB and RGBA of 8 and 16")
+    })?;
+    Ok(Decoded { pixels, orientation })
+}
+
+/// The pixels of a TIFF, where they are of a kind that is read.
+fn tiff_pixels(values: DecodingResult, colours: ColorType, width: u32, height: u32) -> Option<Pixels> {
+    use DecodingResult::{U8, U16};
+    let image = match (values, colours) {
+        (U8(v), ColorType::Gray(8)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLuma8),
+        (U8(v), ColorType::GrayA(8)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLumaA8),
+        (U8(v), ColorType::RGB(8)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgb8),
+        (U8(v), ColorType::RGBA(8)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgba8),
+        (U16(v), ColorType::Gray(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLuma16),
+        (U16(v), ColorType::GrayA(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageLumaA16),
+        (U16(v), ColorType::RGB(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgb16),
+        (U16(v), ColorType::RGBA(16)) => ImageBuffer::from_raw(width, height, v).map(DynamicImage::ImageRgba16),
+        (values, ColorType::Gray(_)) => return tiff_plane(values, (height as usize, width as usize)),
+        _ => None,
+    };
+    image.map(Pixels::Image)
+}
+
+fn tiff_plane(values: DecodingResult, shape: (usize, usize)) -> Option<Pixels> {
+    use DecodingResult::{F16, F32, F64, I8, I16, I32, U32};
+    let (values, most) = match values {
+        F16(v) => (v.into_iter().map(f32::from).collect(), None),
+        F32(v) => (v, None),
+        F64(v) => (v.into_iter().map(|v| v as f32).collect(), None),
+        I8(v) => (v.into_iter().map(f32::from).collect(), Some(f32::from(i8::MAX))),
+        I16(v) => (v.into_iter().map(f32::from).collect(), Some(f32::from(i16::MAX))),
+        I32(v) => (v.into_iter().map(|v| v as f32).collect(), Some(i32::MAX as f32)),
+        U32(v) => (v.into_iter().map(|v| v as f32).collect(), Some(u32::MAX as f32)),
+        _ => return None,
+    };
+    let values = Array2::from_shape_vec(shape, values).ok()?;
+    Some(Pixels::Plane(Plane { values, most }))
+}
+
+/// A depth map of OpenEXR: its channel of depth, or its colours where they are equal.
+fn exr<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decoded> {
+    let broken = |e: exr::error::Error| broken(&e);
+    let about = MetaData::read_from_buffered(&mut from, false).map_err(broken)?;
+    for header in &about.headers {
+        let exr::math::Vec2(width, height) = header.layer_size;
+        check(width as u64, height as u64, how.most_pixels)?;
+    }
+    let names = exr_channels(&about.headers)?;
+    let mut planes = names.iter().map(|name| exr_plane(&mut from, name));
+    let values = planes.next().unwrap_or_else(|| Err("has no channel".into()))?;
+    for other in planes {
+        if other? != values {
+            return Err(
+                "is OpenEXR of colours without a channel of depth (Z or depth), and is read as depth alone".into(),
+            );
+        }
+    }
+    Ok(Decoded {
+        pixels: Pixels::Plane(Plane { values, most: None }),
+        orientation: Orientation::NoTransforms,
+    })
+}
+
+/// One channel of OpenEXR.
+fn exr_plane<R: BufRead + Seek>(from: &mut R, name: &str) -> Said<Array2<f32>> {
+    use exr::prelude::{ReadChannels, ReadLayers, ReadSpecificChannel, Vec2};
+    from.seek(SeekFrom::Start(0))
+        .map_err(|e| format!("cannot be read: {e}"))?;
+    let channel = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .specific_channels()
+        .required(name)
+        .collect_pixels(
+            |size: Vec2<usize>, _: &_| Array2::<f32>::zeros((size.height(), size.width())),
+            |plane: &mut Array2<f32>, at: Vec2<usize>, (value,): (f32,)| plane[(at.y(), at.x())] = value,
+        );
+    let image = channel.first_valid_layer().all_attributes().non_parallel();
+    let image = image.from_buffered(from).map_err(|e| broken(&e))?;
+    Ok(image.layer_data.channel_data.pixels)
+}
+
+/// The channel of depth, or the three of colour where there is none.
+fn exr_channels(headers: &[Header]) -> Said<Vec<String>> {
+    let flat = headers.iter().filter(|header| !header.deep);
+    let names: Vec<String> = flat
+        .flat_map(|header| header.channels.list.iter().map(|channel| channel.name.to_string()))
+        .collect();
+    // Layers stand before a channel's name, as in `ViewLayer.Depth.Z`.
+    let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+    for wanted in ["z", "depth", "y", "d"] {
+        if let Some(name) = names.iter().find(|name| last(name) == wanted) {
+            return Ok(vec![name.clone()]);
+        }
+    }
+    let colours = ["R", "G", "B"].map(str::to_owned);
+    if colours.iter().all(|colour| names.contains(colour)) {
+        return Ok(colours.into());
+    }
+    match names.len() {
+        0 => Err("is OpenEXR of deep data; save it flat".into()),
+        1 => Ok(names),
+        _ => Err(format!(
+            "is OpenEXR with the channels {}; a depth map has one, or one called Z or depth",
+            names.join(", ")
+        )),
+    }
+}
+
+fn turned(pixels: Pixels, orientation: Orientation) -> Pixels {
+    match pixels {
+        Pixels::Image(mut image) => {
+            image.apply_orientation(orientation);
+            Pixels::Image(image)
+        }
+        Pixels::Plane(Plane { values, most }) => Pixels::Plane(Plane {
+            values: turned_plane(values, orientation),
+            most,
+        }),
+    }
+}
+
+fn turned_plane(mut plane: Array2<f32>, orientation: Orientation) -> Array2<f32> {
+    use Orientation::{
+        FlipHorizontal, FlipVertical, NoTransforms, Rotate90, Rotate90FlipH, Rotate180, Rotate270, Rotate270FlipH,
+    };
+    let (transposed, columns, rows) = match orientation {
+        NoTransforms => return plane,
+        FlipHorizontal => (false, true, false),
+        FlipVertical => (false, false, true),
+        Rotate180 => (false, true, true),
+        Rotate90FlipH => (true, false, false),
+        Rotate90 => (true, true, false),
+        Rotate270 => (true, false, true),
+        Rotate270FlipH => (true, true, true),
+    };
+    if transposed {
+        plane = plane.reversed_axes();
+    }
+    if columns {
+        plane.invert_axis(Axis(1));
+    }
+    if rows {
+        plane.invert_axis(Axis(0));
+    }
+    plane.as_standard_layout().into_owned()
+}
+
+/// Whether a picture that was turned so has its height for its width.
+pub(crate) fn swaps_sides(orientation: Orientation) -> bool {
+    orientation.to_exif() >= 5
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn planes_are_turned_as_pictures_are() {
+        for exif in 1..=8 {
+            let orientation = Orientation::from_exif(exif).unwrap();
+            let image = image::GrayImage::from_fn(5, 3, |x, y| image::Luma([(5 * y + x) as u8]));
+            let plane = Array2::from_shape_fn((3, 5), |(y, x)| (5 * y + x) as f32);
+            let mut image = DynamicImage::from(image);
+            image.apply_orientation(orientation);
+            let image = image.into_luma8();
+            let plane = turned_plane(plane, orientation);
+            assert_eq!(
+                (plane.ncols() as u32, plane.nrows() as u32),
+                image.dimensions(),
+                "{exif}"
+            );
+            for ((y, x), value) in plane.indexed_iter() {
+                assert_eq!(*value, f32::from(image.get_pixel(x as u32, y as u32).0[0]), "{exif}");
+            }
+            assert_eq!(swaps_sides(orientation), plane.nrows() == 5, "{exif}");
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Colour pictures: read as amplitudes or bytes, written as PNG.
+
+use crate::Result;
+use crate::input::decode::{self, Reading};
+use crate::output::Pending;
+use image::{DynamicImage, RgbImage};
+use ndarray::{Array3, ArrayView3};
+use std::io::Write;
+use std::path::Path;
+
+pub mod depth_map;
+pub mod export;
+pub mod photo;
+pub mod plot;
+
+/// The picture in the file at `path`, upright.
+pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
+    decode::open_picture(path, Reading::UPRIGHT).map(|(image, _)| image)
+}
+
+/// The amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images have three equal colours; alpha is left out.
+///
+/// # Errors
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
+pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
+    open_image(path).map(amplitudes)
+}
+
+/// The amplitudes of `image`, (3, H, W) in \[0, 1].
+pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let amplitudes =
+        |at: &dyn Fn(usize) -> f32| Array3::from_shape_fn((3, height, width), |(c, y, x)| at(3 * (y * width + x) + c));
+    // Not by way of floats: that would be all of it twice.
+    match image {
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let pixels = image.into_rgb16().into_raw();
+            amplitudes(&|i| f32::from(pixels[i]) / 65535.0)
+        }
+        image => {
+            let pixels = image.into_rgb8().into_raw();
+            amplitudes(&|i| f32::from(pixels[i]) / 255.0)
+        }
+    }
+}
+
+/// The (H, W) of an image, upright, and its pixels as rows of RGB bytes. Grey images have three equal colours; alpha is
+/// left out.
+///
+/// # Errors
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
+pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
+    let image = open_image(path)?.into_rgb8();
+    let shape = (image.height() as usize, image.width() as usize);
+    Ok((shape, image.into_raw()))
+}
+
+/// Writes amplitudes, (C, H, W), as an 8-bit RGB PNG; what is over 1 is white, and one laser's are grey.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_amplitude(path: &Path, amplitude: ArrayView3<'_, f32>) -> Result<()> {
+    let bytes = amplitude_bytes(amplitude);
+    let (_, height, width) = amplitude.dim();
+    write_png_of(path, PngShape::of_levels(3, height, width), &bytes, &[])
+}
+
+/// Amplitudes, (C, H, W), as rows of RGB bytes; one laser's are grey.
+pub fn amplitude_bytes(amplitude: ArrayView3<'_, f32>) -> Vec<u8> {
+    interleaved(as_rgb(&amplitude), |v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+/// A stack of (C, H, W) as one of (3, H, W): one laser's plane is all three.
+pub fn as_rgb<'a, T>(stack: &'a ArrayView3<'_, T>) -> ArrayView3<'a, T> {
+    let (_, height, width) = stack.dim();
+    stack.broadcast((3, height, width)).expect("three colours or one")
+}
+
+pub(crate) fn interleaved<T: Copy>(stack: ArrayView3<'_, T>, byte: impl Fn(T) -> u8) -> Vec<u8> {
+    let pixels = stack.permuted_axes([1, 2, 0]);
+    pixels.iter().map(|v| byte(*v)).collect()
+}
+
+/// Writes an 8-bit RGB PNG.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_rgb(path: &Path, picture: &RgbImage) -> Result<()> {
+    let (width, height) = picture.dimensions();
+    let shape = PngShape::of_levels(3, height as usize, width as usize);
+    write_png_of(path, shape, picture.as_raw(), &[])
+}
+
+/// Writes an 8-bit RGBA PNG of rows of `rgba`.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_rgba(path: &Path, width: usize, height: usize, rgba: &[u8]) -> Result<()> {
+    let shape = PngShape {
+        width,
+        height,
+        color: png::ColorType::Rgba,
+        depth: png::BitDepth::Eight,
+    };
+    write_png_of(path, shape, rgba, &[])
+}
+
+/// Size and kind of a PNG's pixels.
+#[derive(Clone, Copy)]
+pub(crate) struct PngShape {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) color: png::ColorType,
+    pub(crate) depth: png::BitDepth,
+}
+
+impl PngShape {
+    /// Of (`colours`, `height`, `width`) bytes.
+    pub(crate) fn of_levels(colours: usize, height: usize, width: usize) -> Self {
+        PngShape {
+            width,
+            height,
+            color: png_color(colours),
+            depth: png::BitDepth::Eight,
+        }
+    }
+}
+
+/// What a PNG of so many colours is: RGB, or grey for one laser.
+pub(crate) fn png_color(colours: usize) -> png::ColorType {
+    match colours {
+        1 => png::ColorType::Grayscale,
+        _ => png::ColorType::Rgb,
+    }
+}
+
+/// Writes a PNG of rows of `pixels`, words big-endian, with text chunks of these names.
+pub(crate) fn write_png_of(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<()> {
+    pending_png(path, shape, pixels, texts)?.place()
+}
+
+/// As [`write_png_of`], not in its place yet.
+pub(crate) fn pending_png(path: &Path, shape: PngShape, pixels: &[u8], texts: &[(&str, String)]) -> Result<Pending> {
+    Pending::write(path, |file| {
+        let mut encoder = png::Encoder::new(file, shape.width as u32, shape.height as u32);
+        encoder.set_color(shape.color);
+        encoder.set_depth(shape.depth);
+        let other = std::io::Error::other;
+        for (name, text) in texts {
+            encoder.add_text_chunk((*name).into(), text.clone()).map_err(other)?;
+        }
+        let mut writer = encoder.write_header().map_err(other)?;
+        writer.write_image_data(pixels).map_err(other)?;
+        writer.finish().map_err(other)
+    })
+}

@@ -1,0 +1,87 @@
+//! Depth maps of files: one number for each pixel, whatever kind of file holds it.
+
+use crate::input::decode::{self, DEPTH_FORMATS, Pixels, Plane, Reading};
+use crate::input::{self, MOST_ARRAY, MOST_PICTURE, npy};
+use crate::output::has_extension;
+use crate::{Error, Result};
+use image::metadata::Orientation;
+use image::{DynamicImage, Pixel, Rgb};
+use ndarray::Array2;
+use std::path::Path;
+
+/// A depth map, (H, W), and how its file's Exif data had it turned.
+#[derive(Debug)]
+pub(crate) struct DepthFile {
+    pub(crate) depth: Array2<f32>,
+    pub(crate) orientation: Orientation,
+}
+
+/// The numbers of a depth map, (H, W), as they stand in a file of [`DEPTH_FORMATS`], upright. For `normalized` depth
+/// whole numbers are divided by the largest that their type holds. Of colours that are equal, one is taken; alpha is
+/// left out.
+///
+/// # Errors
+/// A file that is missing, cut short, or of another kind.
+pub fn read_depth(path: &Path, normalized: bool) -> Result<Array2<f32>> {
+    read(path, normalized).map(|file| file.depth)
+}
+
+/// [`read_depth`], with how it was turned.
+pub(crate) fn read(path: &Path, normalized: bool) -> Result<DepthFile> {
+    let refuse = |why: String| Error::file(path, why);
+    let (plane, orientation) = if has_extension(path, "npy") {
+        let file = input::bytes(path, MOST_ARRAY)?;
+        (npy::read_plane(&file).map_err(refuse)?, Orientation::NoTransforms)
+    } else {
+        let file = input::open(path, MOST_PICTURE)?;
+        let decoded = decode::decode(file, Reading::UPRIGHT).map_err(refuse)?;
+        let plane = match decoded.pixels {
+            Pixels::Plane(plane) => plane,
+            Pixels::Image(image) => of_image(image).map_err(refuse)?,
+        };
+        (plane, decoded.orientation)
+    };
+    let Plane { mut values, most } = plane;
+    if let Some(most) = most.filter(|_| normalized) {
+        values.mapv_inplace(|v| v / most);
+    }
+    Ok(DepthFile {
+        depth: values,
+        orientation,
+    })
+}
+
+fn of_image(image: DynamicImage) -> std::result::Result<Plane, String> {
+    let shape = (image.height() as usize, image.width() as usize);
+    let bytes = f32::from(u8::MAX);
+    let words = f32::from(u16::MAX);
+    let kind = image.color();
+    let (values, most) = match image {
+        DynamicImage::ImageLuma8(grey) => (Some(grey.into_raw().into_iter().map(f32::from).collect()), bytes),
+        DynamicImage::ImageLuma16(grey) => (Some(grey.into_raw().into_iter().map(f32::from).collect()), words),
+        DynamicImage::ImageLumaA8(grey) => (Some(grey.pixels().map(|p| f32::from(p.0[0])).collect()), bytes),
+        DynamicImage::ImageLumaA16(grey) => (Some(grey.pixels().map(|p| f32::from(p.0[0])).collect()), words),
+        DynamicImage::ImageRgb8(rgb) => (equal(rgb.pixels().copied()), bytes),
+        DynamicImage::ImageRgba8(rgba) => (equal(rgba.pixels().map(Pixel::to_rgb)), bytes),
+        DynamicImage::ImageRgb16(rgb) => (equal(rgb.pixels().copied()), words),
+        DynamicImage::ImageRgba16(rgba) => (equal(rgba.pixels().map(Pixel::to_rgb)), words),
+        _ => return Err(format!("holds {kind:?} pixels; depth is {DEPTH_FORMATS}")),
+    };
+    let values: Vec<f32> = values.ok_or_else(|| {
+        format!(
+            "holds colours: it looks like a colour picture, or a depth map in false colours; depth is {DEPTH_FORMATS}"
+        )
+    })?;
+    let values = Array2::from_shape_vec(shape, values).map_err(|e| e.to_string())?;
+    Ok(Plane {
+        values,
+        most: Some(most),
+    })
+}
+
+/// One colour of each pixel, where all three are equal everywhere.
+fn equal<T: Copy + PartialEq + Into<f32>>(pixels: impl Iterator<Item = Rgb<T>>) -> Option<Vec<f32>> {
+    pixels
+        .map(|Rgb([r, g, b])| (r == g && g == b).then(|| r.into()))
+        .collect()
+}

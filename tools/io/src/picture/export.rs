@@ -1,0 +1,131 @@
+//! Pictures for people: views and maps as PNG, JPEG or WebP, stacks of them as a moving GIF or WebP.
+
+use crate::{Error, Result, output, picture};
+use image::codecs::gif::{GifEncoder, Repeat};
+use image::codecs::jpeg::JpegEncoder;
+use image::imageops::{self, FilterType};
+use image::{Delay, DynamicImage, Frame, RgbImage};
+use ndarray::ArrayView3;
+use std::io::Write;
+use std::path::Path;
+
+/// Quality of JPEG and lossy WebP, of 100.
+const QUALITY: u8 = 90;
+/// Time that a picture of a moving one is shown, ms.
+const FRAME_MS: u32 = 100;
+/// The longest side of a WebP, pixels.
+const WEBP_SIDE: u32 = 16383;
+
+/// Amplitudes, (C, H, W), as a picture; what is over 1 is white, and one laser's is grey.
+pub fn of_amplitude(amplitude: ArrayView3<'_, f32>) -> RgbImage {
+    let (_, height, width) = amplitude.dim();
+    RgbImage::from_raw(width as u32, height as u32, picture::amplitude_bytes(amplitude)).expect("three bytes a pixel")
+}
+
+/// `picture` at `width` pixels, its sides in proportion; as it is where it is no wider.
+pub fn at_width(picture: RgbImage, width: u32) -> RgbImage {
+    if picture.width() <= width {
+        return picture;
+    }
+    let height = (f64::from(picture.height()) * f64::from(width) / f64::from(picture.width())).round() as u32;
+    imageops::resize(&picture, width.max(1), height.max(1), FilterType::Triangle)
+}
+
+/// `picture` as lossy WebP of `quality`, 0 to 100.
+///
+/// # Errors
+/// A picture that is too large for the format.
+pub fn webp(picture: &RgbImage, quality: f32) -> Result<Vec<u8>> {
+    let (width, height) = picture.dimensions();
+    let encoder = webp::Encoder::from_rgb(picture.as_raw(), width, height);
+    let encoded = encoder.encode_simple(false, quality).map_err(|_| too_large(picture))?;
+    Ok(encoded.to_vec())
+}
+
+/// `picture` as WebP without loss.
+pub fn webp_lossless(picture: &RgbImage) -> Vec<u8> {
+    let (width, height) = picture.dimensions();
+    webp::Encoder::from_rgb(picture.as_raw(), width, height)
+        .encode_lossless()
+        .to_vec()
+}
+
+fn too_large(picture: &RgbImage) -> Error {
+    Error::Input(format!(
+        "{}×{} pixels are too many for WebP, whose sides are at most {WEBP_SIDE}; give a smaller --width",
+        picture.width(),
+        picture.height()
+    ))
+}
+
+/// Whether `path` is named as a picture that moves: .gif or .webp.
+pub fn moves(path: &Path) -> bool {
+    ["gif", "webp"].iter().any(|e| output::has_extension(path, e))
+}
+
+/// Writes `picture` as what the name says: .png, .jpg or .webp.
+///
+/// # Errors
+/// Another name; a file that cannot be written.
+pub fn write(path: &Path, picture: &RgbImage) -> Result<()> {
+    let is = |extension| output::has_extension(path, extension);
+    if is("png") {
+        return picture::write_rgb(path, picture);
+    }
+    if is("webp") {
+        let bytes = webp(picture, f32::from(QUALITY))?;
+        return output::write_atomically(path, |file| file.write_all(&bytes));
+    }
+    if is("jpg") || is("jpeg") {
+        return output::write_atomically(path, |file| {
+            let encoder = JpegEncoder::new_with_quality(file, QUALITY);
+            picture.write_with_encoder(encoder).map_err(std::io::Error::other)
+        });
+    }
+    Err(Error::file(path, "a picture's name must end in .png, .jpg or .webp"))
+}
+
+/// Writes `pictures`, all of one size, ten a second, there and back again, as what the name says: .gif or .webp.
+///
+/// # Errors
+/// Another name; a file that cannot be written.
+pub fn write_moving(path: &Path, pictures: &[RgbImage]) -> Result<()> {
+    let back = pictures.iter().skip(1).rev().skip(1);
+    let frames = pictures.iter().chain(back);
+    if output::has_extension(path, "gif") {
+        return output::write_atomically(path, |file| {
+            let other = std::io::Error::other;
+            let mut encoder = GifEncoder::new_with_speed(file, 10);
+            encoder.set_repeat(Repeat::Infinite).map_err(other)?;
+            for picture in frames {
+                let image = DynamicImage::from(picture.clone()).into_rgba8();
+                let delay = Delay::from_numer_denom_ms(FRAME_MS, 1);
+                let frame = Frame::from_parts(image, 0, 0, delay);
+                encoder.encode_frame(frame).map_err(other)?;
+            }
+            Ok(())
+        });
+    }
+    if output::has_extension(path, "webp") {
+        let bytes = moving_webp(frames)?;
+        return output::write_atomically(path, |file| file.write_all(&bytes));
+    }
+    Err(Error::file(path, "a moving picture's name must end in .gif or .webp"))
+}
+
+fn moving_webp<'a>(frames: impl Iterator<Item = &'a RgbImage>) -> Result<Vec<u8>> {
+    let frames: Vec<_> = frames.collect();
+    let first = frames
+        .first()
+        .ok_or_else(|| Error::Input("no picture to write".into()))?;
+    let mut config = webp::WebPConfig::new().map_err(|()| Error::Input("libwebp has no usual settings".into()))?;
+    config.quality = f32::from(QUALITY);
+    let (width, height) = first.dimensions();
+    let mut encoder = webp::AnimEncoder::new(width, height, &config);
+    for (index, picture) in frames.iter().enumerate() {
+        let at_ms = index as i32 * FRAME_MS as i32;
+        encoder.add_frame(webp::AnimFrame::from_rgb(picture.as_raw(), width, height, at_ms));
+    }
+    let encoded = encoder.try_encode().map_err(|_| too_large(first))?;
+    Ok(encoded.to_vec())
+}

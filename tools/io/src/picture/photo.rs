@@ -1,0 +1,282 @@
+//! Photos with depth inside, as phones store them: JPEGs whose XMP says GDepth or Dynamic Depth 1.0.
+//!
+//! * GDepth (`developers.google.com/depthmap-metadata`): the depth image lies in the XMP itself, in base64; where it is
+//!   too long for one segment, in extended XMP (Adobe's XMP specification, part 3).
+//! * Dynamic Depth 1.0: the XMP lists the images that stand behind the photo in the file.
+//!
+//! A depth image holds d_n from 0, near, to 1, far. `RangeLinear`: d = near + d_n·(far − near). `RangeInverse`, as
+//! portraits have it: d = far·near / (far − d_n·(far − near)), so d_n is linear in inverse distance.
+
+use crate::input::decode::{self, Reading};
+use crate::input::{self, MOST_PHOTO};
+use crate::{Error, Result, picture};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD_NO_PAD;
+use ndarray::{Array2, Array3};
+use roxmltree::{Document, Node};
+use std::path::Path;
+
+/// The namespace of GDepth.
+const GDEPTH: &str = "http://ns.google.com/photos/1.0/depthmap/";
+/// The namespaces of Dynamic Depth.
+const DEPTH_MAP: &str = "http://ns.google.com/photos/dd/1.0/depthmap/";
+const ITEM: &str = "http://ns.google.com/photos/dd/1.0/item/";
+/// What an APP1 segment of XMP begins with, and one of extended XMP.
+const XMP: &[u8] = b"http://ns.adobe.com/xap/1.0/\0";
+const EXTENDED_XMP: &[u8] = b"http://ns.adobe.com/xmp/extension/\0";
+/// The GUID, the length of the whole, and the offset of this part, before each part of extended XMP.
+const EXTENDED_HEAD: usize = 32 + 4 + 4;
+/// Most marks (`<`, `"`, `'`) in XMP: elements and attributes take far more memory than their characters.
+const MOST_MARKS: usize = 1 << 15;
+
+/// What the numbers of a photo's depth mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Range {
+    /// Linear in distance.
+    Linear,
+    /// Linear in inverse distance.
+    Inverse,
+}
+
+/// A photo with depth, upright.
+#[derive(Debug, Clone)]
+pub struct Photo {
+    /// Amplitudes, (3, H, W) in 0..=1.
+    pub rgb: Array3<f32>,
+    /// d_n, (h, w) in 0..=1: 0 near, 1 far. It shows what the photo shows, stretched.
+    pub depth: Array2<f32>,
+    /// What d_n means.
+    pub range: Range,
+    /// Distances of d_n = 0 and 1, in metres, where the file says them.
+    pub range_m: Option<(f64, f64)>,
+}
+
+impl Photo {
+    /// Distances in metres, (h, w), where the file says its range.
+    pub fn metres(&self) -> Option<Array2<f32>> {
+        let (near, far) = self.range_m?;
+        Some(self.depth.mapv(|d| {
+            let d = f64::from(d);
+            (match self.range {
+                Range::Linear => near + d * (far - near),
+                Range::Inverse => far * near / (far - d * (far - near)),
+            }) as f32
+        }))
+    }
+}
+
+/// Reads a photo with depth inside.
+///
+/// # Errors
+/// A file that is missing or broken, or has no depth that is understood; the reason says what can be done.
+pub fn read(path: &Path) -> Result<Photo> {
+    let bytes = input::bytes(path, MOST_PHOTO)?;
+    of_bytes(&bytes).map_err(|why| Error::file(path, why))
+}
+
+fn of_bytes(bytes: &[u8]) -> std::result::Result<Photo, String> {
+    if let Some(why) = decode::unread_container(bytes) {
+        return Err(why.into());
+    }
+    if !bytes.starts_with(&[0xFF, 0xD8]) {
+        return Err("is no JPEG; --photo takes a JPEG with depth inside, other pictures go to --rgb with --depth or --depth-network".into());
+    }
+    let (colour, orientation) = decode::picture_of(bytes, Reading::UPRIGHT)?;
+    let found = Xmp::read(bytes)?.depth(bytes)?;
+    // It lies as the photo is stored, whatever it says itself.
+    let depth = decode::picture_of(&found.image, Reading::AS_STORED);
+    let (mut depth, _) = depth.map_err(|why| format!("the depth inside {why}"))?;
+    depth.apply_orientation(orientation);
+    let grey = depth.into_luma16();
+    let (w, h) = (grey.width() as usize, grey.height() as usize);
+    let grey = grey.into_raw().into_iter().map(|v| f32::from(v) / 65535.0);
+    Ok(Photo {
+        rgb: picture::amplitudes(colour),
+        depth: Array2::from_shape_vec((h, w), grey.collect()).map_err(|e| e.to_string())?,
+        range: found.range,
+        range_m: found.range_m,
+    })
+}
+
+/// A depth image that was found, still encoded.
+struct Found {
+    image: Vec<u8>,
+    range: Range,
+    range_m: Option<(f64, f64)>,
+}
+
+/// The XMP of a JPEG.
+struct Xmp {
+    main: String,
+    extended: Option<String>,
+}
+
+impl Xmp {
+    fn read(jpeg: &[u8]) -> std::result::Result<Self, String> {
+        let mut main = None;
+        let mut parts: Vec<&[u8]> = Vec::new();
+        for segment in app1_segments(jpeg) {
+            if let Some(text) = segment.strip_prefix(XMP) {
+                main.get_or_insert(text);
+            } else if let Some(part) = segment.strip_prefix(EXTENDED_XMP) {
+                parts.push(part);
+            }
+        }
+        let main = main.ok_or(
+            "holds no depth: it has no XMP. Phones store depth in portraits; for other photos there is --depth-network",
+        )?;
+        let main = String::from_utf8(main.to_vec()).map_err(|_| "its XMP is no UTF-8")?;
+        let extended = match parts.is_empty() {
+            true => None,
+            false => Some(extended(&main, &parts)?),
+        };
+        Ok(Xmp { main, extended })
+    }
+
+    fn depth(&self, jpeg: &[u8]) -> std::result::Result<Found, String> {
+        let main = parse(&self.main)?;
+        let extended = self.extended.as_deref().map(parse).transpose()?;
+        let documents: Vec<_> = std::iter::once(&main).chain(&extended).collect();
+        let value = |space: &'static str, name: &'static str| {
+            documents.iter().find_map(|xml| property(xml.root(), space, name))
+        };
+        if let Some(data) = value(GDEPTH, "Data") {
+            let packed: Vec<u8> = data
+                .bytes()
+                .filter(|b| !b.is_ascii_whitespace() && *b != b'=')
+                .collect();
+            let image = STANDARD_NO_PAD.decode(packed);
+            return Found::new(
+                image.map_err(|e| format!("its GDepth:Data is no base64: {e}"))?,
+                |name| value(GDEPTH, name),
+            );
+        }
+        if value(GDEPTH, "Format").is_some() {
+            return Err(
+                "its GDepth has no Data; it was cut when the photo was edited or sent: take the original".into(),
+            );
+        }
+        if let Some(uri) = value(DEPTH_MAP, "DepthURI") {
+            let image = item(&main, jpeg, uri)?.to_vec();
+            return Found::new(image, |name| value(DEPTH_MAP, name));
+        }
+        Err("holds no depth: its XMP has neither GDepth nor Dynamic Depth. Phones store depth in portraits; for other photos there is --depth-network".into())
+    }
+}
+
+impl Found {
+    fn new<'a>(image: Vec<u8>, value: impl Fn(&'static str) -> Option<&'a str>) -> std::result::Result<Self, String> {
+        let range = match value("Format") {
+            None | Some("RangeInverse") => Range::Inverse,
+            Some("RangeLinear") => Range::Linear,
+            Some(other) => {
+                return Err(format!(
+                    "its depth is {other:?}; RangeInverse and RangeLinear are known"
+                ));
+            }
+        };
+        let number = |name| value(name).and_then(|text| text.trim().parse::<f64>().ok());
+        let metres = match value("Units").unwrap_or("m").to_ascii_lowercase().as_str() {
+            "m" | "meters" | "metres" => Some(1.0),
+            "mm" | "millimeters" => Some(1e-3),
+            _ => None,
+        };
+        let range_m = match (number("Near"), number("Far"), metres) {
+            (Some(near), Some(far), Some(unit)) if near > 0.0 && near < far && far.is_finite() => {
+                Some((near * unit, far * unit))
+            }
+            _ => None,
+        };
+        Ok(Found { image, range, range_m })
+    }
+}
+
+/// What XMP says.
+fn parse(text: &str) -> std::result::Result<Document<'_>, String> {
+    let marks = text.bytes().filter(|byte| matches!(byte, b'<' | b'"' | b'\''));
+    if marks.count() > MOST_MARKS {
+        return Err(format!("its XMP has over {MOST_MARKS} elements and attributes"));
+    }
+    Document::parse(text).map_err(|e| format!("its XMP is broken: {e}"))
+}
+
+/// What the APP1 segments before the picture's own data hold.
+fn app1_segments(jpeg: &[u8]) -> Vec<&[u8]> {
+    const APP1: u8 = 0xE1;
+    const START_OF_SCAN: u8 = 0xDA;
+    let mut found = Vec::new();
+    let mut rest = &jpeg[2..];
+    while let [0xFF, marker, high, low, ..] = *rest {
+        let length = usize::from(u16::from_be_bytes([high, low]));
+        if marker == START_OF_SCAN || length < 2 || rest.len() < 2 + length {
+            break;
+        }
+        if marker == APP1 {
+            found.push(&rest[4..2 + length]);
+        }
+        rest = &rest[2 + length..];
+    }
+    found
+}
+
+/// The extended XMP that `main` names, of its parts.
+fn extended(main: &str, parts: &[&[u8]]) -> std::result::Result<String, String> {
+    let head = |part: &[u8]| -> Option<(usize, usize)> {
+        let number = |at: usize| Some(u32::from_be_bytes(*part.get(at..)?.first_chunk()?) as usize);
+        Some((number(32)?, number(36)?))
+    };
+    let mut named = Vec::new();
+    for part in parts {
+        let (guid, _) = (part.split_at_checked(32)).ok_or("a part of its extended XMP is cut short")?;
+        if std::str::from_utf8(guid).is_ok_and(|guid| main.contains(guid)) {
+            let (length, offset) = head(part).ok_or("a part of its extended XMP is cut short")?;
+            named.push((length, offset, &part[EXTENDED_HEAD..]));
+        }
+    }
+    let got: usize = named.iter().map(|(_, _, part)| part.len()).sum();
+    let length = named.first().map_or(0, |(length, ..)| *length);
+    // Before there is memory for it: a part may say any length.
+    if got < length {
+        return Err(format!("of its extended XMP {got} of {length} bytes are there"));
+    }
+    let mut text = vec![0; length];
+    for (said, offset, part) in named {
+        let place = text.get_mut(offset..).and_then(|rest| rest.get_mut(..part.len()));
+        let place = place
+            .filter(|_| said == length)
+            .ok_or("its extended XMP does not fit together")?;
+        place.copy_from_slice(part);
+    }
+    String::from_utf8(text).map_err(|_| "its extended XMP is no UTF-8".into())
+}
+
+/// A property of XMP, an attribute or an element, anywhere under `node`.
+fn property<'a>(node: Node<'a, '_>, space: &str, name: &str) -> Option<&'a str> {
+    node.descendants().find_map(|node| {
+        let element = node.has_tag_name((space, name)).then(|| node.text()).flatten();
+        node.attribute((space, name)).or(element)
+    })
+}
+
+/// The bytes of the item of Dynamic Depth that is called `uri`. The items stand one behind the other at the file's end,
+/// in the order of the directory, each with padding behind it; the first is the photo itself.
+fn item<'a>(xml: &Document<'_>, jpeg: &'a [u8], uri: &str) -> std::result::Result<&'a [u8], String> {
+    let items: Vec<_> = (xml.descendants())
+        .filter(|node| node.tag_name().name() == "Item" && property(*node, ITEM, "Mime").is_some())
+        .collect();
+    let number = |node: &Node<'_, '_>, name| property(*node, ITEM, name).and_then(|text| text.parse::<usize>().ok());
+    let mut end = jpeg.len();
+    for node in items.iter().skip(1).rev() {
+        let length = number(node, "Length").ok_or("an item of its Dynamic Depth has no length")?;
+        let padding = number(node, "Padding").unwrap_or(0);
+        let start = (end.checked_sub(padding)).and_then(|behind| Some((behind.checked_sub(length)?, behind)));
+        let (start, behind) = start.ok_or("the items of its Dynamic Depth are longer than the file; it was cut")?;
+        if property(*node, ITEM, "DataURI") == Some(uri) {
+            return Ok(&jpeg[start..behind]);
+        }
+        end = start;
+    }
+    Err(format!(
+        "its Dynamic Depth names {uri}, but no such item is in the file"
+    ))
+}

@@ -1,0 +1,356 @@
+//! `phasefront-lab evaluate`: the paper's Table 2 on a data set.
+
+use clap::{Args, ValueEnum};
+use phasefront::target::Response;
+use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
+use phasefront::unstable::wave::aperture::Opening;
+use phasefront::{Display, EncoderOptions, Sweep, Target};
+use phasefront_command::flags::{EncoderName, OverwriteFlag, PrecisionName, check_used, sweep_for};
+use phasefront_command::networks;
+use phasefront_command::terminal::{self, progress_bar};
+use phasefront_io::{Error, Result, output};
+use phasefront_lab::dataset::Manifest;
+use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Judge methods and networks on a data set: amplitude PSNR and SSIM, at the midpoint and over focal stacks; brightness
+/// against the truth's, and the share of the modulator's light that passes the aperture
+///
+/// A focal stack is a scene's 15 most frequent depths and 5 random ones.
+#[derive(Args)]
+pub(crate) struct Evaluate {
+    /// Folder of the data set, as `phasefront-lab dataset` makes it
+    data: PathBuf,
+    /// Methods to judge, separated by commas
+    #[arg(
+        long,
+        value_enum,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        required_unless_present_any = ["network", "pair"]
+    )]
+    method: Vec<MethodName>,
+    /// Networks to judge, separated by commas: one that comes along, or an ONNX file
+    #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
+    network: Vec<String>,
+    /// Numbers that bundled networks compute in [default: int8]
+    #[arg(long, value_enum)]
+    precision: Option<PrecisionName>,
+    /// Judge the bundled pair of networks for the offset as well; its pre-filter takes the place of each --encoder, so
+    /// that its rows are called deep
+    #[arg(long)]
+    pair: bool,
+    /// Encoders to judge as well, separated by commas; the complex field always is
+    #[arg(long, value_enum, value_name = "NAME,…", value_delimiter = ',')]
+    encoder: Vec<EncoderName>,
+    /// Each encoder with each of these dark thresholds: shares of full light below which phases are drawn to 0
+    #[arg(long, value_name = "D,…", value_delimiter = ',', default_values_t = [EncoderOptions::DARK_THRESHOLD], requires = "encoder")]
+    dark_threshold: Vec<f32>,
+    /// Each encoder with each of these numbers of local steps of correction
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [1], requires = "encoder")]
+    local_steps: Vec<usize>,
+    /// Each encoder with each of these numbers of steps at the midpoint
+    #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [0], requires = "encoder")]
+    midpoint_steps: Vec<usize>,
+    /// Also where a descent of so many steps from the last of these ends: the ceiling of every encoder, some seconds a
+    /// scene
+    #[arg(long, value_name = "N", requires = "encoder")]
+    ceiling: Option<usize>,
+    /// z of encoded holograms against the middle of the volume, mm, positive toward the viewer
+    #[arg(long, value_name = "X", default_value_t = 0.0, allow_negative_numbers = true)]
+    offset_mm: f64,
+    /// Bits of the modulator that encoded holograms are for
+    #[arg(long, value_name = "N", default_value_t = 8, requires = "encoder")]
+    bits: u32,
+    /// Radius of the aperture that is looked through [default: the display's, which holograms are made for]
+    #[arg(long, value_name = "R", requires = "encoder")]
+    look_radius: Option<f64>,
+    /// How far its centre lies beside the optical axis, of its radius
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        requires = "encoder"
+    )]
+    look_shift: f64,
+    /// Depth that methods are given
+    #[arg(long, value_enum, default_value_t = Depth::Rendered)]
+    depth: Depth,
+    /// Which pairs
+    #[arg(long, value_enum, default_value_t = Split::Test)]
+    split: Split,
+    /// Only the first so many of them
+    #[arg(long, value_name = "N")]
+    scenes: Option<usize>,
+    /// Planes of SM-LBM [default: the data set's] and of the sweep [default: what suits the display]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    planes: Option<u32>,
+    /// Taps of the sweep's filter [default: what suits its planes and the display]
+    #[arg(long, value_name = "N")]
+    taps: Option<usize>,
+    /// Hidden layers of the sweep [default: 2]
+    #[arg(long, value_name = "N")]
+    hidden_layers: Option<usize>,
+    /// Pixels along each side of the sweep's tiles [default: 256]
+    #[arg(long, value_name = "N")]
+    tile: Option<usize>,
+    /// Chooses the random depths of the focal stacks
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 32))]
+    seed: u64,
+    /// Pixels at each scene's border that do not count; the reach of light at an offset is λ/2p of it: 30 pixels for 6
+    /// mm
+    #[arg(long, value_name = "PX", default_value_t = 0)]
+    margin: usize,
+    /// Folder for pictures of the worst scenes: input, ours, truth, 4 times the difference
+    #[arg(long, value_name = "DIR")]
+    pictures: Option<PathBuf>,
+    /// Pictures a row
+    #[arg(long, value_name = "N", default_value_t = 3, requires = "pictures")]
+    worst: usize,
+    #[command(flatten)]
+    overwrite: OverwriteFlag,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum MethodName {
+    /// The visible image as the field, phase 0
+    Rgb,
+    /// SM-LBM of what is visible
+    Visible,
+    /// SM-LBM of what is visible and the hidden surfaces that the sweep adds
+    Filled,
+    /// The plane sweep of what is visible
+    Sweep,
+    /// SM-LBM of all layers
+    Layers,
+    /// A sub-hologram for each visible point (Maimone et al.)
+    Points,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Split {
+    Train,
+    Validation,
+    Test,
+}
+
+impl Evaluate {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        if let Some(folder) = &self.pictures {
+            output::folder(folder, self.overwrite.holding())?;
+        }
+        let manifest = Manifest::read(&self.data)?;
+        let (split, [start, end]) = match self.split {
+            Split::Train => ("train", manifest.splits.train),
+            Split::Validation => ("validation", manifest.splits.validation),
+            Split::Test => ("test", manifest.splits.test),
+        };
+        let scenes: Vec<usize> = (start..end).take(self.scenes.unwrap_or(usize::MAX)).collect();
+        self.check_flags()?;
+        let methods = self.methods(&manifest)?;
+        let shown = self.shown(&manifest.display)?;
+        let bar = progress_bar(scenes.len() as u64, "scenes");
+        let sample = Sample {
+            scenes,
+            seed: self.seed,
+            depth: self.depth,
+            margin: self.margin,
+        };
+        let rows = evaluate::evaluate(&manifest, &self.data, &sample, &methods, &shown, &|| bar.inc(1))?;
+        let scenes = sample.scenes;
+        bar.finish_and_clear();
+        if let Some(dir) = &self.pictures {
+            output::make_folder(dir)?;
+            let ways = methods.iter().flat_map(|method| {
+                evaluate::ways(method, &shown)
+                    .into_iter()
+                    .map(move |shown| (method, shown))
+            });
+            for (row, (method, shown)) in rows.iter().zip(ways) {
+                for (rank, index) in row.worst(self.worst).into_iter().enumerate() {
+                    let name = format!(
+                        "{}-{}-worst-{}-scene-{index:06}.png",
+                        file_stem(&row.method),
+                        row.shown.replace(", ", "-").replace(' ', "-"),
+                        rank + 1
+                    );
+                    evaluate::write_picture(&dir.join(name), &manifest, &self.data, index, method, &shown)?;
+                }
+            }
+        }
+        let value = json!({
+            "data": self.data, "split": split, "scenes": scenes.len(), "size": manifest.size,
+            "planes": self.planes.map_or(manifest.planes, |n| n as usize), "seed": self.seed,
+            "offset_mm": self.offset_mm, "bits": self.bits, "margin": self.margin,
+            "look_radius": self.look_radius, "look_shift": self.look_shift, "depth": self.depth.to_possible_value().map(|v| v.get_name().to_owned()),
+            "focal_stack": {
+                "bins": evaluate::DEPTH_BINS, "frequent": evaluate::FREQUENT_DEPTHS, "random": evaluate::RANDOM_DEPTHS,
+            },
+            "rows": rows,
+        });
+        terminal::print(json, &value, table(&rows, scenes.len(), split));
+        Ok(())
+    }
+
+    /// Refuses flags that none of the methods takes.
+    fn check_flags(&self) -> Result<()> {
+        let has = |wanted: &[MethodName]| self.method.iter().any(|method| wanted.contains(method));
+        let sweep = has(&[MethodName::Sweep]);
+        let planes = self.method.iter().any(|method| *method != MethodName::Rgb);
+        let networks = self.pair || self.network.iter().any(|name| networks::is_bundled(name));
+        let cases = [
+            (
+                "--precision",
+                self.precision.is_some(),
+                networks,
+                "a bundled --network or --pair",
+            ),
+            ("--planes", self.planes.is_some(), planes, "a --method of waves"),
+            ("--taps", self.taps.is_some(), sweep, "--method sweep"),
+            ("--hidden-layers", self.hidden_layers.is_some(), sweep, "--method sweep"),
+            ("--tile", self.tile.is_some(), sweep, "--method sweep"),
+        ];
+        check_used(&cases)
+    }
+
+    fn shown(&self, display: &Display) -> Result<Vec<Shown>> {
+        let target = Target {
+            response: Response::linear(self.bits)?,
+            ..display.clone().with_offset_m(self.offset_mm / 1e3)?.into()
+        };
+        let radius = self.look_radius.unwrap_or(display.aperture_radius());
+        let through = Some(Opening {
+            radius,
+            shift: self.look_shift * radius,
+        });
+        let mut shown = vec![Shown::complex()];
+        for encoder in &self.encoder {
+            let encoding = encoder.encoding(None).map_err(|_| {
+                Error::Input(format!(
+                    "--encoder {} needs the network that its pre-filter was trained with: --pair judges those that come along, `python -m phasefront_training evaluate-encoding` others",
+                    encoder.name()
+                ))
+            })?;
+            for &dark_threshold in &self.dark_threshold {
+                for &local_steps in &self.local_steps {
+                    shown.extend(self.midpoint_steps.iter().map(|&midpoint_steps| {
+                        let options = EncoderOptions {
+                            dark_threshold,
+                            local_steps,
+                            midpoint_steps,
+                            ..encoding.clone().into()
+                        };
+                        Shown {
+                            through,
+                            ..Shown::encoded(encoder.name(), target.clone(), options)
+                        }
+                    }));
+                }
+            }
+        }
+        if let (Some(steps), Some(last)) = (self.ceiling, shown.last()) {
+            shown.push(Shown {
+                name: format!("ceiling, {steps} steps"),
+                ceiling: steps,
+                ..last.clone()
+            });
+        }
+        Ok(shown)
+    }
+
+    fn sweep(&self, display: &Display) -> Sweep {
+        Sweep {
+            hidden_layers: self.hidden_layers.unwrap_or(MAX_HIDDEN_LAYERS),
+            tile: self.tile.unwrap_or(Sweep::TILE),
+            ..sweep_for(display, self.planes.map(|n| n as usize), self.taps)
+        }
+    }
+
+    fn methods<'a>(&self, manifest: &'a Manifest) -> Result<Vec<Method<'a>>> {
+        let planes = self.planes.map_or(manifest.planes, |n| n as usize);
+        let display = &manifest.display;
+        let mut methods: Vec<_> = (self.method.iter())
+            .map(|name| {
+                Ok(match name {
+                    MethodName::Rgb => Method::rgb(display),
+                    MethodName::Visible => Method::visible(display, planes),
+                    MethodName::Filled => Method::filled(display, planes),
+                    MethodName::Sweep => Method::sweep(manifest.size, display, self.sweep(display))?,
+                    MethodName::Layers => Method::layers(display, planes),
+                    MethodName::Points => Method::points(display, planes),
+                })
+            })
+            .collect::<Result<_>>()?;
+        for name in &self.network {
+            let precision = self.precision.filter(|_| networks::is_bundled(name));
+            let network = networks::network(name, precision.map(PrecisionName::precision))?;
+            let label = format!("network {}", file_stem(name));
+            let method = Method::network(label, &network, manifest.size, &manifest.display);
+            methods.push(method.map_err(|e| Error::file(name, e))?);
+        }
+        if self.pair {
+            let target = display.clone().with_offset_m(self.offset_mm / 1e3)?;
+            let pair = phasefront_models::pair_for(&target, self.precision.unwrap_or_default().precision())
+                .ok_or_else(|| {
+                    Error::Input(format!(
+                        "no pair of networks is bundled for an offset of {} mm and this display",
+                        self.offset_mm
+                    ))
+                })?;
+            methods.push(Method::pair(
+                "pair",
+                &pair.hologram,
+                pair.prefilter,
+                manifest.size,
+                &target,
+            )?);
+        }
+        Ok(methods)
+    }
+}
+
+/// A name that a file may have: of a path its last part without the extension, no blanks.
+fn file_stem(name: &str) -> String {
+    let stem = Path::new(name).file_stem().unwrap_or_default();
+    stem.to_string_lossy().replace(' ', "-")
+}
+
+fn table(rows: &[Row], scenes: usize, split: &str) -> String {
+    let width = (rows.iter())
+        .map(|row| row.method.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(6);
+    let ways = rows
+        .iter()
+        .map(|row| row.shown.chars().count())
+        .max()
+        .unwrap_or(0)
+        .max(10);
+    let mut text = format!(
+        "{:width$}  {:ways$}  PSNR dB    SSIM  focal PSNR dB  focal SSIM  brightness  light  worst PSNR dB (scene)   ({scenes} scenes of {split})",
+        "method", "shown"
+    );
+    for row in rows {
+        let worst = row.worst(1)[0];
+        let least = row
+            .scenes
+            .iter()
+            .map(|(_, f)| f.amplitude_psnr)
+            .fold(f64::INFINITY, f64::min);
+        text += &format!(
+            "\n{:width$}  {:ways$}  {:7.2}  {:.4}  {:13.2}  {:10.4}  {:10.3}  {:.3}  {least:13.2} ({worst})",
+            row.method,
+            row.shown,
+            row.mean.amplitude_psnr,
+            row.mean.amplitude_ssim,
+            row.mean.focal_psnr,
+            row.mean.focal_ssim,
+            row.mean.brightness,
+            row.mean.light,
+        );
+    }
+    text
+}

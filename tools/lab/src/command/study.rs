@@ -1,0 +1,374 @@
+//! `phasefront-lab study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and temporally
+//! smoothed video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
+
+use clap::{Args, ValueEnum};
+use phasefront::{Method, Sweep};
+use phasefront_command::flags::{DisplayFlags, check_used};
+use phasefront_command::networks;
+use phasefront_command::terminal::{self, progress_bar};
+use phasefront_io::Result;
+use phasefront_io::output::{self, Holding};
+use phasefront_io::picture::plot::{self, Panel};
+use phasefront_lab::study::flicker;
+use phasefront_lab::study::refined_depth::{self, RATIO, SENSOR};
+use phasefront_lab::study::sweep_parts::{self, DisplayRow};
+use phasefront_lab::study::{self, Row, Scenes};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Study how many layers or planes a hologram needs, what the plane sweep's parts and refined depth are worth, and how
+/// much video flickers
+#[derive(Args)]
+pub(crate) struct Study {
+    /// What to study
+    #[arg(value_enum)]
+    what: What,
+    /// Random scenes
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
+    scenes: u16,
+    /// Height and width of a scene, pixels; scenes with depth from a sensor are 1024×768 [default: 384]
+    #[arg(long, value_name = "PX", value_parser = clap::value_parser!(u16).range(1..=4096))]
+    size: Option<u16>,
+    /// Planes of SM-LBM; in the study of planes, of the finest [default: 256; for planes 8192, for sweep and displays
+    /// 200]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    planes: Option<u32>,
+    /// Layers of a layered depth image in the study of planes [default: 5]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    ldi_layers: Option<u8>,
+    /// Seed of the first scene; the others follow
+    #[arg(long, value_name = "S", default_value_t = 0, value_parser = clap::value_parser!(u64).range(..1 << 48))]
+    seed: u64,
+    #[command(flatten)]
+    display: DisplayFlags,
+    /// Folder of what comes out: NAME.json, and NAME.svg of layers, planes and sweep
+    #[arg(short, value_name = "DIR")]
+    output: PathBuf,
+}
+
+/// Planes of the truth in the studies of the sweep.
+const SWEEP_PLANES: u32 = 200;
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum What {
+    /// Layers of a layered depth image: 1 to 9 against 10 (Fig. 2a)
+    Layers,
+    /// Planes of the volume: 32, 128, 512 and 2048 against 8192 (Fig. 2b)
+    Planes,
+    /// The plane sweep's planes, taps, hidden layers, tiles and merged steps, one at a time, beside exact waves
+    Sweep,
+    /// The plane sweep beside exact waves on other displays
+    Displays,
+    /// Holograms of depth that a sensor of 256×192 gave, refined and not, against the truth
+    Depth,
+    /// How much the picture of a scene that stands still changes from frame to frame, 30 of each scene
+    Flicker,
+}
+
+impl Study {
+    pub(crate) fn run(self, json: bool) -> Result<()> {
+        let of_planes = self.what == What::Planes;
+        let of_sensor = matches!(self.what, What::Depth | What::Flicker);
+        check_used(&[
+            (
+                "--display",
+                self.display.is_given(),
+                self.what != What::Displays,
+                "studies of one display, `displays` has displays of its own",
+            ),
+            (
+                "--ldi-layers",
+                self.ldi_layers.is_some(),
+                of_planes,
+                "the study of planes",
+            ),
+            (
+                "--size",
+                self.size.is_some(),
+                !of_sensor,
+                "scenes without a sensor's depth",
+            ),
+            (
+                "--planes",
+                self.planes.is_some(),
+                self.what != What::Flicker,
+                "studies of exact waves",
+            ),
+        ])?;
+        output::folder(&self.output, Holding::Anything)?;
+        match self.what {
+            What::Layers | What::Planes => {}
+            What::Depth => return self.depth(json),
+            What::Flicker => return self.flicker(json),
+            What::Sweep => return self.sweep(json),
+            What::Displays => return self.displays(json),
+        }
+        let scenes = self.scenes()?;
+        let of_layers = self.what == What::Layers;
+        let planes = self.planes.unwrap_or(if of_layers { 256 } else { 8192 }) as usize;
+        let ldi_layers = self.ldi_layers.unwrap_or(5).into();
+        let work = match of_layers {
+            true => study::layers_work(&scenes, planes),
+            false => study::planes_work(&scenes, planes),
+        };
+        let bar = progress_bar(work as u64, "planes");
+        let done = |planes: usize| bar.inc(planes as u64);
+        let (name, rows) = match of_layers {
+            true => ("layers", study::layers(&scenes, planes, &done)?),
+            false => ("planes", study::planes(&scenes, ldi_layers, planes, &done)?),
+        };
+        bar.finish_and_clear();
+        let finest = if of_layers { study::FINEST_LAYERS } else { planes };
+        let result = json!({
+            "study": name, "finest": finest, "planes": planes,
+            "ldi_layers": if of_layers { study::FINEST_LAYERS } else { ldi_layers },
+            "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed, "display": scenes.display,
+            "rows": rows,
+        });
+        self.write_json(name, &result)?;
+        self.plot(name, finest, &rows)?;
+        let mut text = format!(
+            "{name:>7}  PSNR dB    SSIM   (against {finest}, mean of {} scenes)",
+            scenes.scenes
+        );
+        for row in &rows {
+            text += &format!("\n{:7}  {:7.2}  {:.4}", row.value, row.psnr, row.ssim);
+        }
+        terminal::print(json, &result, text);
+        Ok(())
+    }
+
+    fn scenes(&self) -> Result<Scenes> {
+        Ok(Scenes {
+            scenes: self.scenes.into(),
+            size: self.size.unwrap_or(384).into(),
+            seed: self.seed,
+            display: self.display.read_of_midpoint()?.target.display,
+        })
+    }
+
+    fn sweep(&self, json: bool) -> Result<()> {
+        let scenes = self.scenes()?;
+        let planes = self.planes.unwrap_or(SWEEP_PLANES) as usize;
+        let bar = progress_bar(sweep_parts::ablation_work(&scenes, planes) as u64, "holograms");
+        let rows = sweep_parts::ablation(&scenes, planes, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "sweep", "planes": planes, "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed,
+            "display": scenes.display, "rows": rows,
+        });
+        self.write_json("sweep", &result)?;
+        self.plot_sweep(&Sweep::for_display(&scenes.display), &rows)?;
+        let mut text = format!(
+            "{:8} {:48}  clean PSNR dB    SSIM  degraded PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
+            "part", "setting", scenes.scenes
+        );
+        for row in &rows {
+            let time = row.ns_per_pixel.map_or("–".into(), |ns| format!("{ns:.1}"));
+            text += &format!(
+                "\n{:8} {:48}  {:13.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
+                row.part, row.setting, row.clean.psnr, row.clean.ssim, row.degraded.psnr, row.degraded.ssim
+            );
+        }
+        terminal::print(json, &result, text);
+        Ok(())
+    }
+
+    fn plot_sweep(&self, usual: &Sweep, rows: &[sweep_parts::Row]) -> Result<()> {
+        type Figure = fn(&sweep_parts::Row) -> f64;
+        let curve = |part: &str, here: usize, figure: Figure| {
+            let mut points: Vec<_> = (rows.iter())
+                .filter_map(|row| match row.part {
+                    "usual" => Some((here as i32, figure(row))),
+                    other if other == part => Some((row.value as i32, figure(row))),
+                    _ => None,
+                })
+                .collect();
+            points.sort_unstable_by_key(|(x, _)| *x);
+            points
+        };
+        let clean: Figure = |row| row.clean.psnr;
+        let panel = |title, x, y, points| Panel { title, x, y, points };
+        plot::write_svg(
+            &self.output.join("sweep.svg"),
+            &[
+                panel(
+                    "planes, clean depth",
+                    "planes",
+                    "PSNR (dB)",
+                    curve("planes", usual.planes, clean),
+                ),
+                panel(
+                    "planes, refined phone depth",
+                    "planes",
+                    "PSNR (dB)",
+                    curve("planes", usual.planes, |row| row.degraded.psnr),
+                ),
+                panel(
+                    "taps, clean depth",
+                    "taps",
+                    "PSNR (dB)",
+                    curve("taps", usual.taps, clean),
+                ),
+                panel(
+                    "hidden layers, clean depth",
+                    "hidden layers",
+                    "PSNR (dB)",
+                    curve("hidden", usual.hidden_layers, clean),
+                ),
+            ],
+        )
+    }
+
+    fn displays(&self, json: bool) -> Result<()> {
+        let scenes = self.scenes()?;
+        let planes = self.planes.unwrap_or(SWEEP_PLANES) as usize;
+        let bar = progress_bar(sweep_parts::displays_work(&scenes) as u64, "holograms");
+        let rows = sweep_parts::displays(&scenes, planes, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "displays", "planes": planes, "scenes": scenes.scenes, "size": scenes.size, "seed": scenes.seed,
+            "rows": rows,
+        });
+        self.write_json("displays", &result)?;
+        let mut text = format!(
+            "{:34}  planes × taps  visible, exact  filled, exact  sweep PSNR dB / SSIM   (mean of {} scenes)",
+            "display", scenes.scenes
+        );
+        for row in &rows {
+            let DisplayRow {
+                display, planes, taps, ..
+            } = row;
+            let name = if display.is_empty() { "usual" } else { display };
+            text += &format!(
+                "\n{name:34}  {:>13}  {:14.2}  {:13.2}  {:13.2} / {:.4}",
+                format!("{planes} × {taps}"),
+                row.visible.psnr,
+                row.filled.psnr,
+                row.sweep.psnr,
+                row.sweep.ssim
+            );
+        }
+        terminal::print(json, &result, text);
+        Ok(())
+    }
+
+    fn write_json(&self, name: &str, result: &serde_json::Value) -> Result<()> {
+        output::make_folder(&self.output)?;
+        output::write_atomically(&self.output.join(format!("{name}.json")), |file| {
+            serde_json::to_writer_pretty(&mut *file, result)?;
+            std::io::Write::write_all(file, b"\n")
+        })
+    }
+
+    fn depth(&self, json: bool) -> Result<()> {
+        let display = self.display.read_of_midpoint()?.target.display;
+        let planes = self.planes.unwrap_or(256) as usize;
+        let sweep = Method::Sweep(Sweep::for_display(&display));
+        let mut methods = vec![("sweep".to_owned(), sweep)];
+        for model in phasefront_models::NETWORKS {
+            let network = networks::network(model.name, None)?;
+            methods.push((format!("network {}", model.name), Method::trained(network)));
+        }
+        let scenes = usize::from(self.scenes);
+        let bar = progress_bar(refined_depth::work(scenes, methods.len()) as u64, "holograms");
+        let rows = refined_depth::study(scenes, self.seed, planes, &display, &methods, &|| bar.inc(1))?;
+        bar.finish_and_clear();
+        let result = json!({
+            "study": "depth", "planes": planes, "scenes": self.scenes, "seed": self.seed, "display": display,
+            "rows": rows,
+        });
+        self.write_json("depth", &result)?;
+        let mut text = "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
+        for row in &rows {
+            let depth = format!("{}, {}", row.degradation, row.depth);
+            text += &format!(
+                "\n{:17} {depth:20} {:7.2}  {:.4}  {:9.2} %",
+                row.method,
+                row.psnr,
+                row.ssim,
+                100.0 * row.wrong_depth
+            );
+        }
+        terminal::print(json, &result, text);
+        Ok(())
+    }
+
+    fn flicker(&self, json: bool) -> Result<()> {
+        /// Of each scene.
+        const FRAMES: usize = 30;
+        let (height, width) = (SENSOR.0 * RATIO, SENSOR.1 * RATIO);
+        let display = self.display.read_of_three()?.target.display.with_size(height, width)?;
+        let method = Method::Network(networks::network("8", None)?);
+        let scenes = usize::from(self.scenes);
+        let bar = progress_bar((scenes * FRAMES * flicker::SETTINGS.len()) as u64, "frames");
+        let mut rows: Vec<flicker::Row> = Vec::new();
+        for scene in 0..u64::from(self.scenes) {
+            let of_scene = flicker::study(self.seed + scene, FRAMES, &display, &method, &|| bar.inc(1))?;
+            match rows.is_empty() {
+                true => rows = of_scene,
+                false => {
+                    for (sum, row) in rows.iter_mut().zip(of_scene) {
+                        sum.brightness += row.brightness;
+                        sum.pixel += row.pixel;
+                    }
+                }
+            }
+        }
+        bar.finish_and_clear();
+        for row in &mut rows {
+            row.brightness /= scenes as f64;
+            row.pixel /= scenes as f64;
+        }
+        let result = json!({
+            "study": "flicker", "frames": FRAMES, "scenes": self.scenes, "seed": self.seed, "display": display,
+            "rows": rows,
+        });
+        self.write_json("flicker", &result)?;
+        let mut text = "change from frame to frame  brightness   a pixel's amplitude".to_owned();
+        for row in &rows {
+            text += &format!(
+                "\n{:26}  {:8.3} %   {:.5}",
+                row.setting,
+                100.0 * row.brightness,
+                row.pixel
+            );
+        }
+        terminal::print(json, &result, text);
+        Ok(())
+    }
+
+    fn plot(&self, name: &str, finest: usize, rows: &[Row]) -> Result<()> {
+        let of_layers = self.what == What::Layers;
+        let (x, title) = match of_layers {
+            true => ("layers", format!("LDI layers against {finest}")),
+            false => ("bits of depth", format!("planes against {finest}")),
+        };
+        let x_of = |row: &Row| match of_layers {
+            true => row.value as i32,
+            false => row.value.ilog2() as i32,
+        };
+        // Scenes that equal the finest to the bit have no finite PSNR, and then nor has their mean.
+        let points = |figure: fn(&Row) -> f64| -> Vec<(i32, f64)> {
+            (rows.iter().map(|row| (x_of(row), figure(row))))
+                .filter(|(_, y)| y.is_finite())
+                .collect()
+        };
+        let mut panels = vec![Panel {
+            title: &title,
+            x,
+            y: "SSIM",
+            points: points(|row| row.ssim),
+        }];
+        let psnr = points(|row| row.psnr);
+        if !psnr.is_empty() {
+            panels.push(Panel {
+                title: &title,
+                x,
+                y: "PSNR (dB)",
+                points: psnr,
+            });
+        }
+        plot::write_svg(&self.output.join(format!("{name}.svg")), &panels)
+    }
+}

@@ -1,0 +1,580 @@
+//! How good holograms are on a data set: the paper's Table 2. Amplitude PSNR and SSIM of the midpoint
+//! hologram, and their means over a focal stack of each scene's 15 most frequent depths and 5
+//! random ones; for any way to make a field ([`Method`]), as it is or encoded.
+//!
+//! An encoded field is judged as an eye sees it: through modulator levels and the Fourier aperture.
+//! The truth is always the data set's complex field. Pairs are valid to their border, so the whole
+//! frame counts.
+
+mod ceiling;
+
+use crate::dataset::{self, Manifest};
+use crate::evaluate::ceiling::Ceiling;
+use crate::study::refined_depth::{self, DEGRADATIONS};
+use ndarray::{Array2, Array3, Axis, concatenate};
+use num_complex::Complex32;
+use phasefront::unstable::modulator::{Modulator, remove_mean_phase};
+use phasefront::unstable::network::InputKind;
+use phasefront::unstable::refocus::{Refocus, phase_only_field};
+use phasefront::unstable::seeded::SeededPlan;
+use phasefront::unstable::sweep::SweepPlan;
+use phasefront::unstable::wave::aperture::{Aperture, Opening};
+use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
+use phasefront_exact::point_based::{self, Occlusion};
+use phasefront_exact::sm_lbm;
+use phasefront_exact::truth::{Figures, filled, judge, visible_frame};
+use phasefront_io::dice::Dice;
+use phasefront_io::display::calibration::{self, AberrationFile};
+use phasefront_io::hologram::AberratedOptics;
+use phasefront_io::ldi::{Ldi, LdiLayer};
+use phasefront_io::{Result, picture};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::borrow::Cow;
+use std::cmp::Reverse;
+use std::f32::consts::TAU;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Bins of a scene's depth histogram.
+pub const DEPTH_BINS: usize = 200;
+
+/// Depths of a focal stack that are a scene's most frequent.
+pub const FREQUENT_DEPTHS: usize = 15;
+
+/// Depths of a focal stack that are random, of the other bins.
+pub const RANDOM_DEPTHS: usize = 5;
+
+/// What differences are multiplied by in [`write_picture`].
+pub const DIFFERENCE_GAIN: f32 = 4.0;
+
+type MakeField<'a> = dyn Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a;
+
+/// A way from a scene to its complex midpoint hologram.
+pub struct Method<'a> {
+    /// What it is called in tables and file names.
+    pub name: String,
+    field: Box<MakeField<'a>>,
+    /// What the field is trained for: takes the place of every encoding.
+    prefilter: Option<Arc<Network>>,
+}
+
+impl<'a> Method<'a> {
+    /// Any function from a scene to its midpoint hologram, (C, H, W), carrier left out.
+    pub fn new(name: impl Into<String>, field: impl Fn(&Ldi) -> Result<Array3<Complex32>> + Send + Sync + 'a) -> Self {
+        Method {
+            name: name.into(),
+            field: Box::new(field),
+            prefilter: None,
+        }
+    }
+
+    /// The visible image itself as the field, with phase 0: what doing nothing is worth.
+    pub fn rgb(display: &'a Display) -> Self {
+        Self::new("rgb", move |ldi| {
+            Ok(visible_frame(ldi, display)?.rgb().mapv(Complex32::from))
+        })
+    }
+
+    /// SM-LBM with `planes` planes on what is visible, an RGB-D image's worth.
+    pub fn visible(display: &'a Display, planes: usize) -> Self {
+        Self::new("visible", move |ldi| {
+            let front = Ldi::new(vec![ldi.layers[0].clone()])?;
+            sm_lbm::hologram(&front, display, planes, &|_, _| {})
+        })
+    }
+
+    /// The point-based method at `planes` depths on what is visible, the paper's first row of Table 2.
+    pub fn points(display: &'a Display, planes: usize) -> Self {
+        Self::new("points", move |ldi| {
+            point_based::hologram(ldi, display, planes, Occlusion::Input, &|_, _| {})
+        })
+    }
+
+    /// SM-LBM with `planes` planes on all layers.
+    pub fn layers(display: &'a Display, planes: usize) -> Self {
+        Self::new("layers", move |ldi| sm_lbm::hologram(ldi, display, planes, &|_, _| {}))
+    }
+
+    /// SM-LBM with `planes` planes on what is visible and the hidden surfaces that the sweep adds to it: the sweep by
+    /// exact waves.
+    pub fn filled(display: &'a Display, planes: usize) -> Self {
+        Self::new("filled", move |ldi| {
+            let filled = filled(&visible_frame(ldi, display)?, display)?;
+            sm_lbm::hologram(&filled, display, planes, &|_, _| {})
+        })
+    }
+
+    /// The plane sweep on what is visible of scenes of `size`×`size` pixels.
+    ///
+    /// # Errors
+    /// A sweep that cannot be planned.
+    pub fn sweep(size: usize, display: &Display, sweep: Sweep) -> Result<Self> {
+        let (plan, display) = (SweepPlan::new(size, size, display, sweep, 0.0)?, display.clone());
+        Ok(Self::new("sweep", move |ldi| {
+            let mut field = Array3::zeros((display.colours(), size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
+            Ok(field)
+        }))
+    }
+
+    fn seeded(name: String, network: &Network, size: usize, display: &Display) -> Result<Self> {
+        let (plan, display) = (SeededPlan::new(size, size, network, display)?, display.clone());
+        Ok(Self::new(name, move |ldi| {
+            let mut field = Array3::zeros((display.colours(), size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?;
+            Ok(field)
+        }))
+    }
+
+    /// A network on scenes of `size`×`size` pixels, of RGB-D or as many layers as it takes.
+    ///
+    /// # Errors
+    /// A pre-filter, or a network for another display.
+    pub fn network(name: impl Into<String>, network: &Network, size: usize, display: &Display) -> Result<Self> {
+        let name = name.into();
+        if network.input() == InputKind::Seeded {
+            return Self::seeded(name, network, size, display);
+        }
+        let of_layers = matches!(network.input(), InputKind::Ldi { .. });
+        if !of_layers && !matches!(network.input(), InputKind::Rgbd | InputKind::RgbdXy) {
+            return Err(phasefront::Error::Network(format!(
+                "it takes '{}'; a network for 'rgbd', 'seeded' or layered depth images is needed",
+                network.input()
+            ))
+            .into());
+        }
+        let (plan, display) = (network.plan_for(size, size, display)?, display.clone());
+        Ok(Self::new(name, move |ldi| {
+            let mut field = Array3::zeros((display.colours(), size, size));
+            let values = field.as_slice_mut().expect("standard layout");
+            match of_layers {
+                true => plan.field(&*ldi.for_display(&display), values, &mut plan.scratch())?,
+                false => plan.field(&visible_frame(ldi, &display)?, values, &mut plan.scratch())?,
+            }
+            Ok(field)
+        }))
+    }
+
+    /// A network with the pre-filter that it was trained with, which is part of every encoding.
+    ///
+    /// # Errors
+    /// As [`Self::network`].
+    pub fn pair(
+        name: impl Into<String>,
+        network: &Network,
+        prefilter: Arc<Network>,
+        size: usize,
+        display: &Display,
+    ) -> Result<Self> {
+        Ok(Method {
+            prefilter: Some(prefilter),
+            ..Self::network(name, network, size, display)?
+        })
+    }
+
+    /// How a field of this method becomes levels by `options`.
+    fn encoder(&self, options: &EncoderOptions) -> EncoderOptions {
+        EncoderOptions {
+            encoding: match &self.prefilter {
+                Some(prefilter) => Encoding::Deep(prefilter.clone()),
+                None => options.encoding.clone(),
+            },
+            ..options.clone()
+        }
+    }
+}
+
+/// How a field is shown.
+#[derive(Debug, Clone)]
+pub struct Shown {
+    /// What it is called in tables and file names.
+    pub name: String,
+    /// By what levels; `None`: it is shown as the complex field it is.
+    pub levels: Option<(Target, EncoderOptions)>,
+    /// Steps of descent from there to the [`Ceiling`]; 0 shows the levels as they are.
+    pub ceiling: usize,
+    /// The aperture that is looked through, where it is not the one that the levels are made for.
+    pub through: Option<Opening>,
+}
+
+impl Shown {
+    /// The complex field itself.
+    pub fn complex() -> Self {
+        Shown {
+            name: "complex".into(),
+            levels: None,
+            ceiling: 0,
+            through: None,
+        }
+    }
+
+    /// Levels for `target` by `options`, whose encoder is called `encoder`.
+    pub fn encoded(encoder: &str, target: Target, options: EncoderOptions) -> Self {
+        Shown {
+            name: encoded_name(encoder, &options),
+            levels: Some((target, options)),
+            ceiling: 0,
+            through: None,
+        }
+    }
+
+    /// The same for `method`, whose pre-filter takes the place of the encoder, also by name.
+    fn of(&self, method: &Method<'_>) -> Self {
+        let levels = (self.levels.as_ref()).map(|(target, options)| (target.clone(), method.encoder(options)));
+        let name = match (&levels, &method.prefilter) {
+            (Some((_, options)), Some(_)) if self.ceiling == 0 => encoded_name("deep", options),
+            _ => self.name.clone(),
+        };
+        Shown {
+            name,
+            levels,
+            ceiling: self.ceiling,
+            through: self.through,
+        }
+    }
+}
+
+fn encoded_name(encoder: &str, options: &EncoderOptions) -> String {
+    let EncoderOptions {
+        dark_threshold,
+        local_steps,
+        midpoint_steps,
+        ..
+    } = options;
+    let more = match midpoint_steps {
+        0 => String::new(),
+        more => format!(" + {more}"),
+    };
+    format!("{encoder}, dark {dark_threshold}, steps {local_steps}{more}")
+}
+
+/// The ways of `shown` that apply to fields of `method`. A pre-filter takes the place of every encoder, so that
+/// ways which differ in their encoder alone are one.
+pub fn ways(method: &Method<'_>, shown: &[Shown]) -> Vec<Shown> {
+    let mut ways: Vec<Shown> = Vec::new();
+    for shown in shown.iter().map(|shown| shown.of(method)) {
+        if method.prefilter.is_none() || ways.iter().all(|other| other.name != shown.name) {
+            ways.push(shown);
+        }
+    }
+    ways
+}
+
+/// One way on all scenes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Name of the [`Method`].
+    pub method: String,
+    /// Name of the [`Shown`].
+    pub shown: String,
+    /// Means over the scenes.
+    pub mean: Figures,
+    /// Each scene: its index in the data set, and its figures.
+    pub scenes: Vec<(usize, Figures)>,
+}
+
+impl Row {
+    /// Indices of the `count` scenes of the least amplitude PSNR, worst first.
+    pub fn worst(&self, count: usize) -> Vec<usize> {
+        let mut scenes = self.scenes.clone();
+        scenes.sort_by(|(_, a), (_, b)| a.amplitude_psnr.total_cmp(&b.amplitude_psnr));
+        scenes.iter().take(count).map(|(index, _)| *index).collect()
+    }
+}
+
+/// The normalized depths of a scene's focal stack: the middles of the fullest bins of the histogram of its visible
+/// depths, then of random others. The same `seed` gives the same.
+pub fn stack_depths(depth: &Array2<f32>, seed: u64) -> Vec<f64> {
+    let mut counts = [0usize; DEPTH_BINS];
+    for d in depth.iter().filter(|d| !d.is_nan()) {
+        counts[((d * DEPTH_BINS as f32) as usize).min(DEPTH_BINS - 1)] += 1;
+    }
+    let mut bins: Vec<usize> = (0..DEPTH_BINS).collect();
+    bins.sort_by_key(|bin| Reverse(counts[*bin]));
+    let mut dice = Dice::new(seed);
+    for i in FREQUENT_DEPTHS..FREQUENT_DEPTHS + RANDOM_DEPTHS {
+        bins.swap(i, dice.integer(i, DEPTH_BINS - 1));
+    }
+    bins.truncate(FREQUENT_DEPTHS + RANDOM_DEPTHS);
+    bins.iter().map(|bin| (*bin as f64 + 0.5) / DEPTH_BINS as f64).collect()
+}
+
+/// What looks at holograms of one data set: plans for its shape and display. Where its holograms correct an aberration
+/// that is one for all depths, it looks through that (the paper's Fig. 8).
+pub struct Viewer {
+    size: usize,
+    optics: Option<AberratedOptics>,
+    complex: Refocus,
+    /// z of the volume's ends.
+    ends_m: [f64; 2],
+}
+
+impl Viewer {
+    /// Plans views from anywhere in the volume.
+    ///
+    /// # Errors
+    /// A volume that cannot be propagated through, or an aberration that is none.
+    pub fn new(manifest: &Manifest) -> Result<Self> {
+        let display = &manifest.display;
+        let ends_m = [0.5, -0.5].map(|part| part * display.volume_depth_m());
+        let correction = match manifest.aberration.is_empty() {
+            true => None,
+            false => match calibration::aberrations(&manifest.aberration)? {
+                AberrationFile::Uniform(all) => all.constant(),
+                AberrationFile::Spatial(_) => None,
+            },
+        };
+        let shape = (manifest.size, manifest.size);
+        Ok(Viewer {
+            optics: correction
+                .map(|correction| AberratedOptics::new(shape, display, &correction))
+                .transpose()?,
+            complex: Refocus::new(manifest.size, manifest.size, display, &ends_m, None)?,
+            size: manifest.size,
+            ends_m,
+        })
+    }
+
+    /// The amplitudes of the midpoint hologram `field`, (C, H, W), at each of `z_m`, metres, where it is shown by
+    /// `shown`.
+    ///
+    /// # Errors
+    /// A z outside of the volume, or levels that cannot be planned.
+    pub fn views(&self, field: &Array3<Complex32>, shown: &Shown, z_m: &[f64]) -> Result<Seen> {
+        let size = self.size;
+        let mut values = field.iter().copied().collect::<Vec<_>>();
+        let mut light = 1.0;
+        let of_levels;
+        let refocus = match &shown.levels {
+            None => &self.complex,
+            Some((target, options)) => {
+                let modulator = Modulator::new((size, size), target, options)?;
+                let mut scratch = modulator.scratch();
+                if !modulator.keeps_phase() {
+                    remove_mean_phase(&mut values, field.dim().0);
+                }
+                modulator.propagate(&mut values, &mut scratch);
+                let mut levels = vec![0; values.len()];
+                let modulation = modulator.modulate(&mut values, &mut levels, &mut scratch);
+                if shown.ceiling > 0 {
+                    self.lift(field, target, modulation.scale, shown.ceiling, &mut levels)?;
+                }
+                phase_only_field(&levels, &target.response, modulation.scale, &mut values);
+                let opening = (shown.through).unwrap_or(Opening::centred(target.display.aperture_radius()));
+                light = self.light(&values, opening)?;
+                of_levels = Refocus::new(size, size, &target.display, &self.ends_m, Some(opening))?;
+                &of_levels
+            }
+        };
+        if let Some(optics) = &self.optics {
+            optics.pass(&mut values);
+        }
+        let views = refocus.focal_stack(&values, z_m)?.into_iter();
+        let view = |view| Array3::from_shape_vec(field.dim(), view).expect("the field's shape");
+        Ok(Seen {
+            views: views.map(view).collect(),
+            light,
+        })
+    }
+
+    /// Takes `levels` by `steps` of descent toward the amplitudes of the midpoint hologram `field`.
+    fn lift(
+        &self,
+        field: &Array3<Complex32>,
+        target: &Target,
+        scale: f32,
+        steps: usize,
+        levels: &mut [u8],
+    ) -> Result<()> {
+        let ceiling = Ceiling::new(self.size, &target.display)?;
+        let wave: Vec<Complex32> = field.iter().map(|u| u / scale).collect();
+        let wanted = self.complex.focal_stack(&wave, &ceiling.z_m())?;
+        let phases = levels.iter().enumerate();
+        let mut phases: Vec<f32> = phases.map(|(at, level)| target.response.phase(*level, at)).collect();
+        ceiling.optimise(&mut phases, &wanted, steps);
+        for (at, (level, phase)) in levels.iter_mut().zip(&phases).enumerate() {
+            *level = target.response.level(phase.rem_euclid(TAU), at);
+        }
+        Ok(())
+    }
+
+    /// The share of the light of `shown`, (C, H, W) at the modulator, that passes `opening`.
+    fn light(&self, shown: &[Complex32], opening: Opening) -> Result<f64> {
+        let energy = |values: &[Complex32]| values.iter().map(|v| f64::from(v.norm_sqr())).sum::<f64>();
+        let aperture = Aperture::new(self.size, self.size, opening)?;
+        let mut scratch = aperture.scratch();
+        let mut passed = shown.to_vec();
+        for plane in passed.chunks_exact_mut(self.size * self.size) {
+            aperture.filter(plane, &mut scratch);
+        }
+        Ok(energy(&passed) / energy(shown))
+    }
+}
+
+/// What is seen of a hologram.
+pub struct Seen {
+    /// Amplitudes, (C, H, W), one for each z.
+    pub views: Vec<Array3<f32>>,
+    /// The share of the modulator's light that passes the aperture; 1 for a complex field.
+    pub light: f64,
+}
+
+/// What methods are told of the depth of what is visible. Ragged and refined are those of a phone's sensor with all
+/// faults of [`DEGRADATIONS`]; hidden layers are then none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Depth {
+    /// As it was rendered
+    Rendered,
+    /// A sensor's readings, enlarged
+    Ragged,
+    /// A sensor's readings, refined by the core
+    Refined,
+}
+
+impl Depth {
+    /// The scene `ldi` with depth of this kind; `seed` chooses the sensor's faults.
+    fn of(self, ldi: &Ldi, seed: u64) -> Result<Cow<'_, Ldi>> {
+        if self == Depth::Rendered {
+            return Ok(Cow::Borrowed(ldi));
+        }
+        let (rgb, rendered) = refined_depth::front(ldi);
+        let readings = refined_depth::degrade(rendered.view(), &DEGRADATIONS[DEGRADATIONS.len() - 1], seed);
+        let depth = match self {
+            Depth::Refined => refined_depth::refine(&readings, &rgb)?,
+            _ => refined_depth::enlarge(&readings)?,
+        };
+        Ok(Cow::Owned(Ldi::new(vec![LdiLayer { rgb, depth }])?))
+    }
+}
+
+/// What is looked at of a data set.
+#[derive(Debug, Clone)]
+pub struct Sample {
+    /// Indices of its pairs.
+    pub scenes: Vec<usize>,
+    /// Chooses the random depths of the focal stacks.
+    pub seed: u64,
+    /// What methods are told of the depth of what is visible.
+    pub depth: Depth,
+    /// Pixels at the border of each scene that do not count: into a small frame at an offset light comes from outside,
+    /// which no modulator of its size sends.
+    pub margin: usize,
+}
+
+/// Judges each of `methods` in its [`ways`] of `shown` on the `sample` of the data set in `dir`: rows in that order,
+/// the ways of a method together. `done` hears of each scene.
+///
+/// # Errors
+/// No scenes, a margin that leaves nothing, a pair that cannot be read, or what a method refuses.
+pub fn evaluate(
+    manifest: &Manifest,
+    dir: &Path,
+    sample: &Sample,
+    methods: &[Method<'_>],
+    shown: &[Shown],
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Row>> {
+    let Sample {
+        scenes,
+        seed,
+        depth,
+        margin,
+    } = sample;
+    if *depth != Depth::Rendered && !manifest.size.is_multiple_of(refined_depth::RATIO) {
+        return Err(phasefront_io::Error::Input(format!(
+            "scenes of {} px have no sensor's depth; their sides must be multiples of {}",
+            manifest.size,
+            refined_depth::RATIO
+        )));
+    }
+    if 2 * margin >= manifest.size {
+        return Err(phasefront_io::Error::Input(format!(
+            "a margin of {margin} px leaves nothing of scenes of {} px",
+            manifest.size
+        )));
+    }
+    if scenes.is_empty() {
+        return Err(phasefront_io::Error::file(
+            dir,
+            "no scenes to evaluate on in this split; the data set needs at least 40 for one",
+        ));
+    }
+    let viewer = Viewer::new(manifest)?;
+    let each: Vec<_> = methods.iter().map(|method| (method, ways(method, shown))).collect();
+    let of_scenes = scenes
+        .par_iter()
+        .map(|&index| {
+            let pair = dataset::read_pair(manifest, dir, index)?;
+            let depths = stack_depths(&pair.ldi.layers[0].depth, (seed << 32) + index as u64);
+            let mut z_m = vec![0.0];
+            z_m.extend(depths.iter().map(|d| manifest.display.z_of_depth(*d)));
+            let truth = viewer.views(&pair.hologram, &Shown::complex(), &z_m)?.views;
+            let mut figures = Vec::new();
+            let scene = depth.of(&pair.ldi, (seed << 32) + index as u64)?;
+            for (method, ways) in &each {
+                let field = (method.field)(&scene)?;
+                for shown in ways {
+                    let seen = viewer.views(&field, shown, &z_m)?;
+                    figures.push(Figures {
+                        light: seen.light,
+                        ..judge(&seen.views, &truth, *margin)?
+                    });
+                }
+            }
+            done();
+            Ok(figures)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let rows = (each.iter()).flat_map(|(method, ways)| ways.iter().map(move |shown| (method, shown)));
+    Ok(rows
+        .enumerate()
+        .map(|(way, (method, shown))| {
+            let each = || of_scenes.iter().map(|figures| figures[way]);
+            let mean = |figure: fn(Figures) -> f64| each().map(figure).sum::<f64>() / scenes.len() as f64;
+            Row {
+                method: method.name.clone(),
+                shown: shown.name.clone(),
+                mean: Figures {
+                    amplitude_psnr: mean(|f| f.amplitude_psnr),
+                    amplitude_ssim: mean(|f| f.amplitude_ssim),
+                    focal_psnr: mean(|f| f.focal_psnr),
+                    focal_ssim: mean(|f| f.focal_ssim),
+                    brightness: mean(|f| f.brightness),
+                    light: mean(|f| f.light),
+                },
+                scenes: scenes.iter().copied().zip(each()).collect(),
+            }
+        })
+        .collect())
+}
+
+/// Writes a PNG of pair `index` by `method` as `shown`, one of its [`ways`], side by side: the visible image, the
+/// midpoint's amplitude, the true one, and [`DIFFERENCE_GAIN`] times their difference.
+///
+/// # Errors
+/// A pair that cannot be read, what the method refuses, or a file that cannot be written.
+pub fn write_picture(
+    path: &Path,
+    manifest: &Manifest,
+    dir: &Path,
+    index: usize,
+    method: &Method<'_>,
+    shown: &Shown,
+) -> Result<()> {
+    let viewer = Viewer::new(manifest)?;
+    let pair = dataset::read_pair(manifest, dir, index)?;
+    let ours = viewer
+        .views(&(method.field)(&pair.ldi)?, shown, &[0.0])?
+        .views
+        .remove(0);
+    let truth = viewer.views(&pair.hologram, &Shown::complex(), &[0.0])?.views.remove(0);
+    let difference = (&ours - &truth).mapv(|v| v.abs() * DIFFERENCE_GAIN);
+    let gap = Array3::from_elem((ours.dim().0, manifest.size, 4), 1.0);
+    let input = visible_frame(&pair.ldi, &manifest.display)?.rgb().to_owned();
+    let panels = [&input, &gap, &ours, &gap, &truth, &gap, &difference].map(|panel| panel.view());
+    let strip = concatenate(Axis(2), &panels).expect("panels of one height");
+    picture::write_amplitude(path, strip.view())
+}

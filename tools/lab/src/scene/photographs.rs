@@ -1,0 +1,101 @@
+//! Pictures that the surfaces of random scenes show: a folder of the user's own.
+
+use super::Texture;
+use phasefront_io::dice::Dice;
+use phasefront_io::fingerprint::Fingerprint;
+use phasefront_io::{Error, Result, output, picture};
+use std::path::Path;
+
+/// What the names of pictures end in.
+const EXTENSIONS: [&str; 3] = ["jpg", "jpeg", "png"];
+
+/// The pictures (.jpg, .jpeg, .png) in `folder`, in the order of their names.
+///
+/// # Errors
+/// A folder without pictures, or a picture that cannot be read.
+pub fn read_photographs(folder: &Path) -> Result<Vec<Texture>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
+    let mut paths = entries
+        .map(|entry| entry.map(|entry| entry.path()))
+        .collect::<std::io::Result<Vec<_>>>()
+        .map_err(|e| Error::file(folder, e))?;
+    paths.retain(|path| EXTENSIONS.iter().any(|e| output::has_extension(path, e)));
+    paths.sort();
+    if paths.is_empty() {
+        return Err(Error::file(folder, "holds no .jpg, .jpeg or .png file"));
+    }
+    let read = |path: &std::path::PathBuf| {
+        let ((height, width), rgb) = picture::read_rgb_bytes(path)?;
+        let texels = rgb.chunks_exact(3).map(|p| [p[0], p[1], p[2], 255]);
+        Texture::new(width, height, texels.collect())
+    };
+    paths.iter().map(read).collect()
+}
+
+/// A piece of `photograph` as a texture of `size`, each texel the mean of a square of it: somewhere in it, as coarse as
+/// may be.
+pub(super) fn piece(photograph: &Texture, size: (usize, usize), dice: &mut Dice) -> Texture {
+    let (width, height) = (photograph.width(), photograph.height());
+    let largest = (width / size.0).min(height / size.1).max(1);
+    let square = dice.integer(1, largest);
+    let corner = |dice: &mut Dice, whole: usize, part: usize| dice.integer(0, whole.saturating_sub(part * square));
+    let (left, top) = (corner(dice, width, size.0), corner(dice, height, size.1));
+    let mean = |x: usize, y: usize| {
+        let mut sum = [0u32; 3];
+        for (j, i) in (0..square).flat_map(|j| (0..square).map(move |i| (j, i))) {
+            let row = (top + y * square + j) % height;
+            let texel = photograph.texels()[row * width + (left + x * square + i) % width];
+            (0..3).for_each(|c| sum[c] += u32::from(texel[c]));
+        }
+        let count = (square * square) as u32;
+        let [r, g, b] = sum.map(|sum| ((sum + count / 2) / count) as u8);
+        [r, g, b, 255]
+    };
+    let texels = (0..size.0 * size.1).map(|index| mean(index % size.0, index / size.0));
+    Texture::sized(size.0, size.1, texels.collect())
+}
+
+/// FNV-1a over sizes and texels, by which a data set knows its photographs again.
+pub fn fingerprint(photographs: &[Texture]) -> u64 {
+    let mut hash = Fingerprint::default();
+    for photograph in photographs {
+        hash.numbers(&[photograph.width(), photograph.height()]);
+        hash.bytes(photograph.texels().as_flattened());
+    }
+    hash.value()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+
+    #[test]
+    fn pictures_are_read_by_name_and_known_again() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, grey) in [("b.png", 9), ("a.PNG", 200)] {
+            picture::write_rgba(&folder.path().join(name), 3, 2, &[grey; 24]).unwrap();
+        }
+        std::fs::write(folder.path().join("LICENCE.txt"), "free").unwrap();
+        let photographs = read_photographs(folder.path()).unwrap();
+        assert_eq!(photographs.len(), 2);
+        assert_eq!(photographs[0].texels()[5][..3], [200; 3]);
+        assert_eq!((photographs[1].width(), photographs[1].height()), (3, 2));
+        let turned = [photographs[1].clone(), photographs[0].clone()];
+        assert_ne!(fingerprint(&photographs), fingerprint(&turned));
+        assert_eq!(fingerprint(&photographs), fingerprint(&photographs.clone()));
+    }
+
+    #[test]
+    fn a_folder_without_whole_pictures_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let refusal = |text: &str| {
+            let error = read_photographs(folder.path()).unwrap_err().to_string();
+            assert!(error.contains(text), "{error}");
+        };
+        refusal("holds no .jpg");
+        std::fs::write(folder.path().join("cut.jpg"), "no picture").unwrap();
+        refusal("cut.jpg");
+    }
+}

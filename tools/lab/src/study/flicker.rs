@@ -1,0 +1,199 @@
+//! How much video flickers: a scene that stands still, its depth noisy as a phone's, frame after frame through a
+//! session; and how much the picture that is seen changes from each frame to the next.
+
+use crate::scene;
+use crate::study::refined_depth::{Degradation, SENSOR, degrade};
+use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
+use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
+use phasefront_io::ldi::Ldi;
+use phasefront_io::{Error, Result};
+use serde::Serialize;
+
+/// Noise and missing readings, new in each frame.
+const SENSOR_FAULTS: Degradation = Degradation {
+    name: "noise and holes",
+    noise: 0.01,
+    shift: 0,
+    holes: true,
+};
+/// Metres at normalized depth 0 and 1.
+const RANGE_M: (f32, f32) = (0.5, 2.5);
+/// Frames of a second.
+const RATE_HZ: u64 = 30;
+
+/// What smooths a session's frames, and how what is shown is corrected.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// Whether frames have a past: depth is smoothed over time.
+    pub video: bool,
+    /// Whether brightness is [`Brightness::Smoothed`]; if not, it is [`Brightness::FrameMax`].
+    pub smoothed: bool,
+    /// As in [`EncoderOptions`].
+    pub dark_threshold: f32,
+    /// As in [`EncoderOptions`].
+    pub local_steps: usize,
+    /// As in [`EncoderOptions`].
+    pub midpoint_steps: usize,
+}
+
+/// All frames by themselves, as usual.
+const ALONE: Setting = Setting {
+    name: "each frame by itself",
+    video: false,
+    smoothed: false,
+    dark_threshold: EncoderOptions::DARK_THRESHOLD,
+    local_steps: 1,
+    midpoint_steps: 0,
+};
+
+/// Depth and brightness smoothed.
+const BOTH: Setting = Setting {
+    name: "both",
+    video: true,
+    smoothed: true,
+    ..ALONE
+};
+
+/// Nothing smoothed, each, and both; then both without correction, and with one step at the midpoint that goes on from
+/// the frame before.
+pub const SETTINGS: [Setting; 6] = [
+    ALONE,
+    Setting {
+        name: "depth smoothed",
+        video: true,
+        ..ALONE
+    },
+    Setting {
+        name: "brightness smoothed",
+        smoothed: true,
+        ..ALONE
+    },
+    BOTH,
+    Setting {
+        name: "both, AA-DPM as published",
+        dark_threshold: 0.0,
+        local_steps: 0,
+        ..BOTH
+    },
+    Setting {
+        name: "both, 1 midpoint step",
+        midpoint_steps: 1,
+        ..BOTH
+    },
+];
+
+/// What changes from frame to frame: root mean squares over the frames.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What smoothed the frames.
+    pub setting: &'static str,
+    /// The change of the picture's mean brightness, of that brightness.
+    pub brightness: f64,
+    /// The change of a pixel's amplitude, full light being 1.
+    pub pixel: f64,
+}
+
+/// `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`]. What is
+/// seen is what the modulator shows at full light, focused in the middle of the volume. `done` hears of each frame.
+///
+/// # Errors
+/// Fewer than two frames, or what a session refuses.
+pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done: &dyn Fn()) -> Result<Vec<Row>> {
+    if frames < 2 {
+        return Err(Error::Input(
+            "a change from frame to frame needs at least two frames".into(),
+        ));
+    }
+    let shape = (display.height(), display.width());
+    let random = scene::random_scene(seed, shape.0, shape.1);
+    let ldi = scene::render_ldi_reference(&random, shape.0, shape.1, 1)?.quantized();
+    let rgb = colour_bytes(&ldi);
+    let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
+    let readings: Vec<Vec<u8>> = (0..frames)
+        .map(|frame| {
+            let readings = degrade(depth.view(), &SENSOR_FAULTS, seed + 1 + frame as u64);
+            let metres = readings.mapv(|d| RANGE_M.0 + d * (RANGE_M.1 - RANGE_M.0));
+            metres.iter().flat_map(|m| m.to_le_bytes()).collect()
+        })
+        .collect();
+    (SETTINGS.iter())
+        .map(|setting| {
+            let mut options = SessionOptions::new(display, method.clone());
+            options.encoder = EncoderOptions {
+                dark_threshold: setting.dark_threshold,
+                local_steps: setting.local_steps,
+                midpoint_steps: setting.midpoint_steps,
+                brightness: match setting.smoothed {
+                    true => Brightness::Smoothed,
+                    false => Brightness::FrameMax,
+                },
+                ..options.encoder
+            };
+            let process: Box<dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>> = if setting.video {
+                let session = VideoSession::new(options)?;
+                Box::new(move |frame| session.process(frame))
+            } else {
+                let session = ImageSession::new(options)?;
+                Box::new(move |frame| session.process(frame))
+            };
+            let mut seen: Vec<Vec<f32>> = Vec::with_capacity(frames);
+            for (frame, readings) in readings.iter().enumerate() {
+                let colour = Plane::new(&rgb, 3 * shape.1, 3);
+                let colour = ColourImage::new(ColourFormat::Rgb, shape.1, shape.0, &[colour])?;
+                let plane = Plane::new(readings, 4 * SENSOR.1, 4);
+                let depth = DepthImage::new(DepthFormat::MetresF32, SENSOR.1, SENSOR.0, plane)?;
+                let timestamp = (1 + frame as u64) * 1_000_000_000 / RATE_HZ;
+                let hologram = process(&CameraFrame::new(timestamp, colour, depth))?;
+                let (height, width) = (shape.0 / 2, shape.1 / 2);
+                let mut rgba = vec![0; 4 * height * width];
+                hologram.preview(0.0, height, width, &mut rgba)?;
+                // The preview undoes the scale; the eye sees the light, which is amplitude over scale.
+                let light = |byte: &u8| f32::from(*byte) / 255.0 / hologram.scale();
+                let colours = rgba.chunks_exact(4).flat_map(|pixel| &pixel[..3]);
+                seen.push(colours.map(light).collect());
+                done();
+            }
+            Ok(changes(setting.name, &seen))
+        })
+        .collect()
+}
+
+fn changes(setting: &'static str, seen: &[Vec<f32>]) -> Row {
+    let mean = |frame: &[f32]| frame.iter().map(|v| f64::from(*v)).sum::<f64>() / frame.len() as f64;
+    let means: Vec<f64> = seen.iter().map(|frame| mean(frame)).collect();
+    let overall = means.iter().sum::<f64>() / means.len() as f64;
+    let steps = (means.len() - 1) as f64;
+    let brightness = means.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)).sum::<f64>();
+    let pixel = (seen.windows(2)).map(|pair| {
+        let squares = pair[0].iter().zip(&pair[1]).map(|(a, b)| f64::from(b - a).powi(2));
+        squares.sum::<f64>() / pair[0].len() as f64
+    });
+    Row {
+        setting,
+        brightness: (brightness / steps).sqrt() / overall,
+        pixel: (pixel.sum::<f64>() / steps).sqrt(),
+    }
+}
+
+fn colour_bytes(ldi: &Ldi) -> Vec<u8> {
+    let (height, width) = ldi.shape();
+    let rgb = &ldi.layers[0].rgb;
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (y, x)));
+    pixels
+        .flat_map(|(y, x)| [0, 1, 2].map(|c| (rgb[(c, y, x)].clamp(0.0, 1.0) * 255.0).round() as u8))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_root_mean_squares() {
+        let row = changes("", &[vec![1.0, 3.0], vec![2.0, 4.0], vec![2.0, 4.0]]);
+        assert!((row.pixel - (0.5f64).sqrt()).abs() < 1e-9);
+        assert!((row.brightness - (0.5f64).sqrt() / (8.0 / 3.0)).abs() < 1e-9);
+    }
+}

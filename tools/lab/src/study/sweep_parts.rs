@@ -1,0 +1,359 @@
+//! What the plane sweep's planes, taps, hidden layers, tiles and merged steps are worth, one at a time, beside exact
+//! waves on the same surfaces; on rendered depth, and on depth as a phone gives it after the core has refined it. And
+//! the sweep on displays that no network was trained for.
+
+use crate::scene;
+use crate::study::Scenes;
+use crate::study::refined_depth::{DEGRADATIONS, RATIO, degrade, front, refine};
+use ndarray::Array3;
+use num_complex::Complex32;
+use phasefront::unstable::sweep::{self, SweepPlan};
+use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_exact::sm_lbm;
+use phasefront_exact::truth::filled;
+use phasefront_io::ldi::Ldi;
+use phasefront_io::{Error, Result, metrics};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Frames of which the fastest is a sweep's time.
+const TIMED_FRAMES: usize = 5;
+
+/// The displays of [`displays`] beside the study's own: what differs, as the display's file says it.
+pub const DISPLAYS: [&str; 10] = [
+    "",
+    "pitch_um = 6.4",
+    "pitch_um = 3.74",
+    "volume_depth_mm = 12.0",
+    "wavelengths_nm = [660, 532, 473]",
+    "wavelengths_nm = [639, 515, 445]",
+    "offset_mm = 3.0",
+    "offset_mm = 6.0",
+    "offset_mm = -10.0",
+    "offset_mm = 20.0",
+];
+
+/// A way to a hologram.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Way {
+    /// SM-LBM of what is visible and so many hidden layers.
+    Exact { hidden: usize, planes: usize },
+    /// The sweep, with its steps merged or not.
+    Sweep { sweep: Sweep, merged: bool },
+}
+
+/// Means over the scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Figures {
+    /// Of the hologram's amplitude, dB.
+    pub psnr: f64,
+    /// Of the hologram's amplitude.
+    pub ssim: f64,
+}
+
+/// One setting of the ablation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// What is changed: `exact`, `usual`, `planes`, `taps`, `hidden`, `between`, `tile` or `merge`.
+    pub part: &'static str,
+    /// The setting in words.
+    pub setting: String,
+    /// What is changed as a number, for a plot.
+    pub value: usize,
+    /// On rendered depth.
+    pub clean: Figures,
+    /// On degraded depth that was refined.
+    pub degraded: Figures,
+    /// The first scene on one thread, the fastest of five frames, ns a pixel; none for exact waves.
+    pub ns_per_pixel: Option<f64>,
+}
+
+/// The ablation on `scenes`, whose true holograms and exact waves have `planes` planes. `done` hears of each finished
+/// hologram, [`ablation_work`] in all.
+///
+/// # Errors
+/// No scenes, a size that a sensor's pixels do not divide, or a display that cannot be swept.
+pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<Row>> {
+    check(scenes)?;
+    let size = scenes.size;
+    if !size.is_multiple_of(RATIO) {
+        return Err(Error::Input(format!(
+            "scenes of {size} pixels; the degraded depth needs a multiple of {RATIO}"
+        )));
+    }
+    let display = &scenes.display;
+    let settings = settings(display, planes);
+    let mut plans = Vec::new();
+    for (_, _, _, way) in &settings {
+        plans.push(match *way {
+            Way::Exact { .. } => None,
+            Way::Sweep { sweep, merged } => {
+                let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
+                Some(if merged { plan } else { plan.unmerged() })
+            }
+        });
+    }
+    let degradation = DEGRADATIONS[DEGRADATIONS.len() - 1];
+    let of_scenes = (0..scenes.scenes as u64)
+        .into_par_iter()
+        .map(|i| {
+            let ldi = render(scenes, i)?;
+            let truth = sm_lbm::hologram(&ldi, display, planes, &|_, _| {})?;
+            let (rgb, depth) = front(&ldi);
+            let refined = refine(&degrade(depth.view(), &degradation, scenes.seed + i), &rgb)?;
+            let frames = [depth, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
+            let mut figures = Vec::new();
+            for ((.., way), plan) in settings.iter().zip(&plans) {
+                let mut of_way = Vec::new();
+                for frame in &frames {
+                    let frame = frame.as_ref().map_err(|e| Error::Input(e.to_string()))?;
+                    let field = match (way, plan) {
+                        (Way::Exact { hidden, planes }, _) => exact(frame, display, *hidden, *planes)?,
+                        (_, Some(plan)) => swept(plan, frame)?,
+                        _ => unreachable!("a sweep has a plan"),
+                    };
+                    of_way.push(alike(&field, &truth)?);
+                    done();
+                }
+                figures.push([of_way[0], of_way[1]]);
+            }
+            Ok(figures)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let ldi = render(scenes, 0)?;
+    let (rgb, depth) = front(&ldi);
+    let frame = RgbdFrame::new(rgb, depth)?;
+    let mut rows = Vec::new();
+    for (i, ((part, setting, value, _), plan)) in settings.into_iter().zip(&plans).enumerate() {
+        let each = |kind: usize| of_scenes.iter().map(move |figures| figures[i][kind]);
+        rows.push(Row {
+            part,
+            setting,
+            value,
+            clean: mean(each(0)),
+            degraded: mean(each(1)),
+            ns_per_pixel: match plan {
+                Some(plan) => Some(time(plan, &frame)?),
+                None => None,
+            },
+        });
+    }
+    Ok(rows)
+}
+
+/// The holograms of [`ablation`].
+pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
+    2 * scenes.scenes * settings(&scenes.display, planes).len()
+}
+
+/// What is compared: the part that is changed, in words, as a number, and how.
+fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Way)> {
+    let usual = Sweep::for_display(display);
+    let sweep = |sweep| Way::Sweep { sweep, merged: true };
+    let mut settings = Vec::new();
+    for hidden in 0..=sweep::MAX_HIDDEN_LAYERS {
+        for planes in [planes, usual.planes] {
+            let words = format!("exact waves, {planes} planes, {hidden} hidden layers");
+            settings.push(("exact", words, hidden, Way::Exact { hidden, planes }));
+        }
+    }
+    let words = format!(
+        "{} planes of {} taps, {} hidden layers, tiles of {}",
+        usual.planes, usual.taps, usual.hidden_layers, usual.tile
+    );
+    settings.push(("usual", words, usual.planes, sweep(usual)));
+    for tenths in [4, 6, 8, 12, 16, 24, 32] {
+        let planes = (usual.planes * tenths).div_ceil(10);
+        let way = Sweep::of_planes(display, planes);
+        let words = format!("{planes} planes of {} taps", way.taps);
+        settings.push(("planes", words, planes, sweep(way)));
+    }
+    for more in [-4, -2, 2, 4, 8] {
+        let taps = usual.taps.saturating_add_signed(more);
+        let words = format!("{taps} taps");
+        settings.push(("taps", words, taps, sweep(Sweep { taps, ..usual })));
+    }
+    for hidden_layers in 0..sweep::MAX_HIDDEN_LAYERS {
+        let words = format!("{hidden_layers} hidden layers");
+        let way = Sweep { hidden_layers, ..usual };
+        settings.push(("hidden", words, hidden_layers, sweep(way)));
+    }
+    let way = Sweep {
+        between_planes: false,
+        ..usual
+    };
+    settings.push(("between", "points moved to planes".into(), 0, sweep(way)));
+    for tile in [64, 128, 512, 1024] {
+        let words = format!("tiles of {tile}");
+        settings.push(("tile", words, tile, sweep(Sweep { tile, ..usual })));
+    }
+    let way = Way::Sweep {
+        sweep: usual,
+        merged: false,
+    };
+    settings.push(("merge", "each step by itself".into(), 0, way));
+    settings
+}
+
+/// The sweep on one display, beside exact waves; all against the truth of that display, at its modulator.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DisplayRow {
+    /// What differs from the usual display; empty for that one.
+    pub display: String,
+    /// The sweep that suits it.
+    pub planes: usize,
+    /// Its taps.
+    pub taps: usize,
+    /// SM-LBM of what is visible, in the truth's planes.
+    pub visible: Figures,
+    /// SM-LBM of what is visible and the hidden layers, in the sweep's planes.
+    pub filled: Figures,
+    /// The sweep.
+    pub sweep: Figures,
+}
+
+/// [`DISPLAYS`] on `scenes`, whose own display does not count. `done` hears of each finished hologram,
+/// [`displays_work`] in all.
+///
+/// # Errors
+/// No scenes.
+pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Result<Vec<DisplayRow>> {
+    check(scenes)?;
+    let mut rows = Vec::new();
+    for toml in DISPLAYS {
+        let display = Display::from_toml(toml)?;
+        let sweep = Sweep::for_display(&display);
+        // As `Method::Sweep` does: a near modulator is swept to.
+        let near = sweep::reaches(&display, display.offset_m());
+        let z_m = if near { display.offset_m() } else { 0.0 };
+        let plan = SweepPlan::new(scenes.size, scenes.size, &display, sweep, z_m)?;
+        let of_scenes = (0..scenes.scenes as u64)
+            .into_par_iter()
+            .map(|i| {
+                let ldi = render(scenes, i)?;
+                let (rgb, depth) = front(&ldi);
+                let frame = RgbdFrame::new(rgb, depth)?;
+                let there = |field| to_modulator(field, &display);
+                let truth = there(sm_lbm::hologram(&ldi, &display, planes, &|_, _| {})?)?;
+                let visible = there(exact(&frame, &display, 0, planes)?)?;
+                done();
+                let hidden = sweep::MAX_HIDDEN_LAYERS;
+                let filled = there(exact(&frame, &display, hidden, sweep.planes)?)?;
+                done();
+                let field = swept(&plan, &frame)?;
+                let swept = if near { field } else { there(field)? };
+                done();
+                Ok([
+                    alike(&visible, &truth)?,
+                    alike(&filled, &truth)?,
+                    alike(&swept, &truth)?,
+                ])
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let each = |way: usize| of_scenes.iter().map(move |figures| figures[way]);
+        rows.push(DisplayRow {
+            display: toml.into(),
+            planes: sweep.planes,
+            taps: sweep.taps,
+            visible: mean(each(0)),
+            filled: mean(each(1)),
+            sweep: mean(each(2)),
+        });
+    }
+    Ok(rows)
+}
+
+/// The holograms of [`displays`].
+pub fn displays_work(scenes: &Scenes) -> usize {
+    3 * scenes.scenes * DISPLAYS.len()
+}
+
+fn check(scenes: &Scenes) -> Result<()> {
+    if scenes.scenes == 0 || scenes.size == 0 {
+        return Err(Error::Input(
+            "a study needs at least one scene of at least one pixel".into(),
+        ));
+    }
+    Ok(())
+}
+
+fn render(scenes: &Scenes, i: u64) -> Result<Ldi> {
+    let size = scenes.size;
+    let scene = scene::random_scene(scenes.seed + i, size, size);
+    Ok(scene::render_ldi_reference(&scene, size, size, 5)?.quantized())
+}
+
+/// SM-LBM of what is visible and the first `hidden` layers that the sweep adds.
+fn exact(frame: &RgbdFrame, display: &Display, hidden: usize, planes: usize) -> Result<Array3<Complex32>> {
+    let mut layers = filled(frame, display)?.layers;
+    layers.truncate(1 + hidden);
+    sm_lbm::hologram(&Ldi::new(layers)?, display, planes, &|_, _| {})
+}
+
+fn swept(plan: &SweepPlan, frame: &RgbdFrame) -> Result<Array3<Complex32>> {
+    let (height, width) = plan.shape();
+    let mut field = Array3::zeros((3, height, width));
+    let values = field.as_slice_mut().expect("standard layout");
+    plan.field(frame, values, &mut plan.scratch())?;
+    Ok(field)
+}
+
+/// On one thread, the fastest of [`TIMED_FRAMES`], ns a pixel.
+fn time(plan: &SweepPlan, frame: &RgbdFrame) -> Result<f64> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .map_err(|e| Error::Input(e.to_string()))?;
+    pool.install(|| {
+        let (height, width) = plan.shape();
+        let mut field = vec![Complex32::ZERO; 3 * height * width];
+        let mut scratch = plan.scratch();
+        let mut least = f64::INFINITY;
+        for _ in 0..TIMED_FRAMES {
+            let start = Instant::now();
+            plan.field(frame, &mut field, &mut scratch)?;
+            least = least.min(start.elapsed().as_secs_f64());
+        }
+        Ok(least * 1e9 / (height * width) as f64)
+    })
+}
+
+/// A midpoint hologram at the modulator.
+fn to_modulator(mut field: Array3<Complex32>, display: &Display) -> Result<Array3<Complex32>> {
+    if display.offset_m() == 0.0 {
+        return Ok(field);
+    }
+    let (_, height, width) = field.dim();
+    let plans = Propagator::for_colours(
+        height,
+        width,
+        display.pitch_m(),
+        display.wavelengths_m(),
+        display.offset_m(),
+        Padding::Reach,
+    )?;
+    let values = field.as_slice_mut().expect("standard layout");
+    for (plan, plane) in plans.iter().zip(values.chunks_exact_mut(height * width)) {
+        plan.propagate(plane, &mut plan.scratch());
+    }
+    Ok(field)
+}
+
+fn alike(field: &Array3<Complex32>, truth: &Array3<Complex32>) -> Result<Figures> {
+    let [a, b] = [field, truth].map(|field| field.mapv(|u| u.norm()));
+    let alike = metrics::compare(a.view(), b.view())?;
+    Ok(Figures {
+        psnr: alike.psnr_overall,
+        ssim: alike.ssim_overall,
+    })
+}
+
+fn mean(each: impl ExactSizeIterator<Item = Figures>) -> Figures {
+    let count = each.len() as f64;
+    each.fold(Figures::default(), |sum, figures| Figures {
+        psnr: sum.psnr + figures.psnr / count,
+        ssim: sum.ssim + figures.ssim / count,
+    })
+}

@@ -1,0 +1,489 @@
+//! Evaluation on small data sets made on the fly, against the same figures computed apart.
+#![allow(clippy::unwrap_used)]
+
+use ndarray::{Array2, Array3, Axis};
+use num_complex::Complex32;
+use phasefront::target::Aberration;
+use phasefront::unstable::modulator::Modulator;
+use phasefront::unstable::wave::aperture::Opening;
+use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront::unstable::wave::zernike::Aberrations;
+use phasefront::{Brightness, Display, EncoderOptions, Encoding};
+use phasefront_command::networks::{self, Precision};
+use phasefront_exact::sm_lbm;
+use phasefront_io::display::calibration::AberrationFile;
+use phasefront_io::hologram::{Hologram, HologramInfo};
+use phasefront_io::{metrics, picture};
+use phasefront_lab::dataset::{self, Manifest};
+use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown, Viewer};
+use phasefront_lab::scene;
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+const SIZE: usize = 48;
+const PLANES: usize = 10;
+
+/// A data set of 80 pairs of which only the two of the test split are made, 78 and 79.
+struct Data {
+    dir: tempfile::TempDir,
+    manifest: Manifest,
+}
+
+impl Data {
+    fn new() -> Self {
+        Self::correcting(None)
+    }
+
+    fn correcting(aberration: Option<&AberrationFile>) -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let manifest = Manifest::new(80, SIZE, PLANES, 3, 4, Display::default()).unwrap();
+        let manifest = manifest.correcting(aberration);
+        assert_eq!(manifest.splits.test, [78, 80]);
+        for shard in [78, 79] {
+            dataset::make(&manifest, &[], dir.path(), (shard, 80), &|| {}).unwrap();
+        }
+        Data { dir, manifest }
+    }
+
+    fn path(&self) -> &Path {
+        self.dir.path()
+    }
+
+    fn evaluate(&self, methods: &[Method<'_>], shown: &[Shown]) -> Vec<Row> {
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            depth: Depth::Rendered,
+            margin: 0,
+        };
+        evaluate::evaluate(&self.manifest, self.path(), &sample, methods, shown, &|| {}).unwrap()
+    }
+
+    fn command(&self, arguments: &[&str]) -> std::process::Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_phasefront-lab"));
+        command
+            .arg("evaluate")
+            .arg(self.path())
+            .args(arguments)
+            .env_remove("RUST_LOG");
+        command.output().unwrap()
+    }
+}
+
+fn encoded(display: &Display, name: &str, encoding: Encoding) -> Shown {
+    let options = EncoderOptions {
+        brightness: Brightness::FrameMax,
+        ..encoding.into()
+    };
+    Shown {
+        name: name.into(),
+        levels: Some((display.into(), options)),
+        ceiling: 0,
+        through: None,
+    }
+}
+
+#[test]
+fn a_pair_is_read_as_it_was_made() {
+    let data = Data::new();
+    let pair = dataset::read_pair(&data.manifest, data.path(), 79).unwrap();
+    let scene = scene::random_scene(data.manifest.scene_seed(79), SIZE, SIZE);
+    let ldi = scene::render_ldi_reference(&scene, SIZE, SIZE, 3).unwrap().quantized();
+    assert_eq!(pair.ldi, ldi);
+    let hologram = sm_lbm::hologram(&ldi, &Display::default(), PLANES, &|_, _| {}).unwrap();
+    assert_eq!(pair.hologram, hologram);
+
+    let refused = |index: usize, words: &[&str]| {
+        let message = match dataset::read_pair(&data.manifest, data.path(), index) {
+            Ok(_) => panic!("pair {index} was read"),
+            Err(e) => e.to_string(),
+        };
+        for word in words {
+            assert!(message.contains(word), "{message}");
+        }
+    };
+    refused(3, &["pair_000003.npz", "completes the data set"]);
+    let path = Manifest::pair_path(data.path(), 78);
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    refused(78, &["pair_000078.npz", "no whole pair"]);
+    let other = Manifest::new(80, SIZE + 1, PLANES, 3, 4, Display::default()).unwrap();
+    let message = dataset::read_pair(&other, data.path(), 79).err().unwrap().to_string();
+    assert!(message.contains("49×49"), "{message}");
+}
+
+#[test]
+fn the_figures_are_those_of_the_definition() {
+    let data = Data::new();
+    let rows = data.evaluate(&[Method::rgb(&data.manifest.display)], &[Shown::complex()]);
+    assert_eq!((rows.len(), rows[0].scenes.len()), (1, 2));
+    let display = Display::default();
+    for (index, figures) in &rows[0].scenes {
+        let pair = dataset::read_pair(&data.manifest, data.path(), *index).unwrap();
+        let front = &pair.ldi.layers[0];
+        let rgb = Array3::from_shape_fn((3, SIZE, SIZE), |(c, y, x)| {
+            if front.depth[(y, x)].is_nan() {
+                0.0
+            } else {
+                front.rgb[(c, y, x)]
+            }
+        });
+        let truth = pair.hologram.mapv(|v| v.norm());
+        let direct = metrics::compare(rgb.view(), truth.view()).unwrap();
+        assert!((figures.amplitude_psnr - direct.psnr_overall).abs() < 1e-3);
+        assert!((figures.amplitude_ssim - direct.ssim_overall).abs() < 1e-4);
+
+        let field = rgb.mapv(Complex32::from);
+        let depths = evaluate::stack_depths(&front.depth, (5 << 32) + *index as u64);
+        let (mut psnr, mut ssim) = (0.0, 0.0);
+        for d in &depths {
+            let view = |field: &Array3<Complex32>| {
+                let mut out = field.clone();
+                for (colour, lambda) in display.wavelengths_m().iter().copied().enumerate() {
+                    let z = display.z_of_depth(*d);
+                    let plan = Propagator::new(SIZE, SIZE, display.pitch_m(), lambda, z, Padding::Double).unwrap();
+                    let mut plane = out.index_axis_mut(Axis(0), colour);
+                    plan.propagate(plane.as_slice_mut().unwrap(), &mut plan.scratch());
+                }
+                out.mapv(|v| v.norm())
+            };
+            let at = metrics::compare(view(&field).view(), view(&pair.hologram).view()).unwrap();
+            psnr += at.psnr_overall / depths.len() as f64;
+            ssim += at.ssim_overall / depths.len() as f64;
+        }
+        assert!((figures.focal_psnr - psnr).abs() < 0.1, "{} {psnr}", figures.focal_psnr);
+        assert!(
+            (figures.focal_ssim - ssim).abs() < 5e-3,
+            "{} {ssim}",
+            figures.focal_ssim
+        );
+    }
+    let mean = (rows[0].scenes[0].1.focal_psnr + rows[0].scenes[1].1.focal_psnr) / 2.0;
+    assert!((rows[0].mean.focal_psnr - mean).abs() < 1e-12);
+}
+
+#[test]
+fn the_truth_is_the_truth_and_what_is_visible_is_nearer_to_it_than_the_image() {
+    let data = Data::new();
+    let display = &data.manifest.display;
+    let methods = [
+        Method::layers(display, PLANES),
+        Method::visible(display, PLANES),
+        Method::rgb(display),
+    ];
+    let rows = data.evaluate(&methods, &[Shown::complex()]);
+    let [layers, visible, rgb] = [0, 1, 2].map(|i| &rows[i].mean);
+    assert_eq!(layers.amplitude_psnr, f64::INFINITY);
+    assert!((layers.focal_ssim - 1.0).abs() < 1e-9);
+    assert!(visible.amplitude_psnr > rgb.amplitude_psnr, "{visible:?} {rgb:?}");
+    assert!(visible.focal_ssim > rgb.focal_ssim);
+}
+
+/// Fig. 8: where a data set's holograms correct an aberration, all are looked at through it.
+#[test]
+fn holograms_that_correct_an_aberration_are_judged_through_it() {
+    let cylinder = Aberration::new([[2.0, 4.0, 0.0, 0.0, 0.0]; 3]).unwrap();
+    let all = Aberrations::new(vec![(0.0, cylinder)]).unwrap();
+    let plain = Data::new();
+    let corrected = Data::correcting(Some(&AberrationFile::Uniform(all)));
+    let psnr = |data: &Data, method: Method<'_>| data.evaluate(&[method], &[Shown::complex()])[0].mean.amplitude_psnr;
+    let display = Display::default();
+    let layers = || Method::layers(&display, PLANES);
+    assert!(psnr(&plain, layers()) > 100.0);
+    // What corrects nothing is blurred.
+    let blurred = psnr(&corrected, layers());
+    assert!(blurred < 25.0, "{blurred}");
+    // The correcting holograms look through the cylinder as the others do without: but for light over the rim.
+    let z_m = [0.0, 1e-3];
+    let see = |data: &Data| {
+        let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
+        let viewer = Viewer::new(&data.manifest).unwrap();
+        viewer.views(&pair.hologram, &Shown::complex(), &z_m).unwrap().views
+    };
+    let inner = ndarray::s![.., 12..SIZE - 12, 12..SIZE - 12];
+    for (there, here) in see(&corrected).iter().zip(&see(&plain)) {
+        let figures = metrics::compare(there.slice(inner), here.slice(inner)).unwrap();
+        assert!(
+            figures.psnr_overall > blurred + 6.0,
+            "{} {blurred}",
+            figures.psnr_overall
+        );
+    }
+}
+
+#[test]
+fn the_ceiling_is_above_every_encoder() {
+    let data = Data::new();
+    let display = data.manifest.display.clone();
+    let plain = encoded(&display, "anti-alias", Encoding::ANTI_ALIAS);
+    let lifted = Shown {
+        name: "ceiling".into(),
+        ceiling: 60,
+        ..plain.clone()
+    };
+    let rows = data.evaluate(&[Method::layers(&data.manifest.display, PLANES)], &[plain, lifted]);
+    let [plain, lifted] = [0, 1].map(|row: usize| rows[row].mean);
+    assert!(
+        lifted.amplitude_psnr > plain.amplitude_psnr + 1.0,
+        "{plain:?} {lifted:?}"
+    );
+    assert!(lifted.focal_psnr > plain.focal_psnr, "{plain:?} {lifted:?}");
+}
+
+/// At an offset the modulator's frame is too small for the light at its border; away from there it shows the field.
+#[test]
+fn at_an_offset_a_margin_leaves_out_what_the_frame_cannot_show() {
+    let data = Data::new();
+    let display = data.manifest.display.clone().with_offset_m(2e-3).unwrap();
+    let shown = [encoded(&display, "at 2 mm", Encoding::ANTI_ALIAS)];
+    let methods = [Method::layers(&data.manifest.display, PLANES)];
+    let psnr = |margin: usize| {
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            depth: Depth::Rendered,
+            margin,
+        };
+        let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
+        rows[0].mean.amplitude_psnr
+    };
+    let (whole, inner) = (psnr(0), psnr(10));
+    assert!(inner > whole + 0.5 && inner > 18.0, "{whole} {inner}");
+}
+
+/// A correction for the aperture that is looked through shows more than one for another; one beside the axis shows
+/// less.
+#[test]
+fn what_is_shown_depends_on_the_aperture() {
+    let data = Data::new();
+    let of = |made_for: f64, radius: f64, shift: f64| {
+        let display = Display::from_toml(&format!("aperture_radius = {made_for:?}")).unwrap();
+        let options = EncoderOptions {
+            local_steps: 2,
+            ..Encoding::ANTI_ALIAS.into()
+        };
+        Shown {
+            name: format!("{made_for} {radius} {shift}"),
+            levels: Some(((&display).into(), options)),
+            ceiling: 0,
+            through: Some(Opening { radius, shift }),
+        }
+    };
+    let shown = [
+        of(0.7, 0.7, 0.0),
+        of(1.0, 0.7, 0.0),
+        of(1.0, 1.0, 0.0),
+        of(1.0, 1.0, 0.2),
+    ];
+    let rows = data.evaluate(&[Method::layers(&data.manifest.display, PLANES)], &shown);
+    let psnr: Vec<f64> = rows.iter().map(|row| row.mean.amplitude_psnr).collect();
+    assert!(psnr[0] > psnr[1] && psnr[2] > psnr[3], "{psnr:?}");
+    assert!(rows[1].mean.light < rows[2].mean.light, "{rows:?}");
+}
+
+#[test]
+fn ragged_depth_costs_and_refined_depth_gives_it_back() {
+    let data = Data::new();
+    let methods = [Method::visible(&data.manifest.display, PLANES)];
+    let [rendered, ragged, refined] = [Depth::Rendered, Depth::Ragged, Depth::Refined].map(|depth| {
+        let sample = Sample {
+            scenes: vec![78, 79],
+            seed: 5,
+            depth,
+            margin: 0,
+        };
+        let shown = [Shown::complex()];
+        let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
+        rows[0].mean.focal_psnr
+    });
+    assert!(ragged < rendered && refined < rendered, "{rendered} {ragged} {refined}");
+    assert!(refined > ragged, "{ragged} {refined}");
+}
+
+#[test]
+fn encoded_fields_are_judged_as_their_files_look() {
+    let data = Data::new();
+    let display = &data.manifest.display;
+    let shown = [
+        encoded(display, "double", Encoding::DoublePhase),
+        encoded(display, "anti-alias", Encoding::ANTI_ALIAS),
+    ];
+    let rows = data.evaluate(&[Method::layers(display, PLANES)], &shown);
+    for (row, shown) in rows.iter().zip(&shown) {
+        assert_eq!(row.shown, shown.name);
+        let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
+        let (target, options) = shown.levels.as_ref().unwrap();
+        let modulator = Modulator::new((SIZE, SIZE), target, options).unwrap();
+        let mut field = pair.hologram.clone();
+        let mut levels = Array3::zeros((3, SIZE, SIZE));
+        let modulation = modulator.modulate(
+            field.as_slice_mut().unwrap(),
+            levels.as_slice_mut().unwrap(),
+            &mut modulator.scratch(),
+        );
+        let info = HologramInfo {
+            calibrated: Vec::new(),
+            display: display.clone(),
+            encoder: Some(shown.name.clone()),
+            scale: Some(modulation.scale),
+            lut: None,
+            levels_turns: None,
+        };
+        let view = Hologram::PhaseOnly(levels, info).views(&[0.0]).unwrap().remove(0);
+        let truth = pair.hologram.mapv(|v| v.norm());
+        let direct = metrics::compare(view.view(), truth.view()).unwrap();
+        let ours = row.scenes[0].1;
+        assert!(ours.brightness > 0.8 && ours.brightness < 1.2, "{ours:?}");
+        assert!(ours.light > 0.01 && ours.light < 0.9, "{ours:?}");
+        // One is padded for the volume, the other not at all, and the aperture's edge falls between other frequencies.
+        assert!(
+            (ours.amplitude_psnr - direct.psnr_overall).abs() < 1.0,
+            "{ours:?} {direct:?}"
+        );
+    }
+}
+
+#[test]
+fn a_focal_stack_is_the_fullest_bins_and_random_others() {
+    // Bin 2k of the first 40 holds 40 − k pixels, the others none; two pixels are no hit.
+    let mut depths: Vec<f32> = (0..20)
+        .flat_map(|k| std::iter::repeat_n((2 * k) as f32 / 200.0 + 0.001, 40 - k))
+        .collect();
+    depths.extend([f32::NAN; 2]);
+    let depth = Array2::from_shape_vec((1, depths.len()), depths).unwrap();
+    let stack = evaluate::stack_depths(&depth, 1);
+    assert_eq!(stack.len(), 20);
+    let frequent: Vec<f64> = (0..15).map(|k| (2.0 * f64::from(k) + 0.5) / 200.0).collect();
+    assert_eq!(stack[..15], frequent);
+    let mut sorted = stack.clone();
+    sorted.sort_by(f64::total_cmp);
+    sorted.dedup();
+    assert_eq!(sorted.len(), 20, "no depth comes twice");
+    assert!(stack[15..].iter().all(|d| (0.0..1.0).contains(d)));
+    assert_eq!(stack, evaluate::stack_depths(&depth, 1));
+    assert_ne!(stack, evaluate::stack_depths(&depth, 2));
+}
+
+#[test]
+fn networks_are_judged_and_pre_filters_or_other_displays_refused() {
+    let data = Data::new();
+    let network = networks::network("8", Some(Precision::Float32)).unwrap();
+    let layers = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/ldi3-15.onnx");
+    let layers = networks::network(layers, None).unwrap();
+    let judged = [("8", &network), ("layers", &layers)]
+        .map(|(name, n)| Method::network(name, n, SIZE, &data.manifest.display).unwrap());
+    let [flat, layers] = judged;
+    let rows = data.evaluate(
+        &[flat, layers, Method::rgb(&data.manifest.display)],
+        &[Shown::complex()],
+    );
+    let psnr: Vec<f64> = rows.iter().map(|row| row.mean.amplitude_psnr).collect();
+    assert!(psnr[0] > psnr[2] && psnr[1] > psnr[2] + 3.0, "{psnr:?}");
+    let deep = Display::from_toml("volume_depth_mm = 12").unwrap();
+    let refused = Method::network("8", &network, SIZE, &deep).err().unwrap();
+    assert!(refused.to_string().contains("2.00 times the range"), "{refused}");
+}
+
+#[test]
+fn the_command_prints_figures_and_draws_the_worst() {
+    let data = Data::new();
+    let pictures = data.path().join("pictures");
+    let output = data.command(&[
+        "--method",
+        "rgb,visible",
+        "--encoder",
+        "band-limit",
+        "--json",
+        "--pictures",
+        pictures.to_str().unwrap(),
+        "--worst",
+        "1",
+    ]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let rows = result["rows"].as_array().unwrap();
+    let names: Vec<_> = rows
+        .iter()
+        .map(|r| (r["method"].as_str().unwrap(), r["shown"].as_str().unwrap()))
+        .collect();
+    assert_eq!(
+        names,
+        [
+            ("rgb", "complex"),
+            ("rgb", "band-limit, dark 0.4, steps 1"),
+            ("visible", "complex"),
+            ("visible", "band-limit, dark 0.4, steps 1")
+        ]
+    );
+    let worst = |i: usize| {
+        let scenes = rows[i]["scenes"].as_array().unwrap();
+        let psnr = |s: &serde_json::Value| s[1]["amplitude_psnr"].as_f64().unwrap();
+        let worst = scenes.iter().min_by(|a, b| psnr(a).total_cmp(&psnr(b))).unwrap();
+        worst[0].as_u64().unwrap()
+    };
+    for (i, (method, shown)) in names.iter().enumerate() {
+        let shown = shown.replace(", ", "-").replace(' ', "-");
+        let name = format!("{method}-{shown}-worst-1-scene-{:06}.png", worst(i));
+        let picture = picture::read_rgb(&pictures.join(name)).unwrap();
+        assert_eq!(picture.dim(), (3, SIZE, 4 * SIZE + 12));
+    }
+
+    let refused = |arguments: &[&str], code: i32, word: &str| {
+        let output = data.command(arguments);
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{errors}");
+        assert!(errors.contains(word), "{errors}");
+    };
+    refused(&[], 2, "--method");
+    refused(&["--method", "rgb", "--split", "validation"], 1, "pair_00007");
+    refused(&["--network", "nowhere.onnx"], 1, "nowhere.onnx");
+    refused(&["--method", "rgb", "--margin", "24"], 1, "leaves nothing");
+    refused(&["--pair", "--offset-mm", "3"], 1, "3 mm");
+    refused(
+        &["--method", "rgb", "--taps", "9"],
+        1,
+        "--taps goes with --method sweep",
+    );
+    refused(
+        &["--method", "rgb", "--planes", "9"],
+        1,
+        "--planes goes with a --method of waves",
+    );
+    refused(
+        &["--method", "rgb", "--precision", "f32"],
+        1,
+        "--precision goes with a bundled --network or --pair",
+    );
+    refused(&["--method", "rgb", "--dark-threshold", "0"], 2, "--encoder");
+}
+
+/// A pre-filter takes the place of every encoder, once.
+#[test]
+fn a_pairs_rows_are_deep() {
+    let data = Data::new();
+    let encoders = [
+        "--encoder",
+        "double,anti-alias,band-limit",
+        "--dark-threshold",
+        "0,0.4",
+        "--scenes",
+        "1",
+        "--json",
+    ];
+    let output = data.command(&[&["--pair", "--method", "rgb"], &encoders[..]].concat());
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let of = |method: &str| -> Vec<String> {
+        let rows = result["rows"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .filter(|row| row["method"] == method);
+        rows.map(|row| row["shown"].as_str().unwrap().to_owned()).collect()
+    };
+    assert_eq!(
+        of("pair"),
+        ["complex", "deep, dark 0, steps 1", "deep, dark 0.4, steps 1"]
+    );
+    assert_eq!(of("rgb").len(), 7);
+}

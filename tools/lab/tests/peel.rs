@@ -1,0 +1,133 @@
+//! Depth peeling on a GPU, or on a software driver, against the renderer on the CPU.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../tests/driver.rs"]
+mod driver;
+
+use phasefront_io::ldi::Ldi;
+use phasefront_lab::scene::{DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference};
+use std::sync::Arc;
+
+fn peeler() -> DepthPeeler {
+    driver::opened(DepthPeeler::new())
+}
+
+/// Depth and colour.
+type Pixel = (f32, [f32; 3]);
+
+/// How many pixels of the layers differ: a hit in one only, depths apart by more than 1e-4, colours by more than 1/100.
+fn differing(a: &Ldi, b: &Ldi) -> usize {
+    let pixels = |ldi: &Ldi| {
+        let of_layer = |layer: &phasefront_io::ldi::LdiLayer| {
+            let pixel = |((y, x), &d): ((usize, usize), &f32)| (d, [0, 1, 2].map(|c| layer.rgb[[c, y, x]]));
+            layer.depth.indexed_iter().map(pixel).collect::<Vec<_>>()
+        };
+        ldi.layers.iter().flat_map(of_layer).collect::<Vec<_>>()
+    };
+    let (a, b) = (pixels(a), pixels(b));
+    assert_eq!(a.len(), b.len());
+    let differ = |&((d, rgb), (e, other)): &(Pixel, Pixel)| {
+        if d.is_nan() || e.is_nan() {
+            return d.is_nan() != e.is_nan();
+        }
+        (d - e).abs() > 1e-4 || rgb.iter().zip(other).any(|(v, w)| (v - w).abs() > 0.01)
+    };
+    a.into_iter().zip(b).filter(differ).count()
+}
+
+/// A rectangle that faces the viewer at depth d.
+fn wall(x: [f32; 2], d: f32, rgb: [f32; 3]) -> Mesh {
+    let corner = |i: usize, y: f32| [x[i], y, 0.5 - d];
+    Mesh {
+        positions: vec![corner(0, 9.0), corner(1, 9.0), corner(1, 0.0), corner(0, 0.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        uv: vec![[0.5; 2]; 4],
+        colour: Vec::new(),
+        texture: Arc::new(Texture::plain(rgb)),
+    }
+}
+
+#[test]
+fn random_scenes_are_the_references_but_for_single_pixels() {
+    let peeler = peeler();
+    for (seed, (height, width)) in [
+        (1, (96, 80)),
+        (2, (61, 47)),
+        (3, (7, 130)),
+        (4, (128, 192)),
+        (5, (192, 128)),
+        (6, (1, 1)),
+    ] {
+        let scene = random_scene(seed, height, width);
+        let expected = render_ldi_reference(&scene, height, width, 5).unwrap();
+        let ldi = peeler.render(&scene, height, width, 5).unwrap();
+        // Each layer behind a pixel that differs may differ too.
+        let (count, all) = (differing(&ldi, &expected), 5 * height * width);
+        assert!(
+            count * 500 <= all,
+            "seed {seed}: {count} of {all} differ on {}",
+            peeler.adapter()
+        );
+    }
+}
+
+#[test]
+fn simple_scenes_are_the_references_exactly() {
+    let peeler = peeler();
+    let same = |meshes: Vec<Mesh>| {
+        let scene = Scene { meshes };
+        let expected = render_ldi_reference(&scene, 9, 14, 3).unwrap();
+        assert_eq!(differing(&peeler.render(&scene, 9, 14, 3).unwrap(), &expected), 0);
+        expected
+    };
+    let (red, green, blue) = ([1., 0., 0.], [0., 1., 0.], [0., 0., 1.]);
+    same(Vec::new());
+    // At the ends of the volume, out of it, and all at one depth: the first counts.
+    let ends = same(vec![
+        wall([0., 9.], 1.0, red),
+        wall([3., 14.], 0.0, green),
+        wall([0., 14.], 1.25, blue),
+    ]);
+    assert_eq!(ends.layers[0].depth[[4, 1]], 1.0);
+    assert_eq!(ends.layers[0].depth[[4, 12]], 0.0);
+    let ties = same([red, green, blue].map(|rgb| wall([1.5, 12.5], 0.5, rgb)).to_vec());
+    assert!(ties.layers[1].depth.iter().all(|d| d.is_nan()));
+    // Backs are not seen, holes are seen through, colours are held to one.
+    let mut back = wall([0., 14.], 0.2, red);
+    back.triangles.iter_mut().for_each(|t| t.swap(0, 1));
+    let mut sieve = wall([0., 14.], 0.4, green);
+    sieve.texture = Arc::new(Texture::new(2, 1, vec![[200, 200, 9, 255], [200, 200, 9, 0]]).unwrap());
+    sieve.uv = vec![[0.1, 1.0], [3.1, 1.0], [3.1, 0.0], [0.1, 0.0]];
+    sieve.colour = vec![[2.0, 0.5, 1.0]; 4];
+    same(vec![back, sieve, wall([0., 14.], 0.9, blue)]);
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let peeler = peeler();
+    let scene = Scene {
+        meshes: vec![wall([0., 9.], 0.5, [1.0; 3])],
+    };
+    for (height, width, layers) in [(0, 4, 1), (4, 0, 1), (4, 4, 0), (1 << 20, 4, 1), (usize::MAX, 2, 2)] {
+        let message = peeler.render(&scene, height, width, layers).unwrap_err().to_string();
+        assert!(!message.contains('\n'), "{message}");
+    }
+    let mut long = scene.clone();
+    long.meshes[0].texture = Arc::new(Texture::new(1 << 20, 1, vec![[0; 4]; 1 << 20]).unwrap());
+    assert!(
+        peeler
+            .render(&long, 4, 4, 1)
+            .unwrap_err()
+            .to_string()
+            .contains("texture of 1048576x1")
+    );
+    let mut broken = scene;
+    broken.meshes[0].triangles[0][0] = 4;
+    assert!(
+        peeler
+            .render(&broken, 4, 4, 1)
+            .unwrap_err()
+            .to_string()
+            .contains("vertex 4")
+    );
+}
