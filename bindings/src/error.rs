@@ -1,6 +1,6 @@
 //! The one error of the bindings: a kind that apps can act on, and the core's message.
 
-use phasefront::unstable::error::caught;
+use phasefront_core::runtime::caught::caught;
 
 /// Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right.
 #[derive(Debug, Clone, PartialEq, thiserror::Error, uniffi::Error)]

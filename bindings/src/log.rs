@@ -2,7 +2,7 @@
 
 use crate::error::{ListenerError, PhasefrontError, guard};
 use log::{Level, LevelFilter, Log, Metadata, Record};
-use phasefront::unstable::error::caught;
+use phasefront_core::runtime::caught::caught;
 use std::cell::Cell;
 use std::sync::{Arc, PoisonError, RwLock};
 

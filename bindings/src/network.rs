@@ -1,7 +1,7 @@
 //! Networks: from a file, from bytes, or built in.
 
 use crate::error::{PhasefrontError, guard};
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
 

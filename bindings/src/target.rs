@@ -3,7 +3,7 @@
 use crate::display::Display;
 use crate::error::{PhasefrontError, guard};
 use phasefront::target::Response;
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use std::path::Path;
 use std::sync::Arc;
 

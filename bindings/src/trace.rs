@@ -1,7 +1,7 @@
 //! When stages begin and end, to whoever listens: the packages pass it on to the platform's profiler.
 
 use crate::error::{ListenerError, PhasefrontError, guard};
-use phasefront::unstable::error::caught;
+use phasefront_core::runtime::caught::caught;
 use std::sync::{Arc, OnceLock, PoisonError, RwLock};
 use tracing::span::Id;
 use tracing::{Metadata, Subscriber, subscriber};

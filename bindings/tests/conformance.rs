@@ -439,8 +439,9 @@ mod write {
     /// A display whose pixels turn the phase otherwise than they are told, lit unevenly, through a lens that is not
     /// round.
     fn calibration(display: &str) -> Vec<u8> {
-        use phasefront::target::{Aberration, PerPixel};
-        use phasefront::unstable::slm::per_pixel::nodes;
+        use phasefront::target::Aberration;
+        use phasefront_core::display::response::per_pixel::PerPixel;
+        use phasefront_core::display::response::per_pixel::nodes;
         let (w, h) = DISPLAY;
         let (rows, columns) = nodes(h, w, 12);
         let levels: Vec<f32> = (0..3 * rows * columns)

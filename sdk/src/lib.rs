@@ -36,7 +36,6 @@
 //! | [`EncoderOptions`] | how a field becomes levels: [`Encoding`], [`Brightness`] |
 //! | [`Pipeline`] | one frame through all stages, by hand |
 //! | [`output`] | levels to the images that a modulator takes, and back; modulators that can be bought |
-//! | [`unstable`] | what the laboratory and the tests need; it changes without notice |
 //!
 //! The bundled networks are in the crate `phasefront-models`.
 //!
@@ -68,10 +67,6 @@
 
 pub use {ndarray, num_complex};
 
-#[doc(hidden)]
-pub mod device {
-    pub use phasefront_core::output::modulator::{ModulatorSpec as Device, Packing};
-}
 pub mod input;
 pub mod output {
     //! Levels to the images that a modulator takes, and back; modulators that can be bought, as data.
@@ -84,16 +79,8 @@ pub mod target {
     //! correction of the optics.
     pub use phasefront_core::display::illumination::Illumination;
     pub use phasefront_core::display::response::Response;
-    #[doc(hidden)]
-    pub use phasefront_core::display::{
-        panel::{Flatness, Panel},
-        registration::Registration,
-        response::per_pixel::PerPixel,
-    };
     pub use phasefront_core::optics::zernike::Aberration;
 }
-#[cfg_attr(surface, doc(hidden))]
-pub mod unstable;
 
 pub use phasefront_core::display::Display;
 pub use phasefront_core::display::target::Target;

@@ -12,12 +12,16 @@ use network_models::Model;
 use num_complex::Complex32;
 use phasefront::input::DepthFormat;
 use phasefront::output::{Layout, Levels, Output, Placement};
-use phasefront::target::{Aberration, Flatness, Illumination, Panel, PerPixel, Registration, Response};
+use phasefront::target::{Aberration, Illumination, Response};
 use phasefront::{
     Brightness, Display, EncoderOptions, Encoding, Method, Network, Pipeline, RgbdFrame, SessionOptions, Sweep, Target,
     VideoSession,
 };
+use phasefront_core::display::panel::Flatness;
+use phasefront_core::display::panel::Panel;
+use phasefront_core::display::registration::Registration;
 use phasefront_core::display::response::per_pixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_core::encode::Encoder;
 use phasefront_core::view::preview::Preview;
 use phasefront_core::view::refocus::{Refocus, phase_only_field};

@@ -15,9 +15,9 @@ use crate::simulated_display::SimulatedDisplay;
 use ndarray::{Array2, Array3, Axis, s, stack};
 use num_complex::Complex32;
 use phasefront::target::{Aberration, Response};
-use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::wave::zernike::Coefficients;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
+use phasefront_core::optics::zernike::Coefficients;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::dice::Dice;
 use phasefront_io::display;
 use phasefront_io::display::calibration::{self, Entry};
@@ -443,7 +443,7 @@ fn flat_grey(simulated: &SimulatedDisplay, target: &Target, colour: usize) -> Re
         brightness: Brightness::Fixed(1.0),
         ..Encoding::DoublePhase.into()
     };
-    let plan = Modulator::new(shape, target, &options)?;
+    let plan = DisplayPlan::new(shape, target, &options)?;
     let mut field = Array3::from_elem((3, h, w), Complex32::new(0.4, 0.0));
     let mut levels = Array3::zeros((3, h, w));
     plan.modulate(

@@ -12,11 +12,12 @@ use crate::curves::curve;
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::target::{Aberration, PerPixel, Response};
-use phasefront::unstable::slm::per_pixel;
-use phasefront::unstable::wave::aperture;
-use phasefront::unstable::wave::asm::{self, Padding, Transfer};
-use phasefront::unstable::wave::fft::Fft2;
+use phasefront::target::{Aberration, Response};
+use phasefront_core::display::response::per_pixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
+use phasefront_core::optics::aperture;
+use phasefront_core::optics::asm::{self, Padding, Transfer};
+use phasefront_core::optics::fft::Fft2;
 use phasefront_io::dice::Dice;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
@@ -375,7 +376,7 @@ fn normal(dice: &mut Dice) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use phasefront::unstable::wave::aperture::{Aperture, Opening};
+    use phasefront_core::optics::aperture::{Aperture, Opening};
 
     fn small() -> SimulatedDisplay {
         let display = Display::from_toml("width = 48\nheight = 40").unwrap();

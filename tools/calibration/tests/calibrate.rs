@@ -5,14 +5,14 @@
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::target::{Aberration, Response};
-use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::wave::zernike::Aberrations;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding, Target};
 use phasefront_calibration::camera::pattern::Pattern;
 use phasefront_calibration::camera::photograph::Photograph;
 use phasefront_calibration::curves::lut::{self, Curves, Problem, Refusal, What};
 use phasefront_calibration::rehearse;
 use phasefront_calibration::simulated_display::{self, SimulatedDisplay};
+use phasefront_core::optics::zernike::Aberrations;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::corrected::{self, Correction};
 use phasefront_exact::sm_lbm;
 use phasefront_io::display::DisplayFile;
@@ -290,7 +290,7 @@ fn a_cylinder_of_200_mm_is_corrected_within_1_db() {
             correction: correct.then(cylinder),
             ..bare.target.clone()
         };
-        let plan = Modulator::new(size, &target, options).unwrap();
+        let plan = DisplayPlan::new(size, &target, options).unwrap();
         let mut field = field.clone();
         let mut levels = Array3::zeros((3, h, w));
         let mut scratch = plan.scratch();

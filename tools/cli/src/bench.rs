@@ -6,9 +6,9 @@ pub mod random;
 
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
-use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::network::Precision;
 use phasefront::{Brightness, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Target};
+use phasefront_core::method::network::Precision;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_io::{Error, Result};
 use phasefront_kernels::{f32_peak, int8_peak};
 use serde::Serialize;
@@ -195,7 +195,7 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
     let (name, _) = named(case.method);
     let options = full_light(case.encoder);
     let by_table = (target.response.shape())
-        .map(|_| Modulator::new((height, width), target, &options))
+        .map(|_| DisplayPlan::new((height, width), target, &options))
         .transpose()?;
     let mut by_table = by_table.map(|plan| (plan.scratch(), plan));
     let frame = test_frame(height, width)?.for_display(&target.display);

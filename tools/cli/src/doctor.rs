@@ -3,12 +3,13 @@
 
 use ndarray::{Array2, Array3};
 use num_complex::{Complex32, Complex64};
-use phasefront::unstable::gpu::{Device, Job, probe};
-use phasefront::unstable::network::{Isa, reference};
-use phasefront::unstable::sweep::{self, SweepPlan};
-use phasefront::unstable::wave::asm::{self, Padding, Propagator};
-use phasefront::unstable::wave::reference::propagate;
 use phasefront::{Display, EncoderOptions, Method, Network, Pipeline, RgbdFrame, Sweep, Target};
+use phasefront_core::method::network::{Isa, reference};
+use phasefront_core::method::sweep;
+use phasefront_core::method::sweep::SweepPlan;
+use phasefront_core::optics::asm::{self, Padding, Propagator};
+use phasefront_core::optics::reference::propagate;
+use phasefront_gpu::{Device, Job, probe};
 use phasefront_io::hologram::{Hologram, HologramInfo};
 use phasefront_io::{Error, Result, metrics};
 use phasefront_models::{Precision, network};
@@ -146,16 +147,16 @@ pub fn self_test() -> Result<Vec<Check>> {
 }
 
 /// Compares a small default frame on the GPU that `open` gives with the CPU's.
-pub fn test_gpu(open: &phasefront::unstable::gpu::DeviceOptions) -> Check {
+pub fn test_gpu(open: &phasefront_gpu::DeviceOptions) -> Check {
     let compare = || {
         let device = Arc::new(Device::open(open)?);
-        let network = coming_along(Precision::Int8).map_err(phasefront::unstable::gpu::GpuError::Core)?;
+        let network = coming_along(Precision::Int8).map_err(phasefront_gpu::GpuError::Core)?;
         probe(&device, &Job::new(SIZE, Method::Network(network), Display::default()))?;
         Ok(device.name())
     };
     match compare() {
         Ok(name) => Check::new("gpu", true, format!("{name} gives the CPU's phases")),
-        Err(phasefront::unstable::gpu::GpuError::None(why)) => Check {
+        Err(phasefront_gpu::GpuError::None(why)) => Check {
             name: "gpu",
             passed: None,
             says: why,

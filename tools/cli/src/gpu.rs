@@ -1,7 +1,7 @@
 //! GPUs for the command: which one, and what was compiled for it, kept from run to run.
 
-use phasefront::unstable::file;
-use phasefront::unstable::gpu::{Device, DeviceOptions};
+use phasefront_core::runtime::file;
+use phasefront_gpu::{Device, DeviceOptions};
 use std::io::Write;
 use std::path::PathBuf;
 

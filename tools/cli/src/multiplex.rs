@@ -8,11 +8,11 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::unstable::encode::Encoder;
-use phasefront::unstable::refocus::{Refocus, phase_only_field};
-use phasefront::unstable::wave::aperture::Opening;
-use phasefront::unstable::wave::asm::{Padding, Propagator};
 use phasefront::{EncoderOptions, Target};
+use phasefront_core::encode::Encoder;
+use phasefront_core::optics::aperture::Opening;
+use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use phasefront_exact::truth::{self, Figures};
 use phasefront_io::Result;
 use std::f32::consts::TAU;

@@ -5,7 +5,7 @@
 mod folder;
 
 use folder::Folder;
-use phasefront::device::{Device, Packing};
+use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_io::hologram::packed::Image;
 use phasefront_io::hologram::{self, Hologram};
 use phasefront_io::picture;
@@ -33,8 +33,8 @@ fn levels(path: &Path) -> Vec<u16> {
 
 #[test]
 fn every_device_takes_a_frame_whose_levels_are_the_holograms() {
-    for name in Device::names() {
-        let device = Device::shipped(name).unwrap();
+    for name in ModulatorSpec::names() {
+        let device = ModulatorSpec::shipped(name).unwrap();
         let folder = Folder::new();
         // Cells need every pixel; elsewhere a small hologram stands in the middle.
         let (size, fit) = match device.packing {
@@ -349,7 +349,7 @@ fn a_hologram_is_for_the_display_that_it_was_made_for() {
 fn devices_are_listed_with_their_sources() {
     let folder = Folder::new();
     let text = folder.succeeds(&["devices"]);
-    for name in Device::names() {
+    for name in ModulatorSpec::names() {
         assert!(text.contains(name), "{text}");
     }
     let one = folder.succeeds(&["devices", "ti-plm-p67"]);

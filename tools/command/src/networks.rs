@@ -1,7 +1,7 @@
 //! The networks of `--network`: the bundled ones, by name, and those of files.
 
 use phasefront::Network;
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use phasefront_io::{Error, Result, output};
 use phasefront_models::NETWORKS;
 pub use phasefront_models::Precision;

@@ -2,7 +2,7 @@
 
 use crate::trace;
 use clap::Args;
-use phasefront::unstable::error::Line;
+use phasefront_core::runtime::error::Line;
 use phasefront_io::{Error, Result};
 use std::io::Write;
 use std::num::NonZeroUsize;

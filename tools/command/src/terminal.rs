@@ -1,7 +1,7 @@
 //! What commands print: results, names of files and progress.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use phasefront::unstable::error::Line;
+use phasefront_core::runtime::error::Line;
 use std::io::Write;
 use std::path::Path;
 

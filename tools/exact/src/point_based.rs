@@ -35,7 +35,7 @@ use crate::sm_lbm;
 use ndarray::{Array2, Array3, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::unstable::wave::asm;
+use phasefront_core::optics::asm;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;

@@ -16,8 +16,8 @@
 use ndarray::{Array3, ArrayView1, ArrayViewMut2, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::unstable::wave::asm::{self, Padding, Transfer};
-use phasefront::unstable::wave::fft::{Fft2, Scratch};
+use phasefront_core::optics::asm::{self, Padding, Transfer};
+use phasefront_core::optics::fft::{Fft2, Scratch};
 use phasefront_io::Result;
 use phasefront_io::ldi::Ldi;
 use std::ops::Range;

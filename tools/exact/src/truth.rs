@@ -2,9 +2,9 @@
 //! sweep finds behind an RGB-D frame, and figures of views against the views of the exact wave.
 
 use ndarray::{Array2, Array3};
-use phasefront::unstable::sweep::hidden::{Hidden, NOTHING};
-use phasefront::unstable::sweep::hidden_reach;
 use phasefront::{Display, RgbdFrame};
+use phasefront_core::method::sweep::hidden::{Hidden, NOTHING};
+use phasefront_core::method::sweep::hidden_reach;
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Result, metrics};
 use rayon::prelude::*;

@@ -4,10 +4,10 @@ use crate::display::calibration::AberrationFile;
 use crate::output::has_extension;
 use crate::{Error, Result, input};
 use ndarray_npy::WriteNpyExt;
-use phasefront::device::Device;
+use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
-use phasefront::unstable::keys;
 use phasefront::{Display, Target};
+use phasefront_core::runtime::keys;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ pub struct DisplayFile {
     /// What it says but for aberrations.
     pub target: Target,
     /// The modulator, and how its input takes a hologram.
-    pub device: Device,
+    pub device: ModulatorSpec,
     /// The modulator's table, where it is calibrated as a whole.
     pub lut: Option<[u8; 256]>,
     /// What corrects the display's aberrations.
@@ -88,7 +88,7 @@ pub fn find_display(name: &str) -> Result<DisplayFile> {
     if let Some(path) = display_path(name) {
         return read_display(&path);
     }
-    let device = Device::shipped(name)
+    let device = ModulatorSpec::shipped(name)
         .map_err(|e| Error::Input(format!("--display {name}: no such file, and {}", one_line_of(&e))))?;
     Ok(DisplayFile {
         target: device.target()?,
@@ -151,7 +151,7 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 }
 
 /// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
-/// 256 levels, and those of [`crate::display::calibration`]. Others are those of [`Device`] and [`crate::display::panel`].
+/// 256 levels, and those of [`crate::display::calibration`]. Others are those of [`ModulatorSpec`] and [`crate::display::panel`].
 ///
 /// # Errors
 /// A file that is missing or says what cannot be.
@@ -168,7 +168,7 @@ pub fn read_display(path: &Path) -> Result<DisplayFile> {
     let (lut_path, per_pixel_path) = (named("lut")?, named("per_pixel")?);
     let (laser_path, aberration_path) = (named("laser")?, named("aberration")?);
     let panel = panel::take(path, &mut table)?;
-    let device = Device::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
+    let device = ModulatorSpec::from_table(table).map_err(|e| Error::file(path, one_line_of(&e)))?;
     let display = &device.display;
     let lut = match lut_path {
         None => None,

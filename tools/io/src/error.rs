@@ -1,7 +1,7 @@
 //! The one error type of the laboratory. Each message is one line that names what is wrong and what would be right.
 
-use phasefront::unstable::error::Line;
-use phasefront::unstable::gpu::GpuError;
+use phasefront_core::runtime::error::Line;
+use phasefront_gpu::GpuError;
 use std::path::PathBuf;
 
 /// Why the laboratory refused to go on.

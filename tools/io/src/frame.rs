@@ -10,8 +10,9 @@ use crate::{Error, Result};
 use image::metadata::Orientation;
 use ndarray::{Array2, Array3, ArrayView2};
 use phasefront::RgbdFrame;
-use phasefront::unstable::depth::refine::Refiner;
-use phasefront::unstable::depth::{self, DepthUnit};
+use phasefront_core::depth;
+use phasefront_core::depth::DepthUnit;
+use phasefront_core::depth::refine::Refiner;
 use std::path::Path;
 
 /// How far the aspect ratios of colour and depth may lie apart, relative.

@@ -10,9 +10,9 @@ use ndarray::{Array3, ArrayView3, Ix3};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::device::Device;
+use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -109,9 +109,9 @@ impl HologramInfo {
             )));
         }
         let lut = self.lut.as_deref().map(lut_of).transpose()?;
-        let device = Device {
+        let device = ModulatorSpec {
             levels_turns: self.levels_turns.clone(),
-            ..Device::from(self.display.clone())
+            ..ModulatorSpec::from(self.display.clone())
         };
         let mut target = device.target()?;
         if let Some(lut) = lut {

@@ -6,7 +6,7 @@ pub mod npy;
 pub mod quiet;
 
 use crate::{Error, Result, output};
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;

@@ -7,9 +7,9 @@ use crate::{Error, Result};
 use image::codecs::png::PngEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageEncoder};
 use ndarray::{Array2, Array3};
-use phasefront::unstable::frame::luminance;
-use phasefront::unstable::network::Source;
 use phasefront::{Display, RgbdFrame};
+use phasefront_core::frame::luminance;
+use phasefront_core::method::network::Source;
 use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
@@ -54,7 +54,7 @@ impl PartialEq for LdiLayer {
     }
 }
 
-/// The planes of [`phasefront::unstable::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn,
+/// The planes of [`phasefront_core::method::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn,
 /// each minus ½; black and farthest where there is no hit, or no such layer.
 impl Source for Ldi {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {

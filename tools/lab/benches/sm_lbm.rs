@@ -8,7 +8,7 @@
 use ndarray::{Array2, Array3};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::unstable::wave::asm::{self, Padding};
+use phasefront_core::optics::asm::{self, Padding};
 use phasefront_exact::sm_lbm;
 use phasefront_io::Result;
 use phasefront_io::dice::Dice;

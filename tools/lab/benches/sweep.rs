@@ -7,9 +7,9 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
-use phasefront::unstable::depth::DepthUnit;
-use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_core::depth::DepthUnit;
+use phasefront_core::method::sweep::SweepPlan;
 use phasefront_io::Result;
 use phasefront_io::frame::{self, DepthOptions};
 use std::path::Path;

@@ -17,7 +17,7 @@ use ndarray::{Array2, Array3, Array4};
 use ndarray_npy::NpzWriter;
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::sm_lbm;
 use phasefront_io::display::calibration::{self, AberrationFile, Entry};

@@ -13,13 +13,13 @@ use crate::evaluate::ceiling::Ceiling;
 use crate::study::refined_depth::{self, DEGRADATIONS};
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
-use phasefront::unstable::modulator::{Modulator, remove_mean_phase};
-use phasefront::unstable::network::InputKind;
-use phasefront::unstable::refocus::{Refocus, phase_only_field};
-use phasefront::unstable::seeded::SeededPlan;
-use phasefront::unstable::sweep::SweepPlan;
-use phasefront::unstable::wave::aperture::{Aperture, Opening};
 use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
+use phasefront_core::method::network::InputKind;
+use phasefront_core::method::seeded::SeededPlan;
+use phasefront_core::method::sweep::SweepPlan;
+use phasefront_core::optics::aperture::{Aperture, Opening};
+use phasefront_core::pipeline::display_plan::{DisplayPlan, remove_mean_phase};
+use phasefront_core::view::refocus::{Refocus, phase_only_field};
 use phasefront_exact::point_based::{self, Occlusion};
 use phasefront_exact::sm_lbm;
 use phasefront_exact::truth::{Figures, filled, judge, visible_frame};
@@ -351,7 +351,7 @@ impl Viewer {
         let refocus = match &shown.levels {
             None => &self.complex,
             Some((target, options)) => {
-                let modulator = Modulator::new((size, size), target, options)?;
+                let modulator = DisplayPlan::new((size, size), target, options)?;
                 let mut scratch = modulator.scratch();
                 if !modulator.keeps_phase() {
                     remove_mean_phase(&mut values, field.dim().0);

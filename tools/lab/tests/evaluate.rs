@@ -4,12 +4,12 @@
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::target::Aberration;
-use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::wave::aperture::Opening;
-use phasefront::unstable::wave::asm::{Padding, Propagator};
-use phasefront::unstable::wave::zernike::Aberrations;
 use phasefront::{Brightness, Display, EncoderOptions, Encoding};
 use phasefront_command::networks::{self, Precision};
+use phasefront_core::optics::aperture::Opening;
+use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::optics::zernike::Aberrations;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::sm_lbm;
 use phasefront_io::display::calibration::AberrationFile;
 use phasefront_io::hologram::{Hologram, HologramInfo};
@@ -314,7 +314,7 @@ fn encoded_fields_are_judged_as_their_files_look() {
         assert_eq!(row.shown, shown.name);
         let pair = dataset::read_pair(&data.manifest, data.path(), 78).unwrap();
         let (target, options) = shown.levels.as_ref().unwrap();
-        let modulator = Modulator::new((SIZE, SIZE), target, options).unwrap();
+        let modulator = DisplayPlan::new((SIZE, SIZE), target, options).unwrap();
         let mut field = pair.hologram.clone();
         let mut levels = Array3::zeros((3, SIZE, SIZE));
         let modulation = modulator.modulate(

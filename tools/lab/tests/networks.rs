@@ -3,9 +3,10 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::unstable::method::MethodPlan;
-use phasefront::unstable::network::{self, InputKind};
 use phasefront::{Display, Method, Network, RgbdFrame};
+use phasefront_core::method::MethodPlan;
+use phasefront_core::method::network;
+use phasefront_core::method::network::InputKind;
 use phasefront_exact::sm_lbm;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::metrics;

@@ -4,8 +4,8 @@
 use ndarray::{Array2, Array3, Array4, Axis, concatenate, s};
 use ndarray_npy::{read_npy, write_npy};
 use num_complex::Complex32;
-use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_core::method::sweep::SweepPlan;
 use phasefront_exact::truth;
 use phasefront_lab::dataset::{self, Manifest};
 use phasefront_lab::seeds;

@@ -7,7 +7,7 @@ mod reference;
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};
 use phasefront::Display;
-use phasefront::unstable::wave::asm::{self, Padding, Propagator};
+use phasefront_core::optics::asm::{self, Padding, Propagator};
 use phasefront_exact::sm_lbm;
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_lab::scene;

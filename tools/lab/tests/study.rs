@@ -3,8 +3,8 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::unstable::sweep::SweepPlan;
 use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_core::method::sweep::SweepPlan;
 use phasefront_exact::{sm_lbm, truth};
 use phasefront_io::ldi::Ldi;
 use phasefront_io::metrics;

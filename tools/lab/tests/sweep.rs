@@ -8,13 +8,14 @@ mod skip;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane};
-use phasefront::unstable::depth::DepthUnit;
-use phasefront::unstable::depth::refine::Refiner;
-use phasefront::unstable::frame::{ColourPlan, Crop};
-use phasefront::unstable::refocus::Refocus;
-use phasefront::unstable::sweep::{self, SweepPlan};
-use phasefront::unstable::wave::asm::{Padding, Propagator};
 use phasefront::{Display, RgbdFrame, Sweep};
+use phasefront_core::depth::DepthUnit;
+use phasefront_core::depth::refine::Refiner;
+use phasefront_core::frame::{ColourPlan, Crop};
+use phasefront_core::method::sweep;
+use phasefront_core::method::sweep::SweepPlan;
+use phasefront_core::optics::asm::{Padding, Propagator};
+use phasefront_core::view::refocus::Refocus;
 use phasefront_exact::sm_lbm;
 use phasefront_exact::truth::filled;
 use phasefront_io::ldi::Ldi;
@@ -117,7 +118,7 @@ fn captured(folder: &Path) -> RgbdFrame {
     let millimetres = depth_map::read_depth(&folder.join("depth_0.png"), false).unwrap();
     let shape = millimetres.dim();
     let holes = millimetres.mapv(|mm| f32::from(mm > 0.0));
-    let depth = phasefront::unstable::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
+    let depth = phasefront_core::depth::normalize(millimetres.view(), DepthUnit::Millimetres, None, None)
         .unwrap()
         .depth;
     let refiner = Refiner::new(shape, Crop::cover(shape, OUT), OUT).unwrap();

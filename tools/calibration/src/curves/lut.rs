@@ -13,7 +13,7 @@ use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::curves::curve::{self, Basis, COEFFICIENTS, LEVELS};
 use crate::curves::surface;
 use ndarray::Array2;
-use phasefront::target::PerPixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_io::{Error, Result};
 use rayon::prelude::*;
 use std::f32::consts::TAU;

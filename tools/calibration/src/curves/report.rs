@@ -5,7 +5,7 @@ use crate::curves::chart::{self, Curve, Map, Panel};
 use crate::curves::curve::{self, Basis, LEVELS};
 use crate::curves::lut::{self, Curves, Errors};
 use ndarray::Array2;
-use phasefront::target::PerPixel;
+use phasefront_core::display::response::per_pixel::PerPixel;
 use phasefront_io::Result;
 use serde::Serialize;
 use std::f32::consts::TAU;

@@ -5,7 +5,7 @@
 //! with the slope around them.
 
 use ndarray::{Array2, Array3, ArrayView2};
-use phasefront::unstable::slm::per_pixel;
+use phasefront_core::display::response::per_pixel;
 use rayon::prelude::*;
 
 /// The weight of the bending energy against a node's share of pixels: waves shorter than 2π nodes are taken for noise.

@@ -7,10 +7,8 @@
 
 use ndarray::Array2;
 use num_complex::Complex32;
-use phasefront::unstable::wave::{
-    fft::{Fft2, Scratch},
-    zernike::{self, Coefficients},
-};
+use phasefront_core::optics::fft::{Fft2, Scratch};
+use phasefront_core::optics::zernike::{self, Coefficients};
 use rayon::prelude::*;
 
 /// Samples across the pupil.
@@ -210,7 +208,7 @@ mod tests {
                     false => num_complex::Complex64::ZERO,
                 }
             });
-            let light = phasefront::unstable::wave::reference::dft(&plane, -1.0);
+            let light = phasefront_core::optics::reference::dft(&plane, -1.0);
             light.iter().map(|v| v.norm_sqr().powi(2)).sum::<f64>()
         };
         let most = direct(&[0.0; TERMS]);

@@ -3,10 +3,10 @@
 
 use super::{full_light, median, named};
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
-use phasefront::unstable::gpu::{
+use phasefront::{EncoderOptions, Method, StageTimes, Target};
+use phasefront_gpu::{
     ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
 };
-use phasefront::{EncoderOptions, Method, StageTimes, Target};
 use phasefront_io::Result;
 use serde::Serialize;
 use std::collections::{BTreeMap, VecDeque};

@@ -88,7 +88,7 @@ fn planes(name: &str, planes: usize) -> Vec<u8> {
     Message::default().text(1, name).bytes(2, &kind.0).0
 }
 
-/// The chain of [`phasefront::unstable::network::chain`].
+/// The chain of [`phasefront_core::method::network::chain`].
 fn onnx(layers: usize) -> Vec<u8> {
     let mut random = ChaCha8Rng::seed_from_u64(layers as u64);
     let mut graph = Message::default().text(2, "chain");

@@ -3,8 +3,6 @@
 use crate::flags::backend::BackendFlags;
 use crate::flags::encoder::{Encoder, EncoderFlags};
 use clap::{Args, ValueEnum};
-use phasefront::unstable::gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
-use phasefront::unstable::network;
 use phasefront::{Method, Network, Sweep, Target};
 use phasefront_cli::bench::gpu::{GpuCase, GpuRow};
 use phasefront_cli::bench::{self, Case, Machine, Row};
@@ -12,6 +10,8 @@ use phasefront_cli::gpu;
 use phasefront_command::flags::{DisplayFlags, PrecisionName, check_used, parse_size};
 use phasefront_command::networks::{self, Precision};
 use phasefront_command::terminal::{self, progress_bar};
+use phasefront_core::method::network;
+use phasefront_gpu::{ChainOptions, Device, DeviceOptions, Float, Fusion};
 use phasefront_io::picture::plot::{self, Bar};
 use phasefront_io::{Error, Result, output};
 use serde_json::json;

@@ -3,7 +3,6 @@
 use clap::{Args, Subcommand, ValueEnum};
 use ndarray::{Axis, stack};
 use phasefront::Display;
-use phasefront::unstable::file;
 use phasefront_calibration::COLOURS;
 use phasefront_calibration::camera::marks;
 use phasefront_calibration::camera::pattern::{DARK, PATTERNS, Pattern};
@@ -15,6 +14,7 @@ use phasefront_calibration::optics::spot::{self, Search, TRIALS};
 use phasefront_calibration::rehearse::{self, Rehearsal};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, parse_size};
 use phasefront_command::terminal::{self, progress_bar};
+use phasefront_core::runtime::file;
 use phasefront_io::display::calibration::{self, AberrationFile, Entry};
 use phasefront_io::output::{self, Holding};
 use phasefront_io::{Error, Result};

@@ -1,8 +1,8 @@
 //! `phasefront devices`: the modulators that are known by name.
 
 use clap::Args;
-use phasefront::device::{Device, Packing};
 use phasefront::output::Layout;
+use phasefront::output::{ModulatorSpec, Packing};
 use phasefront_command::terminal;
 use phasefront_io::{Result, display};
 use serde_json::json;
@@ -26,7 +26,7 @@ impl Devices {
         let own: Vec<String> = (display::own_devices().iter())
             .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
             .collect();
-        let shipped = Device::names().map(str::to_owned);
+        let shipped = ModulatorSpec::names().map(str::to_owned);
         let names: Vec<String> = own
             .iter()
             .cloned()
@@ -41,7 +41,7 @@ impl Devices {
     }
 }
 
-fn packing(device: &Device) -> &'static str {
+fn packing(device: &ModulatorSpec) -> &'static str {
     match &device.packing {
         Packing::Images(Layout::Rgb) => "three colours in one image",
         Packing::Images(Layout::Grey) => "an image a colour, grey",
@@ -52,7 +52,7 @@ fn packing(device: &Device) -> &'static str {
     }
 }
 
-fn row(name: &str, device: &Device) -> String {
+fn row(name: &str, device: &ModulatorSpec) -> String {
     let display = &device.display;
     let size = format!("{}x{}", display.width(), display.height());
     let unconfirmed = match device.unconfirmed.len() {
@@ -67,7 +67,7 @@ fn row(name: &str, device: &Device) -> String {
     )
 }
 
-fn describe(device: &Device) -> String {
+fn describe(device: &ModulatorSpec) -> String {
     let mut text = row(&device.name, device);
     for (title, figures) in [("from", &device.sources), ("unconfirmed", &device.unconfirmed)] {
         for (key, source) in figures {
@@ -77,7 +77,7 @@ fn describe(device: &Device) -> String {
     text
 }
 
-fn object(name: &str, device: &Device) -> serde_json::Value {
+fn object(name: &str, device: &ModulatorSpec) -> serde_json::Value {
     let display = &device.display;
     json!({
         "name": Path::new(name).file_stem().and_then(|stem| stem.to_str()), "title": device.name,

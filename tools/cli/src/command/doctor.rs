@@ -71,8 +71,7 @@ impl Chosen {
         };
         let kernels = match network {
             Some(network) => {
-                let plan =
-                    phasefront::unstable::method::MethodPlan::new(height, width, Method::Network(network), display)?;
+                let plan = phasefront_core::method::MethodPlan::new(height, width, Method::Network(network), display)?;
                 plan.engine().map(|engine| format!("{}: {}", engine.name, engine.why))
             }
             None => None,

@@ -7,7 +7,7 @@ use clap::Args;
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Pipeline;
-use phasefront::device::Packing;
+use phasefront::output::Packing;
 use phasefront_cli::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, sweep_for};
 use phasefront_command::terminal;

@@ -1,7 +1,7 @@
 //! `phasefront pack` and `phasefront unpack`: holograms to what a modulator's input takes, and back.
 
 use clap::Args;
-use phasefront::device::Packing;
+use phasefront::output::Packing;
 use phasefront_command::flags::{DisplayFlags, parse_size};
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;

@@ -1,7 +1,7 @@
 //! What a depth network may make tract allocate and compute, checked before it does: a file of a few bytes may name a
 //! tensor of any size.
 
-use phasefront::unstable::network::bounds;
+use phasefront_core::method::network::bounds;
 use std::path::Path;
 use tract_onnx::pb::ModelProto;
 use tract_onnx::prelude::*;

@@ -2,8 +2,8 @@
 
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
-use phasefront::unstable::gpu::DeviceOptions;
 use phasefront_cli::gpu;
+use phasefront_gpu::DeviceOptions;
 use phasefront_io::{Error, Result};
 
 /// Where frames are made.

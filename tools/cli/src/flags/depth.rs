@@ -2,8 +2,8 @@
 
 use crate::record::RunRecord;
 use clap::{Args, ValueEnum};
-use phasefront::unstable::depth::DepthUnit;
 use phasefront_command::flags::check_used;
+use phasefront_core::depth::DepthUnit;
 use phasefront_io::frame::DepthOptions;
 use phasefront_io::{Error, Result};
 

@@ -5,12 +5,12 @@ use super::{HologramRequest, HologramResult, Method};
 use crate::flags::encoder::Encoder;
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::unstable::modulator::Modulator;
-use phasefront::unstable::network::InputKind;
 use phasefront::{Display, Network};
 use phasefront_command::flags::PrecisionName;
 use phasefront_command::networks;
 use phasefront_command::terminal::progress_bar;
+use phasefront_core::method::network::InputKind;
+use phasefront_core::pipeline::display_plan::DisplayPlan;
 use phasefront_exact::corrected::{self, Correction, spatial};
 use phasefront_exact::{point_based, sm_lbm};
 use phasefront_io::display::DisplayFile;
@@ -48,7 +48,7 @@ impl HologramRequest {
         };
         let display = &target.display;
         let options = self.encoder_options(&encoder.options);
-        let modulator = Modulator::new((height, width), &target, &options)?;
+        let modulator = DisplayPlan::new((height, width), &target, &options)?;
         let mut scratch = modulator.scratch();
         let start = Instant::now();
         let Wave {

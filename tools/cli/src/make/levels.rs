@@ -2,8 +2,8 @@
 
 use ndarray::Array3;
 use num_complex::Complex32;
-use phasefront::unstable::modulator::Modulation;
-use phasefront::unstable::network::Engine;
+use phasefront_core::method::network::Engine;
+use phasefront_core::pipeline::display_plan::Modulation;
 
 /// Where levels are put.
 pub(super) enum Out<'a> {

@@ -17,8 +17,8 @@ use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::target::Aberration;
-use phasefront::unstable::wave::asm::Transfer;
-use phasefront::unstable::wave::fft::{ConvolveScratch, Fft2, Scratch, fast_size};
+use phasefront_core::optics::asm::Transfer;
+use phasefront_core::optics::fft::{ConvolveScratch, Fft2, Scratch, fast_size};
 use phasefront_io::display::spatial::SpatialAberrations;
 use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
@@ -184,7 +184,7 @@ pub fn convolve_reference(field: &Array2<Complex32>, place: Place<'_>) -> Array2
             let v = place.kernel(&aberration, side, kx, ky);
             Complex64::new(v.re.into(), v.im.into())
         });
-        phasefront::unstable::wave::reference::dft(&kernel, 1.0) / (side * side) as f64
+        phasefront_core::optics::reference::dft(&kernel, 1.0) / (side * side) as f64
     };
     let mut out = Array2::from_elem((height, width), Complex64::ZERO);
     for i in 0..(height - 1) / NODE + 2 {
@@ -314,6 +314,7 @@ fn spread(fft: &Fft2, scratch: &mut Scratch, back: &Transfer, here: Place<'_>) {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use phasefront_core::optics::zernike::Aberrations;
 
     fn grid() -> SpatialAberrations {
         let points = (0..15)

@@ -1,7 +1,7 @@
 //! The files of a calibration, to which a display file refers: the per-pixel table, the laser map, the
 //! aberrations.
 //!
-//! * The table is [`phasefront::unstable::slm::per_pixel`]'s bytes.
+//! * The table is [`phasefront_core::display::response::per_pixel`]'s bytes.
 //! * The laser map is a PNG of 8 or 16 bits, RGB, or grey for one laser: the lasers' amplitude at nodes spread evenly
 //!   from the first to the last pixel of each axis, each colour of any scale.
 //! * Aberrations are TOML, one `[[at]]` a calibrated distance, z ascending, with the coefficients a₃ to a₇ of the
@@ -25,9 +25,10 @@ use crate::{Error, Result};
 use image::DynamicImage;
 use ndarray::{Array3, ArrayView3};
 use phasefront::Display;
-use phasefront::target::{Aberration, Illumination, PerPixel};
-use phasefront::unstable::keys;
-use phasefront::unstable::wave::zernike::{Aberrations, Coefficients};
+use phasefront::target::{Aberration, Illumination};
+use phasefront_core::display::response::per_pixel::PerPixel;
+use phasefront_core::optics::zernike::{Aberrations, Coefficients};
+use phasefront_core::runtime::keys;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::Path;

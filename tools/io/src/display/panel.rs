@@ -18,8 +18,9 @@ use crate::picture::open_image;
 use crate::{Error, Result};
 use image::DynamicImage;
 use phasefront::Target;
-use phasefront::target::{Flatness, Registration};
-use phasefront::unstable::keys;
+use phasefront_core::display::panel::Flatness;
+use phasefront_core::display::registration::Registration;
+use phasefront_core::runtime::keys;
 use serde::Deserialize;
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 use crate::film::video;
 use crate::{Error, Result, input, output};
 use image::{ImageDecoder, ImageReader};
-use phasefront::unstable::depth::DepthUnit;
+use phasefront_core::depth::DepthUnit;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

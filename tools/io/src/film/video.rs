@@ -6,7 +6,7 @@ use crate::picture::depth_map;
 use crate::{Error, Result, frame};
 use ndarray::Array2;
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
-use phasefront::unstable::depth::DepthUnit;
+use phasefront_core::depth::DepthUnit;
 use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,7 @@ use image::imageops::{self, FilterType};
 use image::{Rgb, Rgb32FImage};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, s};
 use phasefront::RgbdFrame;
-use phasefront::unstable::frame::Crop;
+use phasefront_core::frame::Crop;
 
 /// How a picture lies on a modulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use crate::picture::{PngShape, open_image, pending_png};
 use crate::{Error, Result};
 use image::DynamicImage;
 use ndarray::Array3;
-use phasefront::device::Packing;
+use phasefront::output::Packing;
 use phasefront::output::{BitPlanes, Layout, Levels, Output, Placement};
 use std::path::{Path, PathBuf};
 

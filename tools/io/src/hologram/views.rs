@@ -9,9 +9,9 @@ use num_complex::Complex32;
 use phasefront::Display;
 use phasefront::output::Levels;
 use phasefront::target::Aberration;
-use phasefront::unstable::refocus::{Refocus, shown_field};
-use phasefront::unstable::wave::aperture::Opening;
-use phasefront::unstable::wave::asm::Propagator;
+use phasefront_core::optics::aperture::Opening;
+use phasefront_core::optics::asm::Propagator;
+use phasefront_core::view::refocus::{Refocus, shown_field};
 
 /// Optics with an aberration that is one for all depths, for holograms of one shape.
 pub struct AberratedOptics(Vec<Propagator>);

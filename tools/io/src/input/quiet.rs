@@ -20,7 +20,7 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
         }));
     });
     let before = IS_QUIET.replace(true);
-    let done = phasefront::unstable::error::caught(work);
+    let done = phasefront_core::runtime::caught::caught(work);
     IS_QUIET.set(before);
     done
 }

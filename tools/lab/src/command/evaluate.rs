@@ -2,12 +2,12 @@
 
 use clap::{Args, ValueEnum};
 use phasefront::target::Response;
-use phasefront::unstable::sweep::MAX_HIDDEN_LAYERS;
-use phasefront::unstable::wave::aperture::Opening;
 use phasefront::{Display, EncoderOptions, Sweep, Target};
 use phasefront_command::flags::{EncoderName, OverwriteFlag, PrecisionName, check_used, sweep_for};
 use phasefront_command::networks;
 use phasefront_command::terminal::{self, progress_bar};
+use phasefront_core::method::sweep::MAX_HIDDEN_LAYERS;
+use phasefront_core::optics::aperture::Opening;
 use phasefront_io::{Error, Result, output};
 use phasefront_lab::dataset::Manifest;
 use phasefront_lab::evaluate::{self, Depth, Method, Row, Sample, Shown};

@@ -8,7 +8,7 @@
 
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::unstable::wave::asm::{Padding, Propagator};
+use phasefront_core::optics::asm::{Padding, Propagator};
 use phasefront_io::Result;
 use phasefront_io::dice::Dice;
 use rayon::prelude::*;

@@ -3,7 +3,7 @@
 
 use super::model::MAX_MODEL_BYTES;
 use image::DynamicImage;
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 use phasefront_io::input::decode::{self, Reading};
 use phasefront_io::output;
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
 use super::beside::Beside;
 use super::model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
 use super::{Texture, texture};
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 
 type Result<T> = std::result::Result<T, String>;
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use tobj::{LoadOptions, Material};
 
-use phasefront::unstable::file;
+use phasefront_core::runtime::file;
 
 use super::Texture;
 use super::beside::Beside;

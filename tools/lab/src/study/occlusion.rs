@@ -15,8 +15,8 @@
 use ndarray::{Array2, Array3, Axis, Zip, s};
 use num_complex::Complex32;
 use phasefront::Display;
-use phasefront::unstable::refocus::Refocus;
-use phasefront::unstable::wave::asm;
+use phasefront_core::optics::asm;
+use phasefront_core::view::refocus::Refocus;
 use phasefront_exact::point_based::{self, Occlusion};
 use phasefront_exact::sm_lbm::{self, plane_of_depth, plane_z_m};
 use phasefront_io::ldi::{Ldi, LdiLayer};

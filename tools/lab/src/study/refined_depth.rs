@@ -4,11 +4,11 @@
 use crate::scene;
 use ndarray::{Array2, Array3, ArrayView2};
 use num_complex::Complex32;
-use phasefront::unstable::depth::fill_nearest;
-use phasefront::unstable::depth::refine::Refiner;
-use phasefront::unstable::frame::Crop;
-use phasefront::unstable::method::MethodPlan;
 use phasefront::{Display, Method, RgbdFrame};
+use phasefront_core::depth::fill_nearest;
+use phasefront_core::depth::refine::Refiner;
+use phasefront_core::frame::Crop;
+use phasefront_core::method::MethodPlan;
 use phasefront_exact::sm_lbm;
 use phasefront_io::dice::Dice;
 use phasefront_io::ldi::Ldi;

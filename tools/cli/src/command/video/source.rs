@@ -3,10 +3,10 @@
 use super::Video;
 use crate::flags::frame::SeenDepthFlags;
 use indicatif::ProgressBar;
-use phasefront::unstable::depth::DepthUnit;
 use phasefront_cli::depth_network::DepthNetwork;
 use phasefront_command::flags::check_used;
 use phasefront_command::terminal::{progress_bar, progress_count};
+use phasefront_core::depth::DepthUnit;
 use phasefront_io::film::sequence::{self, Sequence};
 use phasefront_io::film::video::{self, RawVideo, VideoFrame};
 use phasefront_io::film::{self, Film, Pixels};
