@@ -5,7 +5,7 @@
 //! What level shows a phase is [`crate::display::response`]'s knowledge; an amplitude's scale is what full light stands for.
 
 pub mod brightness;
-mod dark;
+mod dark_threshold;
 pub mod double_phase;
 mod encoder;
 mod encoding;

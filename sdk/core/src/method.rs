@@ -70,10 +70,10 @@ pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) 
 pub struct MethodPlan {
     shape: (usize, usize),
     colours: usize,
-    way: Way,
+    plan: Plan,
 }
 
-enum Way {
+enum Plan {
     Network(Box<NetworkPlan>),
     Sweep(Box<SweepPlan>),
     Seeded(Box<SeededPlan>),
@@ -117,24 +117,24 @@ impl MethodPlan {
     /// A network for layered input or for another display, or a method that cannot be planned for this shape.
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
-        let way = match method {
-            Method::Network(network) => Way::Network(Box::new(network.plan_for(height, width, display)?)),
+        let plan = match method {
+            Method::Network(network) => Plan::Network(Box::new(network.plan_for(height, width, display)?)),
             Method::Seeded(network) => {
                 let plan = SeededPlan::new(height, width, &network, display)?;
-                Way::Seeded(Box::new(plan))
+                Plan::Seeded(Box::new(plan))
             }
-            Method::Sweep(sweep) => Way::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
+            Method::Sweep(sweep) => Plan::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
             Method::Auto(sweep, network) => {
                 // Both end where the network does.
                 let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
                 let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
-                Way::Auto(Box::new(sweep), Box::new(trained))
+                Plan::Auto(Box::new(sweep), Box::new(trained))
             }
         };
         Ok(MethodPlan {
             shape: (height, width),
             colours: display.colours(),
-            way,
+            plan,
         })
     }
 
@@ -146,29 +146,29 @@ impl MethodPlan {
     /// Where the hologram stands, metres from the midpoint toward the viewer: a sweep goes on to a display that is not
     /// far away, all else ends at the midpoint.
     pub fn z_m(&self) -> f64 {
-        match &self.way {
-            Way::Network(_) | Way::Seeded(_) | Way::Auto(..) => 0.0,
-            Way::Sweep(plan) => plan.z_m(),
+        match &self.plan {
+            Plan::Network(_) | Plan::Seeded(_) | Plan::Auto(..) => 0.0,
+            Plan::Sweep(plan) => plan.z_m(),
         }
     }
 
     /// What runs the network, and why; None for a method without one.
     pub fn engine(&self) -> Option<&Engine> {
-        match &self.way {
-            Way::Network(plan) => Some(plan.engine()),
-            Way::Seeded(plan) => Some(plan.engine()),
-            Way::Auto(_, trained) => trained.engine(),
-            Way::Sweep(_) => None,
+        match &self.plan {
+            Plan::Network(plan) => Some(plan.engine()),
+            Plan::Seeded(plan) => Some(plan.engine()),
+            Plan::Auto(_, trained) => trained.engine(),
+            Plan::Sweep(_) => None,
         }
     }
 
     /// Working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
-        MethodScratch(match &self.way {
-            Way::Network(plan) => Scratch::Network(plan.scratch()),
-            Way::Sweep(plan) => Scratch::Sweep(plan.scratch()),
-            Way::Seeded(plan) => Scratch::Seeded(plan.scratch()),
-            Way::Auto(sweep, trained) => Scratch::Auto {
+        MethodScratch(match &self.plan {
+            Plan::Network(plan) => Scratch::Network(plan.scratch()),
+            Plan::Sweep(plan) => Scratch::Sweep(plan.scratch()),
+            Plan::Seeded(plan) => Scratch::Seeded(plan.scratch()),
+            Plan::Auto(sweep, trained) => Scratch::Auto {
                 sweep: sweep.scratch(),
                 trained: Box::new(trained.scratch()),
                 was_sharp: None,
@@ -197,12 +197,12 @@ impl MethodPlan {
         scratch: &mut MethodScratch,
     ) -> Result<()> {
         frame.check(self.shape, self.colours)?;
-        match (&self.way, &mut scratch.0) {
-            (Way::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
-            (Way::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
-            (Way::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
+        match (&self.plan, &mut scratch.0) {
+            (Plan::Network(plan), Scratch::Network(scratch)) => plan.field(frame, field, scratch),
+            (Plan::Sweep(plan), Scratch::Sweep(scratch)) => plan.field(frame, field, scratch),
+            (Plan::Seeded(plan), Scratch::Seeded(scratch)) => plan.field(frame, field, scratch),
             (
-                Way::Auto(sweep, trained),
+                Plan::Auto(sweep, trained),
                 Scratch::Auto {
                     sweep: of_sweep,
                     trained: of_trained,

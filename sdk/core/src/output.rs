@@ -155,7 +155,7 @@ pub struct Output {
     from: (i64, i64),
     /// Bits of a level in bytes, and of one in words.
     bits: (u32, u32),
-    dark: Dark,
+    around: Dark,
 }
 
 /// What is shown around the hologram: double phase of amplitude 0.
@@ -200,7 +200,7 @@ impl Output {
                 Response::Lut { .. } if target.panel.levels_turns.is_some() => (bits, bits),
                 Response::Lut { .. } | Response::PerPixel(_) => (8, bits),
             },
-            dark: match target.response.clone() {
+            around: match target.response.clone() {
                 Response::PerPixel(table) => Dark::PerPixel(table),
                 same => Dark::Everywhere(DARK.map(|phase| same.level(phase, 0))),
             },
@@ -231,7 +231,7 @@ impl Output {
             Levels::Bytes(levels) => {
                 assert_eq!(levels.len(), size);
                 let level = |at: usize| u16::from(levels[at]);
-                let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.dark {
+                let dark = |odd: usize, colour: usize, (y, x): (usize, usize)| match &self.around {
                     Dark::Everywhere(levels) => levels[odd].into(),
                     Dark::PerPixel(table) => {
                         let (height, width) = self.modulator;

@@ -251,7 +251,7 @@ fn a_seeded_network_corrects_the_sweep() {
 }
 
 #[test]
-fn by_sharpness_each_frame_gets_what_suits_its_depth() {
+fn auto_gives_each_frame_what_suits_its_depth() {
     let (height, width) = (40, 60);
     // A modulator that a sweep alone would go on to.
     let display = Display::default().with_offset_m(2e-3).unwrap();

@@ -17,10 +17,10 @@ pub(super) struct MethodPlan {
     size: (usize, usize),
     /// From the frame to what the network or the sweep reads.
     packer: Packer,
-    way: Way,
+    plan: Plan,
 }
 
-enum Way {
+enum Plan {
     Network(Trained),
     Sweep(Sweeper),
     /// The sweep, from it and the frame to the network's input, and the network.
@@ -77,17 +77,17 @@ impl MethodPlan {
             Ok::<_, GpuError>((packer, sweep))
         };
         let (height, width) = size;
-        let (packer, way) = match method {
+        let (packer, plan) = match method {
             Method::Network(network) => {
                 let how = how(network)?;
                 let form = Form::Chain(network.chain(), how.0, how.1);
                 let packer = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, how, size, &packer, options)?;
-                (packer, Way::Network(trained))
+                (packer, Plan::Network(trained))
             }
             Method::Sweep(sweep) => {
                 let (packer, sweep) = swept(sweep_plan(height, width, *sweep, display)?)?;
-                (packer, Way::Sweep(sweep))
+                (packer, Plan::Sweep(sweep))
             }
             Method::Seeded(network) => {
                 let sweep = seed(network, display);
@@ -98,7 +98,7 @@ impl MethodPlan {
                 let source = Source::Seeded(&packer.input.first, &sweep.field);
                 let seeded = Packer::new(device, form, size, source, None)?;
                 let trained = Trained::new(device, network, how, size, &seeded, options)?;
-                (packer, Way::Seeded(sweep, Box::new(seeded), trained))
+                (packer, Plan::Seeded(sweep, Box::new(seeded), trained))
             }
             Method::Auto(..) => {
                 return Err(GpuError::Refused(
@@ -108,7 +108,7 @@ impl MethodPlan {
             }
             _ => return Err(GpuError::Refused("this method runs on the CPU only".into())),
         };
-        Ok(MethodPlan { size, packer, way })
+        Ok(MethodPlan { size, packer, plan })
     }
 
     /// Frames come in `formats` from now on.
@@ -116,9 +116,9 @@ impl MethodPlan {
         if self.packer.formats() == Some(formats) {
             return Ok(());
         }
-        let form = match &self.way {
-            Way::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
-            Way::Sweep(_) | Way::Seeded(..) => Form::Surfaces,
+        let form = match &self.plan {
+            Plan::Network(trained) => Form::Chain(trained.network.chain(), trained.numbers, trained.depth_scale),
+            Plan::Sweep(_) | Plan::Seeded(..) => Form::Surfaces,
         };
         let source = Source::Frame(formats.0, formats.1);
         let input = Some(self.packer.input.clone());
@@ -138,10 +138,10 @@ impl MethodPlan {
 
     /// Makes the field of what was read.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
-        match &self.way {
-            Way::Network(trained) => trained.chain.run(pass),
-            Way::Sweep(sweep) => sweep.run(pass),
-            Way::Seeded(sweep, seeded, trained) => {
+        match &self.plan {
+            Plan::Network(trained) => trained.chain.run(pass),
+            Plan::Sweep(sweep) => sweep.run(pass),
+            Plan::Seeded(sweep, seeded, trained) => {
                 sweep.run(pass);
                 seeded.run(pass);
                 trained.chain.run(pass);
@@ -151,33 +151,33 @@ impl MethodPlan {
 
     /// (3, H, W) complex f32.
     pub(super) fn field(&self) -> &wgpu::Buffer {
-        match &self.way {
-            Way::Network(trained) | Way::Seeded(_, _, trained) => &trained.chain.field,
-            Way::Sweep(sweep) => &sweep.field,
+        match &self.plan {
+            Plan::Network(trained) | Plan::Seeded(_, _, trained) => &trained.chain.field,
+            Plan::Sweep(sweep) => &sweep.field,
         }
     }
 
     /// Its sums: three complex f32 for each of so many workgroups.
     pub(super) fn sums(&self) -> (&wgpu::Buffer, usize) {
-        match &self.way {
-            Way::Network(trained) | Way::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
-            Way::Sweep(sweep) => (&sweep.partial, sweep.parts),
+        match &self.plan {
+            Plan::Network(trained) | Plan::Seeded(_, _, trained) => (&trained.chain.partial, trained.chain.parts),
+            Plan::Sweep(sweep) => (&sweep.partial, sweep.parts),
         }
     }
 
     /// Where the hologram stands, metres from the midpoint toward the viewer.
     pub(super) fn z_m(&self) -> f64 {
-        match &self.way {
-            Way::Network(_) | Way::Seeded(..) => 0.0,
-            Way::Sweep(sweep) => sweep.z_m,
+        match &self.plan {
+            Plan::Network(_) | Plan::Seeded(..) => 0.0,
+            Plan::Sweep(sweep) => sweep.z_m,
         }
     }
 
     /// What it is computed in.
     pub(super) fn numbers(&self) -> Numbers {
-        match &self.way {
-            Way::Network(trained) | Way::Seeded(_, _, trained) => trained.numbers,
-            Way::Sweep(_) => Numbers::F32,
+        match &self.plan {
+            Plan::Network(trained) | Plan::Seeded(_, _, trained) => trained.numbers,
+            Plan::Sweep(_) => Numbers::F32,
         }
     }
 
@@ -191,19 +191,19 @@ impl MethodPlan {
             let (fusion, dispatches) = (trained.chain.fusion, trained.chain.dispatches());
             format!("{fusion:?} in {dispatches} dispatches")
         };
-        match &self.way {
-            Way::Network(network) => trained(network),
-            Way::Sweep(sweep) => swept(sweep),
-            Way::Seeded(sweep, _, network) => format!("{}, {}", swept(sweep), trained(network)),
+        match &self.plan {
+            Plan::Network(network) => trained(network),
+            Plan::Sweep(sweep) => swept(sweep),
+            Plan::Seeded(sweep, _, network) => format!("{}, {}", swept(sweep), trained(network)),
         }
     }
 
     /// Bytes that the field's dispatches read and write in a frame, each value once.
     pub(super) fn bytes(&self) -> usize {
-        match &self.way {
-            Way::Network(trained) => trained.chain.bytes,
-            Way::Sweep(sweep) => sweep.bytes,
-            Way::Seeded(sweep, _, trained) => sweep.bytes + trained.chain.bytes,
+        match &self.plan {
+            Plan::Network(trained) => trained.chain.bytes,
+            Plan::Sweep(sweep) => sweep.bytes,
+            Plan::Seeded(sweep, _, trained) => sweep.bytes + trained.chain.bytes,
         }
     }
 }

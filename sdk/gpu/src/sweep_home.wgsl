@@ -2,7 +2,7 @@
 // behind, then columns. The latter also sum what becomes the mean phase. The header that sweep.rs writes before this
 // text gives RADIUS and DOWN.
 
-struct Way {
+struct Sizes {
     // Of what is written, and of what is read.
     width: u32, height: u32, wide: u32, high: u32,
     border: u32, tiles: u32, unused_a: u32, unused_b: u32,
@@ -10,7 +10,7 @@ struct Way {
 // The filter's centre, then the taps at distances 1, 2 …, complex.
 struct Colour { taps: array<vec4f, RADIUS + 1> }
 
-@group(0) @binding(0) var<uniform> way: Way;
+@group(0) @binding(0) var<uniform> sizes: Sizes;
 @group(0) @binding(1) var<uniform> colours: array<Colour, 3>;
 @group(0) @binding(2) var<storage, read> source: array<vec2f>;
 @group(0) @binding(3) var<storage, read_write> field: array<vec2f>;
@@ -29,13 +29,13 @@ fn go_home(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let colour = at.z;
-    let there = at.x < way.width && at.y < way.height;
+    let there = at.x < sizes.width && at.y < sizes.height;
     var sum = vec2f(0);
     if (there) {
-        let step = select(1u, way.wide, DOWN);
-        let length = select(way.wide, way.high, DOWN);
-        let middle = select(at.x, at.y, DOWN) + way.border;
-        let line = colour * way.wide * way.high + select(at.y * way.wide, at.x, DOWN);
+        let step = select(1u, sizes.wide, DOWN);
+        let length = select(sizes.wide, sizes.high, DOWN);
+        let middle = select(at.x, at.y, DOWN) + sizes.border;
+        let line = colour * sizes.wide * sizes.high + select(at.y * sizes.wide, at.x, DOWN);
         sum = times(colours[colour].taps[0].xy, source[line + middle * step]);
         for (var j = 1u; j <= RADIUS; j++) {
             var both = vec2f(0);
@@ -43,7 +43,7 @@ fn go_home(
             if (middle + j < length) { both += source[line + (middle + j) * step]; }
             sum += times(colours[colour].taps[j].xy, both);
         }
-        field[(colour * way.height + at.y) * way.width + at.x] = sum;
+        field[(colour * sizes.height + at.y) * sizes.width + at.x] = sum;
     }
     if (DOWN) {
         sums[thread] = sum;
@@ -51,6 +51,6 @@ fn go_home(
             workgroupBarrier();
             if (thread < step) { sums[thread] += sums[thread + step]; }
         }
-        if (thread == 0u) { partial[3u * (group.y * way.tiles + group.x) + colour] = sums[0]; }
+        if (thread == 0u) { partial[3u * (group.y * sizes.tiles + group.x) + colour] = sums[0]; }
     }
 }

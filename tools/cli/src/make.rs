@@ -41,7 +41,7 @@ impl HologramRequest {
         match (method, image) {
             (Method::Core(method), Image::Rgbd(frame)) => {
                 let chosen = match method {
-                    CoreMethod::Auto => self.by_sharpness(frame, &display.target.display)?,
+                    CoreMethod::Auto => self.automatic(frame, &display.target.display)?,
                     method => method,
                 };
                 // Where depth is sharp, auto leaves its network alone.
@@ -69,7 +69,7 @@ impl HologramRequest {
     }
 
     /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
-    fn by_sharpness(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
+    fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
         Ok(match trained && !sharpness::measure(frame).is_sharp() {
             true => CoreMethod::Network,

@@ -113,7 +113,7 @@ impl Depth {
 
     /// Of each of `frames`' views the one that is sharpest at a place: where colours differ most from their
     /// neighbours'.
-    pub fn by_sharpness(frames: &[Vec<RgbImage>]) -> Self {
+    pub fn from_focus(frames: &[Vec<RgbImage>]) -> Self {
         let mut size = (0, 0);
         let mut slices = Vec::new();
         for views in frames {
@@ -366,7 +366,7 @@ mod tests {
                 false => image::Rgb([100; 3]),
             })
         };
-        let found = Depth::by_sharpness(&[vec![grey(0..40), grey(40..80)]]);
+        let found = Depth::from_focus(&[vec![grey(0..40), grey(40..80)]]);
         let slices = STANDARD.decode(&found.slices).unwrap();
         assert_eq!((found.width, found.height, found.known), (80, 40, false));
         assert_eq!((slices[20 * 80 + 10], slices[20 * 80 + 70]), (0, 1));

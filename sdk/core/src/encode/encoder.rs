@@ -1,7 +1,7 @@
 //! The plan from fields to phases or levels: what needs the whole field first, then row by row in one sweep over
 //! memory.
 
-use super::dark::Dark;
+use super::dark_threshold::DarkThreshold;
 use super::encoding::{Prefilter, PrefilterScratch};
 use super::local::{LocalFilter, LocalScratch, Wanted};
 use super::start::{Start, StartScratch};
@@ -20,7 +20,7 @@ pub struct Encoder {
     height: usize,
     width: usize,
     prefilter: Prefilter,
-    dark: f32,
+    dark_threshold: f32,
     local: Option<Local>,
     /// With (H, W) of the modulator, in whose middle the hologram stands.
     illumination: Option<(Illumination, (usize, usize))>,
@@ -63,7 +63,7 @@ struct PartScratch {
 /// What is done to a field row by row.
 #[derive(Clone, Copy)]
 struct Work<'a> {
-    dark: Option<Dark>,
+    dark_threshold: Option<DarkThreshold>,
     /// With 1 over the scale.
     local: Option<(&'a Local, f32)>,
 }
@@ -98,7 +98,7 @@ impl Encoder {
             height,
             width,
             prefilter,
-            dark: options.dark_threshold,
+            dark_threshold: options.dark_threshold,
             local: (options.local_steps > 0).then(|| Local {
                 filter: LocalFilter::of_aperture(target.display.aperture_radius()),
                 steps: options.local_steps,
@@ -200,7 +200,7 @@ impl Encoder {
         // In darkness there is nothing to correct.
         let local = self.local.as_ref().filter(|_| scale > 0.0);
         Work {
-            dark: Dark::new(self.dark, scale),
+            dark_threshold: DarkThreshold::new(self.dark_threshold, scale),
             local: local.map(|local| (local, 1.0 / scale)),
         }
     }
@@ -218,7 +218,7 @@ impl Encoder {
         scale.unwrap_or_else(|| {
             let mut most = std::mem::take(&mut scratch.most);
             let nothing = Work {
-                dark: None,
+                dark_threshold: None,
                 local: None,
             };
             self.rows(field, nothing, &mut most, scratch, |_, row, most| {
@@ -259,7 +259,7 @@ impl Encoder {
                 plane: plane(field),
                 height,
                 colour,
-                dark: work.dark,
+                dark_threshold: work.dark_threshold,
                 blur: self.prefilter.blur(),
                 light: (self.illumination.as_ref()).map(|(light, modulator)| (light, *modulator)),
             };

@@ -2,7 +2,7 @@
 //! light.
 
 use super::anti_alias::AntiAlias;
-use super::dark::Dark;
+use super::dark_threshold::DarkThreshold;
 use crate::display::illumination::Illumination;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
@@ -15,7 +15,7 @@ pub(super) struct Start<'a> {
     pub(super) height: usize,
     /// 0 red, 1 green, 2 blue; of one laser 0.
     pub(super) colour: usize,
-    pub(super) dark: Option<Dark>,
+    pub(super) dark_threshold: Option<DarkThreshold>,
     pub(super) blur: Option<&'a AntiAlias>,
     /// The light, with (H, W) of the modulator.
     pub(super) light: Option<(&'a Illumination, (usize, usize))>,
@@ -52,17 +52,17 @@ impl Start<'_> {
         let width = out.len();
         let source = |y: usize| &self.plane[y * width..][..width];
         let StartScratch { ring, damped, next } = scratch;
-        match (self.blur, self.dark) {
+        match (self.blur, self.dark_threshold) {
             (None, None) => out.copy_from_slice(source(y)),
-            (None, Some(dark)) => wide!(dark.draw(source(y), out)),
-            (Some(blur), dark) => wide!({
+            (None, Some(threshold)) => wide!(threshold.draw(source(y), out)),
+            (Some(blur), threshold) => wide!({
                 let (half, kept) = (blur.half(), ring.len() / width);
                 while *next <= (y + half).min(self.height - 1) {
                     let to = &mut ring[*next % kept * width..][..width];
-                    match dark {
+                    match threshold {
                         None => blur.blur_row(source(*next), to),
-                        Some(dark) => {
-                            dark.draw(source(*next), damped);
+                        Some(threshold) => {
+                            threshold.draw(source(*next), damped);
                             blur.blur_row(damped, to);
                         }
                     }

@@ -60,7 +60,7 @@ impl Local {
         } else {
             (None, job.field.clone())
         };
-        let rooms = [
+        let missing = [
             device.buffer("what is missing", bytes)?,
             device.buffer("what is missing after a step", bytes)?,
         ];
@@ -70,13 +70,13 @@ impl Local {
         let program = device.program("the start", source.clone(), "begin");
         let mut arguments = shared.arguments(&[0, 1, 2, 3, 5, 9]);
         arguments.push((10, wanted.as_entire_binding()));
-        arguments.push((12, rooms[0].as_entire_binding()));
+        arguments.push((12, missing[0].as_entire_binding()));
         let mut begin = vec![program.on(device, &arguments, by_rows)?];
 
         let of_step = |step: usize, bindings: &[u32]| {
             let mut arguments = shared.arguments(bindings);
             arguments.push((10, wanted.as_entire_binding()));
-            arguments.push((11, rooms[step % 2].as_entire_binding()));
+            arguments.push((11, missing[step % 2].as_entire_binding()));
             arguments.push((13, taps.buffer.as_entire_binding()));
             arguments
         };
@@ -86,12 +86,12 @@ impl Local {
         let before = if to_midpoint { steps } else { steps - 1 };
         for step in 0..before {
             let mut arguments = of_step(step, &[0, 1, 3, 5, 9]);
-            arguments.push((12, rooms[(step + 1) % 2].as_entire_binding()));
+            arguments.push((12, missing[(step + 1) % 2].as_entire_binding()));
             begin.push(program.on(device, &arguments, [grid[0], grid[1], 3])?);
         }
         let last = if to_midpoint {
-            let rooms = [&wanted, &rooms[before % 2]];
-            let midpoint = Midpoint::new(device, job, shared, &source, rooms, buffers)?;
+            let missing = [&wanted, &missing[before % 2]];
+            let midpoint = Midpoint::new(device, job, shared, &source, missing, buffers)?;
             Last::Midpoint(Box::new(midpoint))
         } else {
             let program = device.program("the last local step", source, "finish");

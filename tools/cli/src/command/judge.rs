@@ -60,15 +60,15 @@ const PAGE_BYTES: usize = 4_000_000;
 /// What corrects a still.
 const STILL_STEPS: usize = 3;
 
-/// One way to a hologram.
-struct Way {
+/// A method with an encoder.
+struct Combination {
     method: CoreMethod,
     encoder: EncoderFlags,
     /// Of the pairs, whose encoder is their own.
     network: Option<&'static str>,
 }
 
-/// A way, judged.
+/// A combination, judged.
 struct Row {
     method: &'static str,
     encoder: String,
@@ -103,20 +103,24 @@ impl Judge {
         let (truth, what) = self.truth(&file, &image, layers.as_ref(), sharp, &mut request)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
-        let ways = self.ways(display);
-        let bar = progress_bar(ways.len() as u64, "ways");
+        let combinations = self.combinations(display);
+        let bar = progress_bar(combinations.len() as u64, "combinations");
         let mut rows = Vec::new();
-        for way in ways {
-            request.set_method(Method::Core(way.method), way.network.map(str::to_owned), way.encoder);
+        for combination in combinations {
+            request.set_method(
+                Method::Core(combination.method),
+                combination.network.map(str::to_owned),
+                combination.encoder,
+            );
             let made = request.make(&file, &image)?;
             let (info, _) = infos(&file, &made);
             let shown = made.hologram(info).views_on(&file, &z_m)?;
             let times: Vec<Duration> = made.stages.iter().map(|(_, time)| *time).collect();
             rows.push(Row {
-                method: if way.network.is_some() {
+                method: if combination.network.is_some() {
                     "pair"
                 } else {
-                    way.method.name()
+                    combination.method.name()
                 },
                 encoder: made.encoder.describe(),
                 figures: truth::judge(&shown, &wanted, self.margin)?,
@@ -138,7 +142,7 @@ impl Judge {
         Ok(())
     }
 
-    /// What ways are judged by: a field at the modulator, and what it is.
+    /// What combinations are judged by: a field at the modulator, and what it is.
     fn truth(
         &self,
         file: &DisplayFile,
@@ -187,7 +191,7 @@ impl Judge {
         request.make(file, &Image::Layers(ldi.clone()))
     }
 
-    fn ways(&self, display: &phasefront::Display) -> Vec<Way> {
+    fn combinations(&self, display: &phasefront::Display) -> Vec<Combination> {
         let trained = phasefront_models::default_network(display).is_some();
         let usual = match trained {
             true => vec![CoreMethod::Sweep, CoreMethod::Network],
@@ -198,7 +202,7 @@ impl Judge {
         } else {
             self.method.clone()
         };
-        let mut ways = Vec::new();
+        let mut combinations = Vec::new();
         for &method in &methods {
             for &encoder in &self.encoder {
                 let steps = EncoderOptions::default().local_steps;
@@ -207,7 +211,7 @@ impl Judge {
                     (EncoderOptions::DARK_THRESHOLD, steps, 0),
                     (EncoderOptions::DARK_THRESHOLD, steps, STILL_STEPS),
                 ];
-                ways.extend(corrections.map(|(dark, local, midpoint)| Way {
+                combinations.extend(corrections.map(|(dark, local, midpoint)| Combination {
                     method,
                     encoder: EncoderFlags::of(encoder, dark, local, midpoint),
                     network: None,
@@ -216,13 +220,13 @@ impl Judge {
         }
         let pair = phasefront_models::pair_for(display, networks::Precision::Int8).is_some();
         if pair && methods.contains(&CoreMethod::Network) {
-            ways.push(Way {
+            combinations.push(Combination {
                 method: CoreMethod::Network,
                 encoder: EncoderFlags::default(),
                 network: Some(networks::DEEP),
             });
         }
-        ways
+        combinations
     }
 }
 
@@ -273,7 +277,7 @@ fn table(rows: &[Row], what: &str) -> String {
     text + &format!("\nJudged by {what}. Times are of one run, after no warm-up.")
 }
 
-/// A page with what each way shows, and what it is judged by.
+/// A page with what each combination shows, and what it is judged by.
 fn write_page(
     path: &std::path::Path,
     file: &DisplayFile,

@@ -287,7 +287,7 @@ impl Parts {
         let last = (self.z_m.len() - 1) as f32;
         let depth = match &self.depth {
             Some(depth) => Depth::known(depth, |d| (d.clamp(0.0, 1.0) * last).round() as u8),
-            None => Depth::by_sharpness(&self.shown),
+            None => Depth::from_focus(&self.shown),
         };
         let stacks = if self.field.is_empty() { 1 } else { 2 };
         let frames = self.shown.len();

@@ -36,9 +36,9 @@ pub const DISPLAYS: [&str; 10] = [
     "offset_mm = 20.0",
 ];
 
-/// A way to a hologram.
+/// How a hologram is made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Way {
+enum Propagation {
     /// SM-LBM of what is visible and so many hidden layers.
     Exact { hidden: usize, planes: usize },
     /// The sweep, with its steps merged or not.
@@ -87,10 +87,10 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
     let display = &scenes.display;
     let settings = settings(display, planes);
     let mut plans = Vec::new();
-    for (_, _, _, way) in &settings {
-        plans.push(match *way {
-            Way::Exact { .. } => None,
-            Way::Sweep { sweep, merged } => {
+    for (_, _, _, how) in &settings {
+        plans.push(match *how {
+            Propagation::Exact { .. } => None,
+            Propagation::Sweep { sweep, merged } => {
                 let plan = SweepPlan::new(size, size, display, sweep, 0.0)?;
                 Some(if merged { plan } else { plan.unmerged() })
             }
@@ -106,12 +106,12 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             let refined = refine(&degrade(depth.view(), &degradation, scenes.seed + i), &rgb)?;
             let frames = [depth, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
             let mut figures = Vec::new();
-            for ((.., way), plan) in settings.iter().zip(&plans) {
+            for ((.., how), plan) in settings.iter().zip(&plans) {
                 let mut of_way = Vec::new();
                 for frame in &frames {
                     let frame = frame.as_ref().map_err(|e| Error::Input(e.to_string()))?;
-                    let field = match (way, plan) {
-                        (Way::Exact { hidden, planes }, _) => exact(frame, display, *hidden, *planes)?,
+                    let field = match (how, plan) {
+                        (Propagation::Exact { hidden, planes }, _) => exact(frame, display, *hidden, *planes)?,
                         (_, Some(plan)) => swept(plan, frame)?,
                         _ => unreachable!("a sweep has a plan"),
                     };
@@ -150,14 +150,14 @@ pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
 }
 
 /// What is compared: the part that is changed, in words, as a number, and how.
-fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Way)> {
+fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Propagation)> {
     let usual = Sweep::for_display(display);
-    let sweep = |sweep| Way::Sweep { sweep, merged: true };
+    let sweep = |sweep| Propagation::Sweep { sweep, merged: true };
     let mut settings = Vec::new();
     for hidden in 0..=sweep::MAX_HIDDEN_LAYERS {
         for planes in [planes, usual.planes] {
             let words = format!("exact waves, {planes} planes, {hidden} hidden layers");
-            settings.push(("exact", words, hidden, Way::Exact { hidden, planes }));
+            settings.push(("exact", words, hidden, Propagation::Exact { hidden, planes }));
         }
     }
     let words = format!(
@@ -167,9 +167,9 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
     settings.push(("usual", words, usual.planes, sweep(usual)));
     for tenths in [4, 6, 8, 12, 16, 24, 32] {
         let planes = (usual.planes * tenths).div_ceil(10);
-        let way = Sweep::of_planes(display, planes);
-        let words = format!("{planes} planes of {} taps", way.taps);
-        settings.push(("planes", words, planes, sweep(way)));
+        let swept = Sweep::of_planes(display, planes);
+        let words = format!("{planes} planes of {} taps", swept.taps);
+        settings.push(("planes", words, planes, sweep(swept)));
     }
     for more in [-4, -2, 2, 4, 8] {
         let taps = usual.taps.saturating_add_signed(more);
@@ -178,23 +178,23 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
     }
     for hidden_layers in 0..sweep::MAX_HIDDEN_LAYERS {
         let words = format!("{hidden_layers} hidden layers");
-        let way = Sweep { hidden_layers, ..usual };
-        settings.push(("hidden", words, hidden_layers, sweep(way)));
+        let swept = Sweep { hidden_layers, ..usual };
+        settings.push(("hidden", words, hidden_layers, sweep(swept)));
     }
-    let way = Sweep {
+    let swept = Sweep {
         between_planes: false,
         ..usual
     };
-    settings.push(("between", "points moved to planes".into(), 0, sweep(way)));
+    settings.push(("between", "points moved to planes".into(), 0, sweep(swept)));
     for tile in [64, 128, 512, 1024] {
         let words = format!("tiles of {tile}");
         settings.push(("tile", words, tile, sweep(Sweep { tile, ..usual })));
     }
-    let way = Way::Sweep {
+    let how = Propagation::Sweep {
         sweep: usual,
         merged: false,
     };
-    settings.push(("merge", "each step by itself".into(), 0, way));
+    settings.push(("merge", "each step by itself".into(), 0, how));
     settings
 }
 
@@ -253,7 +253,7 @@ pub fn displays(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
                 ])
             })
             .collect::<Result<Vec<_>>>()?;
-        let each = |way: usize| of_scenes.iter().map(move |figures| figures[way]);
+        let each = |setting: usize| of_scenes.iter().map(move |figures| figures[setting]);
         rows.push(DisplayRow {
             display: toml.into(),
             planes: sweep.planes,
