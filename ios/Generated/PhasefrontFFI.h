@@ -313,7 +313,7 @@ typedef struct UniffiVTableCallbackInterfaceLogListener {
 typedef struct UniffiVTableCallbackInterfaceSessionListener {
     UniffiCallbackInterfaceFree _Nonnull uniffiFree;
     UniffiCallbackInterfaceClone _Nonnull uniffiClone;
-    UniffiCallbackInterfaceSessionListenerMethod0 _Nonnull onHologram;
+    UniffiCallbackInterfaceSessionListenerMethod0 _Nonnull onProcessed;
     UniffiCallbackInterfaceSessionListenerMethod1 _Nonnull onDropped;
     UniffiCallbackInterfaceSessionListenerMethod2 _Nonnull onFailed;
     UniffiCallbackInterfaceSessionListenerMethod3 _Nonnull onQualityChanged;
@@ -596,9 +596,9 @@ void uniffi_phasefront_ffi_fn_free_sessionlistener(uint64_t handle, RustCallStat
 void uniffi_phasefront_ffi_fn_init_callback_vtable_sessionlistener(const UniffiVTableCallbackInterfaceSessionListener* _Nonnull vtable
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_HOLOGRAM
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_HOLOGRAM
-void uniffi_phasefront_ffi_fn_method_sessionlistener_on_hologram(uint64_t ptr, uint64_t hologram, RustCallStatus *_Nonnull out_status
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_PROCESSED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_PROCESSED
+void uniffi_phasefront_ffi_fn_method_sessionlistener_on_processed(uint64_t ptr, uint64_t hologram, RustCallStatus *_Nonnull out_status
 );
 #endif
 #ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_FN_METHOD_SESSIONLISTENER_ON_DROPPED
@@ -1206,9 +1206,9 @@ uint16_t uniffi_phasefront_ffi_checksum_method_rawsession_warm_up(void
     
 );
 #endif
-#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_HOLOGRAM
-#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_HOLOGRAM
-uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_hologram(void
+#ifndef UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_PROCESSED
+#define UNIFFI_FFIDEF_UNIFFI_PHASEFRONT_FFI_CHECKSUM_METHOD_SESSIONLISTENER_ON_PROCESSED
+uint16_t uniffi_phasefront_ffi_checksum_method_sessionlistener_on_processed(void
     
 );
 #endif

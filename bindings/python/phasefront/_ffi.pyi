@@ -127,7 +127,7 @@ class QualityReason(enum.Enum):
         ROOM: There was room for more.
         THERMAL: The device is hot.
         ASKED: The caller said so.
-        REFUSED: The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+        REFUSED: The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it again.
         OTHER: For a reason that this version of the bindings does not know.
     """
     TOO_SLOW = 0
@@ -143,7 +143,7 @@ class Method:
     One of:
         TRAINED: A trained network.
         SWEEP: The plane sweep, for any display: slower, and nothing needs to be trained.
-        BY_SHARPNESS: For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained network where it is ragged, as sensors' depth is.
+        AUTO: For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained network where it is noisy or incomplete, as sensors' depth is.
     """
     class TRAINED(Method):
         """A trained network.
@@ -156,9 +156,9 @@ class Method:
     class SWEEP(Method):
         """The plane sweep, for any display: slower, and nothing needs to be trained."""
         def __init__(self) -> None: ...
-    class BY_SHARPNESS(Method):
-        """For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained
-        network where it is ragged, as sensors' depth is.
+    class AUTO(Method):
+        """For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
+        network where it is noisy or incomplete, as sensors' depth is.
 
         Fields:
             network: The network, for the session's display.
@@ -169,29 +169,29 @@ class Method:
     def is_trained(self) -> bool: ...
     def is_SWEEP(self) -> bool: ...
     def is_sweep(self) -> bool: ...
-    def is_BY_SHARPNESS(self) -> bool: ...
-    def is_by_sharpness(self) -> bool: ...
+    def is_AUTO(self) -> bool: ...
+    def is_auto(self) -> bool: ...
 
 class Quality:
     """Whether a session may change its quality.
 
     One of:
-        ADAPTIVE: It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up where there is room.
-        FIXED: It stays on this rung.
+        ADAPTIVE: It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up where there is room.
+        FIXED: It stays at this quality level.
     """
     class ADAPTIVE(Quality):
-        """It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up
+        """It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
         where there is room.
         """
         def __init__(self) -> None: ...
     class FIXED(Quality):
-        """It stays on this rung.
+        """It stays at this quality level.
 
         Fields:
-            rung: 0 the best.
+            quality_level: 0 the best.
         """
-        rung: int
-        def __init__(self, rung: int) -> None: ...
+        quality_level: int
+        def __init__(self, quality_level: int) -> None: ...
     def is_ADAPTIVE(self) -> bool: ...
     def is_adaptive(self) -> bool: ...
     def is_FIXED(self) -> bool: ...
@@ -248,11 +248,11 @@ class Brightness:
     """Which amplitude full light stands for.
 
     One of:
-        STEADY: Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
+        SMOOTHED: Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
         FIXED: This one; what is brighter is clipped.
         FRAME_MAX: The frame's largest.
     """
-    class STEADY(Brightness):
+    class SMOOTHED(Brightness):
         """Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker."""
         def __init__(self) -> None: ...
     class FIXED(Brightness):
@@ -266,8 +266,8 @@ class Brightness:
     class FRAME_MAX(Brightness):
         """The frame's largest."""
         def __init__(self) -> None: ...
-    def is_STEADY(self) -> bool: ...
-    def is_steady(self) -> bool: ...
+    def is_SMOOTHED(self) -> bool: ...
+    def is_smoothed(self) -> bool: ...
     def is_FIXED(self) -> bool: ...
     def is_fixed(self) -> bool: ...
     def is_FRAME_MAX(self) -> bool: ...
@@ -347,12 +347,12 @@ class RunningMode(enum.Enum):
 
     Values:
         IMAGE: Each frame is answered by itself.
-        VIDEO: Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
-        LIVE_STREAM: Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
+        VIDEO: Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
+        LIVE: Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
     """
     IMAGE = 0
     VIDEO = 1
-    LIVE_STREAM = 2
+    LIVE = 2
 
 class Stage(enum.Enum):
     """A part of the work on a frame.
@@ -360,13 +360,13 @@ class Stage(enum.Enum):
     Values:
         FRAME: All of a frame's work on the session's threads; the others, but for `Plan` and `Preview`, lie within it.
         COLOUR: Colour: turned, converted, resized.
-        DEPTH: Depth: read, aligned, steadied, refined.
+        DEPTH: Depth: read, aligned, smoothed over time, refined.
         METHOD: From the frame to the midpoint hologram.
         PROPAGATE: From the midpoint to the modulator.
         ENCODE: From the field to levels.
         MIDPOINT: Steps at the midpoint, within `Encode`.
         GPU: A frame that a GPU computes, with the ways there and back.
-        PLAN: Plans and memory of a rung are made.
+        PLAN: Plans and memory of a quality level are made.
         PREVIEW: A small view.
     """
     FRAME = 0
@@ -384,10 +384,10 @@ class Thermal(enum.Enum):
     """How hot the device is, as its system says.
 
     Values:
-        NOMINAL: Nothing to heed.
+        NOMINAL: Not warm: nothing is limited.
         FAIR: Warm: frames may take a little less time.
         SERIOUS: Hot: half the time.
-        CRITICAL: Too hot: the lowest rung.
+        CRITICAL: Too hot: the lowest quality level.
     """
     NOMINAL = 0
     FAIR = 1
@@ -631,7 +631,7 @@ class HologramInfo:
         near_m: Metres at the near end of the volume; none for normalized depth.
         far_m: Metres at the far end of the volume; none for normalized depth.
         valid_depth: The share of the depth sensor's pixels that had a usable reading.
-        rung: The rung of the ladder that it was made on, 0 the best.
+        quality_level: The quality level that it was made at, 0 the best.
         times: How long each stage took.
     """
     timestamp_ns: int
@@ -642,9 +642,9 @@ class HologramInfo:
     near_m: float | None
     far_m: float | None
     valid_depth: float
-    rung: int
+    quality_level: int
     times: FrameTimes
-    def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, rung: int, times: FrameTimes) -> None: ...
+    def __init__(self, *, timestamp_ns: int, width: int, height: int, colours: int, scale: float, near_m: float | None, far_m: float | None, valid_depth: float, quality_level: int, times: FrameTimes) -> None: ...
 
 class Placement:
     """How a hologram is put on its modulator.
@@ -664,28 +664,28 @@ class Placement:
     def __init__(self, *, layout: Layout, flip_x: bool = False, flip_y: bool = False, shift_x: int = 0, shift_y: int = 0) -> None: ...
 
 class QualityChange:
-    """A step on the ladder.
+    """A change of the quality level.
 
     Fields:
-        from_rung: The rung before.
-        to_rung: The rung now; the one before where the step was refused.
+        from_quality_level: The quality level before.
+        to_quality_level: The quality level now; the one before where the step was refused.
         reason: Why.
     """
-    from_rung: int
-    to_rung: int
+    from_quality_level: int
+    to_quality_level: int
     reason: QualityReason
-    def __init__(self, *, from_rung: int, to_rung: int, reason: QualityReason) -> None: ...
+    def __init__(self, *, from_quality_level: int, to_quality_level: int, reason: QualityReason) -> None: ...
 
-class Rung:
-    """One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
-    shown in its middle.
+class QualityLevel:
+    """One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
+    is shown in its middle.
 
     Fields:
         method: What makes the hologram.
         width: Width of the hologram, pixels.
         height: Height of the hologram, pixels.
-        local_steps: Local steps of this rung; none for the session's.
-        midpoint_steps: Steps at the midpoint of this rung; none for the session's.
+        local_steps: Local steps of this quality level; none for the session's.
+        midpoint_steps: Steps at the midpoint of this quality level; none for the session's.
     """
     method: Method
     width: int
@@ -695,31 +695,31 @@ class Rung:
     def __init__(self, *, method: Method, width: int, height: int, local_steps: int | None = ..., midpoint_steps: int | None = ...) -> None: ...
 
 class SessionOptions:
-    """What a session makes, and how. `session_options` has what is usual; change what is not.
+    """What a session makes, and how. `session_options` gives the defaults; change what differs.
 
     Fields:
         target: What holograms are for.
-        ladder: Quality levels, the best first: 1 to 16.
-        quality: Whether the session may step on the ladder by itself.
-        target_rate_hz: Frames a second that are aimed at; none takes frames as they come and never steps.
+        quality_levels: Quality levels, the best first: 1 to 16.
+        quality: Whether the session may change its quality level by itself.
+        target_rate_hz: Frames a second that are aimed at; none takes every frame and never steps.
         encoding: How the field becomes phases.
         brightness: Which amplitude full light stands for.
-        dark: Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
-        local_steps: Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what suits the encoding: 1, and 0 with a pre-filter.
+        dark_threshold: Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
+        local_steps: Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for what suits the encoding: 1, and 0 with a pre-filter.
         midpoint_steps: Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for video, where it goes on from the frame before.
         depth_range: Which metres are shown at the ends of the volume.
         least_confidence: Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
         threads: Threads to compute with, at most 256; none for as many as the device has.
-        most_pixels: Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple of them.
+        most_pixels: Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple of them.
         backend: Where frames are computed.
     """
     target: Target
-    ladder: list[Rung]
+    quality_levels: list[QualityLevel]
     quality: Quality
     target_rate_hz: float | None
     encoding: Encoding
     brightness: Brightness
-    dark: float | None
+    dark_threshold: float | None
     local_steps: int | None
     midpoint_steps: int
     depth_range: DepthRange
@@ -727,7 +727,7 @@ class SessionOptions:
     threads: int | None
     most_pixels: int
     backend: Backend
-    def __init__(self, *, target: Target, ladder: list[Rung], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend) -> None: ...
+    def __init__(self, *, target: Target, quality_levels: list[QualityLevel], quality: Quality, target_rate_hz: float | None, encoding: Encoding, brightness: Brightness, dark_threshold: float | None = ..., local_steps: int | None = ..., midpoint_steps: int = 0, depth_range: DepthRange, least_confidence: float, threads: int | None, most_pixels: int = 33554432, backend: Backend) -> None: ...
 
 class Statistics:
     """What a session has done so far. Submitted frames are processed, failed, refused, dropped or pending.
@@ -743,7 +743,7 @@ class Statistics:
         times: Mean times, of late.
         backend: What runs the network.
         backend_why: Why that.
-        rung: The rung of the ladder, 0 the best.
+        quality_level: The quality level, 0 the best.
         listener_failures: How often the listener threw.
     """
     submitted: int
@@ -756,12 +756,12 @@ class Statistics:
     times: FrameTimes
     backend: str
     backend_why: str
-    rung: int
+    quality_level: int
     listener_failures: int
-    def __init__(self, *, submitted: int, processed: int, failed: int, refused: int, dropped: Drops, pending: int, rate_hz: float, times: FrameTimes, backend: str, backend_why: str, rung: int, listener_failures: int) -> None: ...
+    def __init__(self, *, submitted: int, processed: int, failed: int, refused: int, dropped: Drops, pending: int, rate_hz: float, times: FrameTimes, backend: str, backend_why: str, quality_level: int, listener_failures: int) -> None: ...
 
 def built_in_pair(offset_mm: float) -> DeepPair:
-    """The pair in int8 that comes along for a modulator at `offset_mm` and the default display's pitch, colours and
+    """The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
     volume.
 
     Errors: Another offset, or a library that was built without them.
@@ -774,9 +774,9 @@ def display_from_toml(text: str) -> Display:
     """
 
 def session_options(target: Target, method: Method | None = ...) -> SessionOptions:
-    """What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
+    """The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
     correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
-    the display; steady brightness, near and far by percentiles.
+    the display; smoothed brightness, near and far by percentiles.
     """
 
 def set_log_listener(level: LogLevel, listener: LogListener | None) -> None:
@@ -800,7 +800,7 @@ class Network:
     """A hologram network. Immutable; one serves many sessions."""
     @classmethod
     def built_in(cls, name: str = 'rgbd-8') -> Network:
-        """A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default
+        """A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
         display's pitch, colours and volume.
 
         Errors: A name that none has, or a library that was built without them.
@@ -964,9 +964,9 @@ class RawSession:
     def resume(self) -> None:
         """Takes frames again."""
     def set_quality(self, quality: Quality) -> None:
-        """Allows or forbids steps on the ladder.
+        """Allows or forbids changes of the quality level.
 
-        Errors: A rung that is not on the ladder.
+        Errors: A quality level that the session does not have.
         """
     def set_thermal(self, thermal: Thermal) -> None:
         """Says how hot the device is."""
@@ -991,14 +991,14 @@ class SessionListener:
     """Hears what becomes of the frames of a live session: one call after another, on the session's own thread, in the
     order in which things happened. While it is busy no frame is processed. What it throws is counted and logged.
     """
-    def on_hologram(self, hologram: RawHologram) -> None:
+    def on_processed(self, hologram: RawHologram) -> None:
         """A frame became a hologram."""
     def on_dropped(self, timestamp_ns: int, reason: DropReason) -> None:
         """A frame was dropped."""
     def on_failed(self, timestamp_ns: int, message: str) -> None:
         """A frame could not be processed. The session goes on."""
     def on_quality_changed(self, timestamp_ns: int, change: QualityChange) -> None:
-        """The frames after this one are made on another rung of the ladder."""
+        """The frames after this one are made at another quality level."""
     def on_closed(self) -> None:
         """The session is closed and its memory is given back. This is the last call, made exactly once, also where
         shutting down does not wait for it.

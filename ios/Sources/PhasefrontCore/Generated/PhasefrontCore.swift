@@ -923,7 +923,7 @@ open class Network: NetworkProtocol, @unchecked Sendable {
 
     
     /**
-     * A network in int8 that comes along, by `name`: that of 8 layers unless another is named. For the default
+     * A network in int8 that is bundled, by `name`: that of 8 layers unless another is named. For the default
      * display's pitch, colours and volume.
      *
      * # Errors
@@ -1817,10 +1817,10 @@ public protocol RawSessionProtocol: AnyObject, Sendable {
     func resume() throws 
     
     /**
-     * Allows or forbids steps on the ladder.
+     * Allows or forbids changes of the quality level.
      *
      * # Errors
-     * A rung that is not on the ladder.
+     * A quality level that the session does not have.
      */
     func setQuality(quality: Quality) throws 
     
@@ -1998,10 +1998,10 @@ open func resume()throws   {try rustCallWithError(FfiConverterTypePhasefrontErro
 }
     
     /**
-     * Allows or forbids steps on the ladder.
+     * Allows or forbids changes of the quality level.
      *
      * # Errors
-     * A rung that is not on the ladder.
+     * A quality level that the session does not have.
      */
 open func setQuality(quality: Quality)throws   {try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
         uniffiCallStatus in
@@ -2152,7 +2152,7 @@ public protocol SessionListener: AnyObject, Sendable {
     /**
      * A frame became a hologram.
      */
-    func onHologram(hologram: RawHologram) throws 
+    func onProcessed(hologram: RawHologram) throws 
     
     /**
      * A frame was dropped.
@@ -2165,7 +2165,7 @@ public protocol SessionListener: AnyObject, Sendable {
     func onFailed(timestampNs: UInt64, message: String) throws 
     
     /**
-     * The frames after this one are made on another rung of the ladder.
+     * The frames after this one are made at another quality level.
      */
     func onQualityChanged(timestampNs: UInt64, change: QualityChange) throws 
     
@@ -2236,9 +2236,9 @@ open class SessionListenerImpl: SessionListener, @unchecked Sendable {
     /**
      * A frame became a hologram.
      */
-open func onHologram(hologram: RawHologram)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
+open func onProcessed(hologram: RawHologram)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
-    uniffi_phasefront_ffi_fn_method_sessionlistener_on_hologram(
+    uniffi_phasefront_ffi_fn_method_sessionlistener_on_processed(
             self.uniffiCloneHandle(),
         FfiConverterTypeRawHologram_lower(hologram),uniffiCallStatus
     )
@@ -2272,7 +2272,7 @@ open func onFailed(timestampNs: UInt64, message: String)throws   {try rustCallWi
 }
     
     /**
-     * The frames after this one are made on another rung of the ladder.
+     * The frames after this one are made at another quality level.
      */
 open func onQualityChanged(timestampNs: UInt64, change: QualityChange)throws   {try rustCallWithError(FfiConverterTypeListenerError_lift) {
         uniffiCallStatus in
@@ -2324,7 +2324,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 fatalError("Uniffi callback interface SessionListener: handle missing in uniffiClone")
             }
         },
-        onHologram: { (
+        onProcessed: { (
             uniffiHandle: UInt64,
             hologram: UInt64,
             uniffiOutReturn: UnsafeMutableRawPointer,
@@ -2335,7 +2335,7 @@ fileprivate struct UniffiCallbackInterfaceSessionListener {
                 guard let uniffiObj = try? FfiConverterTypeSessionListener.handleMap.get(handle: uniffiHandle) else {
                     throw UniffiInternalError.unexpectedStaleHandle
                 }
-                return try uniffiObj.onHologram(
+                return try uniffiObj.onProcessed(
                      hologram: try FfiConverterTypeRawHologram_lift(hologram)
                 )
             }
@@ -3939,9 +3939,9 @@ public struct HologramInfo: Equatable, Hashable {
      */
     public var validDepth: Float
     /**
-     * The rung of the ladder that it was made on, 0 the best.
+     * The quality level that it was made at, 0 the best.
      */
-    public var rung: UInt32
+    public var qualityLevel: UInt32
     /**
      * How long each stage took.
      */
@@ -3975,8 +3975,8 @@ public struct HologramInfo: Equatable, Hashable {
          * The share of the depth sensor's pixels that had a usable reading.
          */validDepth: Float, 
         /**
-         * The rung of the ladder that it was made on, 0 the best.
-         */rung: UInt32, 
+         * The quality level that it was made at, 0 the best.
+         */qualityLevel: UInt32, 
         /**
          * How long each stage took.
          */times: FrameTimes) {
@@ -3988,7 +3988,7 @@ public struct HologramInfo: Equatable, Hashable {
         self.nearM = nearM
         self.farM = farM
         self.validDepth = validDepth
-        self.rung = rung
+        self.qualityLevel = qualityLevel
         self.times = times
     }
 
@@ -4016,7 +4016,7 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
                 nearM: FfiConverterOptionFloat.read(from: &buf), 
                 farM: FfiConverterOptionFloat.read(from: &buf), 
                 validDepth: FfiConverterFloat.read(from: &buf), 
-                rung: FfiConverterUInt32.read(from: &buf), 
+                qualityLevel: FfiConverterUInt32.read(from: &buf), 
                 times: FfiConverterTypeFrameTimes.read(from: &buf)
         )
     }
@@ -4030,7 +4030,7 @@ public struct FfiConverterTypeHologramInfo: FfiConverterRustBuffer {
         FfiConverterOptionFloat.write(value.nearM, into: &buf)
         FfiConverterOptionFloat.write(value.farM, into: &buf)
         FfiConverterFloat.write(value.validDepth, into: &buf)
-        FfiConverterUInt32.write(value.rung, into: &buf)
+        FfiConverterUInt32.write(value.qualityLevel, into: &buf)
         FfiConverterTypeFrameTimes.write(value.times, into: &buf)
     }
 }
@@ -4547,17 +4547,17 @@ public func FfiConverterTypePose_lower(_ value: Pose) -> RustBuffer {
 
 
 /**
- * A step on the ladder.
+ * A change of the quality level.
  */
 public struct QualityChange: Equatable, Hashable {
     /**
-     * The rung before.
+     * The quality level before.
      */
-    public var fromRung: UInt32
+    public var fromQualityLevel: UInt32
     /**
-     * The rung now; the one before where the step was refused.
+     * The quality level now; the one before where the step was refused.
      */
-    public var toRung: UInt32
+    public var toQualityLevel: UInt32
     /**
      * Why.
      */
@@ -4567,16 +4567,16 @@ public struct QualityChange: Equatable, Hashable {
     // declare one manually.
     public init(
         /**
-         * The rung before.
-         */fromRung: UInt32, 
+         * The quality level before.
+         */fromQualityLevel: UInt32, 
         /**
-         * The rung now; the one before where the step was refused.
-         */toRung: UInt32, 
+         * The quality level now; the one before where the step was refused.
+         */toQualityLevel: UInt32, 
         /**
          * Why.
          */reason: QualityReason) {
-        self.fromRung = fromRung
-        self.toRung = toRung
+        self.fromQualityLevel = fromQualityLevel
+        self.toQualityLevel = toQualityLevel
         self.reason = reason
     }
 
@@ -4596,15 +4596,15 @@ public struct FfiConverterTypeQualityChange: FfiConverterRustBuffer {
     public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> QualityChange {
         return
             try QualityChange(
-                fromRung: FfiConverterUInt32.read(from: &buf), 
-                toRung: FfiConverterUInt32.read(from: &buf), 
+                fromQualityLevel: FfiConverterUInt32.read(from: &buf), 
+                toQualityLevel: FfiConverterUInt32.read(from: &buf), 
                 reason: FfiConverterTypeQualityReason.read(from: &buf)
         )
     }
 
     public static func write(_ value: QualityChange, into buf: inout [UInt8]) {
-        FfiConverterUInt32.write(value.fromRung, into: &buf)
-        FfiConverterUInt32.write(value.toRung, into: &buf)
+        FfiConverterUInt32.write(value.fromQualityLevel, into: &buf)
+        FfiConverterUInt32.write(value.toQualityLevel, into: &buf)
         FfiConverterTypeQualityReason.write(value.reason, into: &buf)
     }
 }
@@ -4626,10 +4626,10 @@ public func FfiConverterTypeQualityChange_lower(_ value: QualityChange) -> RustB
 
 
 /**
- * One quality: a method, a resolution, and how what is shown is corrected. A hologram smaller than the modulator is
- * shown in its middle.
+ * One quality: a method, a resolution, and how the displayed image is corrected. A hologram smaller than the modulator
+ * is shown in its middle.
  */
-public struct Rung {
+public struct QualityLevel {
     /**
      * What makes the hologram.
      */
@@ -4643,11 +4643,11 @@ public struct Rung {
      */
     public var height: UInt32
     /**
-     * Local steps of this rung; none for the session's.
+     * Local steps of this quality level; none for the session's.
      */
     public var localSteps: UInt32?
     /**
-     * Steps at the midpoint of this rung; none for the session's.
+     * Steps at the midpoint of this quality level; none for the session's.
      */
     public var midpointSteps: UInt32?
 
@@ -4664,10 +4664,10 @@ public struct Rung {
          * Height of the hologram, pixels.
          */height: UInt32, 
         /**
-         * Local steps of this rung; none for the session's.
+         * Local steps of this quality level; none for the session's.
          */localSteps: UInt32? = nil, 
         /**
-         * Steps at the midpoint of this rung; none for the session's.
+         * Steps at the midpoint of this quality level; none for the session's.
          */midpointSteps: UInt32? = nil) {
         self.method = method
         self.width = width
@@ -4682,16 +4682,16 @@ public struct Rung {
 }
 
 #if compiler(>=6)
-extension Rung: Sendable {}
+extension QualityLevel: Sendable {}
 #endif
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public struct FfiConverterTypeRung: FfiConverterRustBuffer {
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> Rung {
+public struct FfiConverterTypeQualityLevel: FfiConverterRustBuffer {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> QualityLevel {
         return
-            try Rung(
+            try QualityLevel(
                 method: FfiConverterTypeMethod.read(from: &buf), 
                 width: FfiConverterUInt32.read(from: &buf), 
                 height: FfiConverterUInt32.read(from: &buf), 
@@ -4700,7 +4700,7 @@ public struct FfiConverterTypeRung: FfiConverterRustBuffer {
         )
     }
 
-    public static func write(_ value: Rung, into buf: inout [UInt8]) {
+    public static func write(_ value: QualityLevel, into buf: inout [UInt8]) {
         FfiConverterTypeMethod.write(value.method, into: &buf)
         FfiConverterUInt32.write(value.width, into: &buf)
         FfiConverterUInt32.write(value.height, into: &buf)
@@ -4713,20 +4713,20 @@ public struct FfiConverterTypeRung: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeRung_lift(_ buf: RustBuffer) throws -> Rung {
-    return try FfiConverterTypeRung.lift(buf)
+public func FfiConverterTypeQualityLevel_lift(_ buf: RustBuffer) throws -> QualityLevel {
+    return try FfiConverterTypeQualityLevel.lift(buf)
 }
 
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-public func FfiConverterTypeRung_lower(_ value: Rung) -> RustBuffer {
-    return FfiConverterTypeRung.lower(value)
+public func FfiConverterTypeQualityLevel_lower(_ value: QualityLevel) -> RustBuffer {
+    return FfiConverterTypeQualityLevel.lower(value)
 }
 
 
 /**
- * What a session makes, and how. [`session_options`] has what is usual; change what is not.
+ * What a session makes, and how. [`session_options`] gives the defaults; change what differs.
  */
 public struct SessionOptions {
     /**
@@ -4736,13 +4736,13 @@ public struct SessionOptions {
     /**
      * Quality levels, the best first: 1 to 16.
      */
-    public var ladder: [Rung]
+    public var qualityLevels: [QualityLevel]
     /**
-     * Whether the session may step on the ladder by itself.
+     * Whether the session may change its quality level by itself.
      */
     public var quality: Quality
     /**
-     * Frames a second that are aimed at; none takes frames as they come and never steps.
+     * Frames a second that are aimed at; none takes every frame and never steps.
      */
     public var targetRateHz: Double?
     /**
@@ -4757,10 +4757,10 @@ public struct SessionOptions {
      * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
      * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
      */
-    public var dark: Float?
+    public var darkThreshold: Float?
     /**
-     * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
-     * suits the encoding: 1, and 0 with a pre-filter.
+     * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+     * what suits the encoding: 1, and 0 with a pre-filter.
      */
     public var localSteps: UInt32?
     /**
@@ -4781,8 +4781,8 @@ public struct SessionOptions {
      */
     public var threads: UInt32?
     /**
-     * Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
-     * of them.
+     * Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
+     * multiple of them.
      */
     public var mostPixels: UInt64
     /**
@@ -4798,12 +4798,12 @@ public struct SessionOptions {
          */target: Target, 
         /**
          * Quality levels, the best first: 1 to 16.
-         */ladder: [Rung], 
+         */qualityLevels: [QualityLevel], 
         /**
-         * Whether the session may step on the ladder by itself.
+         * Whether the session may change its quality level by itself.
          */quality: Quality, 
         /**
-         * Frames a second that are aimed at; none takes frames as they come and never steps.
+         * Frames a second that are aimed at; none takes every frame and never steps.
          */targetRateHz: Double?, 
         /**
          * How the field becomes phases.
@@ -4814,10 +4814,10 @@ public struct SessionOptions {
         /**
          * Where the amplitude is below this share of full light, 0 to 1, phases are drawn to 0, against coloured speckle
          * in the dark; none for what suits the encoding: 0.4, and 0 with a pre-filter.
-         */dark: Float? = nil, 
+         */darkThreshold: Float? = nil, 
         /**
-         * Steps of correction, 0 to 8, each of which draws what is shown toward the field that is wanted; none for what
-         * suits the encoding: 1, and 0 with a pre-filter.
+         * Steps of correction, 0 to 8, each of which draws the displayed image toward the field that is wanted; none for
+         * what suits the encoding: 1, and 0 with a pre-filter.
          */localSteps: UInt32? = nil, 
         /**
          * Steps of correction at the midpoint, 0 to 100, each of which costs four transforms a colour: 3 for stills, 1 for
@@ -4833,19 +4833,19 @@ public struct SessionOptions {
          * Threads to compute with, at most 256; none for as many as the device has.
          */threads: UInt32?, 
         /**
-         * Most pixels of a rung and of the modulator, 8192×4096 unless it is set: what a session allocates is a multiple
-         * of them.
+         * Most pixels of a quality level and of the modulator, 8192×4096 unless it is set: what a session allocates is a
+         * multiple of them.
          */mostPixels: UInt64 = UInt64(33554432), 
         /**
          * Where frames are computed.
          */backend: Backend) {
         self.target = target
-        self.ladder = ladder
+        self.qualityLevels = qualityLevels
         self.quality = quality
         self.targetRateHz = targetRateHz
         self.encoding = encoding
         self.brightness = brightness
-        self.dark = dark
+        self.darkThreshold = darkThreshold
         self.localSteps = localSteps
         self.midpointSteps = midpointSteps
         self.depthRange = depthRange
@@ -4872,12 +4872,12 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
         return
             try SessionOptions(
                 target: FfiConverterTypeTarget.read(from: &buf), 
-                ladder: FfiConverterSequenceTypeRung.read(from: &buf), 
+                qualityLevels: FfiConverterSequenceTypeQualityLevel.read(from: &buf), 
                 quality: FfiConverterTypeQuality.read(from: &buf), 
                 targetRateHz: FfiConverterOptionDouble.read(from: &buf), 
                 encoding: FfiConverterTypeEncoding.read(from: &buf), 
                 brightness: FfiConverterTypeBrightness.read(from: &buf), 
-                dark: FfiConverterOptionFloat.read(from: &buf), 
+                darkThreshold: FfiConverterOptionFloat.read(from: &buf), 
                 localSteps: FfiConverterOptionUInt32.read(from: &buf), 
                 midpointSteps: FfiConverterUInt32.read(from: &buf), 
                 depthRange: FfiConverterTypeDepthRange.read(from: &buf), 
@@ -4890,12 +4890,12 @@ public struct FfiConverterTypeSessionOptions: FfiConverterRustBuffer {
 
     public static func write(_ value: SessionOptions, into buf: inout [UInt8]) {
         FfiConverterTypeTarget.write(value.target, into: &buf)
-        FfiConverterSequenceTypeRung.write(value.ladder, into: &buf)
+        FfiConverterSequenceTypeQualityLevel.write(value.qualityLevels, into: &buf)
         FfiConverterTypeQuality.write(value.quality, into: &buf)
         FfiConverterOptionDouble.write(value.targetRateHz, into: &buf)
         FfiConverterTypeEncoding.write(value.encoding, into: &buf)
         FfiConverterTypeBrightness.write(value.brightness, into: &buf)
-        FfiConverterOptionFloat.write(value.dark, into: &buf)
+        FfiConverterOptionFloat.write(value.darkThreshold, into: &buf)
         FfiConverterOptionUInt32.write(value.localSteps, into: &buf)
         FfiConverterUInt32.write(value.midpointSteps, into: &buf)
         FfiConverterTypeDepthRange.write(value.depthRange, into: &buf)
@@ -4967,9 +4967,9 @@ public struct Statistics: Equatable, Hashable {
      */
     public var backendWhy: String
     /**
-     * The rung of the ladder, 0 the best.
+     * The quality level, 0 the best.
      */
-    public var rung: UInt32
+    public var qualityLevel: UInt32
     /**
      * How often the listener threw.
      */
@@ -5009,8 +5009,8 @@ public struct Statistics: Equatable, Hashable {
          * Why that.
          */backendWhy: String, 
         /**
-         * The rung of the ladder, 0 the best.
-         */rung: UInt32, 
+         * The quality level, 0 the best.
+         */qualityLevel: UInt32, 
         /**
          * How often the listener threw.
          */listenerFailures: UInt64) {
@@ -5024,7 +5024,7 @@ public struct Statistics: Equatable, Hashable {
         self.times = times
         self.backend = backend
         self.backendWhy = backendWhy
-        self.rung = rung
+        self.qualityLevel = qualityLevel
         self.listenerFailures = listenerFailures
     }
 
@@ -5054,7 +5054,7 @@ public struct FfiConverterTypeStatistics: FfiConverterRustBuffer {
                 times: FfiConverterTypeFrameTimes.read(from: &buf), 
                 backend: FfiConverterString.read(from: &buf), 
                 backendWhy: FfiConverterString.read(from: &buf), 
-                rung: FfiConverterUInt32.read(from: &buf), 
+                qualityLevel: FfiConverterUInt32.read(from: &buf), 
                 listenerFailures: FfiConverterUInt64.read(from: &buf)
         )
     }
@@ -5070,7 +5070,7 @@ public struct FfiConverterTypeStatistics: FfiConverterRustBuffer {
         FfiConverterTypeFrameTimes.write(value.times, into: &buf)
         FfiConverterString.write(value.backend, into: &buf)
         FfiConverterString.write(value.backendWhy, into: &buf)
-        FfiConverterUInt32.write(value.rung, into: &buf)
+        FfiConverterUInt32.write(value.qualityLevel, into: &buf)
         FfiConverterUInt64.write(value.listenerFailures, into: &buf)
     }
 }
@@ -5176,7 +5176,7 @@ public enum Brightness: Equatable, Hashable {
     /**
      * Near the frame's largest, moving smoothly from frame to frame, so that video does not flicker.
      */
-    case steady
+    case smoothed
     /**
      * This one; what is brighter is clipped.
      */
@@ -5210,7 +5210,7 @@ public struct FfiConverterTypeBrightness: FfiConverterRustBuffer {
         let variant: Int32 = try readInt(&buf)
         switch variant {
         
-        case 1: return .steady
+        case 1: return .smoothed
         
         case 2: return .fixed(scale: try FfiConverterFloat.read(from: &buf)
         )
@@ -5225,7 +5225,7 @@ public struct FfiConverterTypeBrightness: FfiConverterRustBuffer {
         switch value {
         
         
-        case .steady:
+        case .smoothed:
             writeInt(&buf, Int32(1))
         
         
@@ -6193,10 +6193,10 @@ public enum Method {
      */
     case sweep
     /**
-     * For each frame what suits its depth: the plane sweep where it is sharp, as rendered depth is, the trained
-     * network where it is ragged, as sensors' depth is.
+     * For each frame what suits its depth: the plane sweep where it is clean, as rendered depth is, the trained
+     * network where it is noisy or incomplete, as sensors' depth is.
      */
-    case bySharpness(
+    case auto(
         /**
          * The network, for the session's display.
          */network: Network
@@ -6227,7 +6227,7 @@ public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
         
         case 2: return .sweep
         
-        case 3: return .bySharpness(network: try FfiConverterTypeNetwork.read(from: &buf)
+        case 3: return .auto(network: try FfiConverterTypeNetwork.read(from: &buf)
         )
         
         default: throw UniffiInternalError.unexpectedEnumCase
@@ -6247,7 +6247,7 @@ public struct FfiConverterTypeMethod: FfiConverterRustBuffer {
             writeInt(&buf, Int32(2))
         
         
-        case let .bySharpness(network):
+        case let .auto(network):
             writeInt(&buf, Int32(3))
             FfiConverterTypeNetwork.write(network, into: &buf)
             
@@ -6433,17 +6433,17 @@ public func FfiConverterTypePhasefrontError_lower(_ value: PhasefrontError) -> R
 public enum Quality: Equatable, Hashable {
     
     /**
-     * It steps on the ladder: down where frames take longer than the target rate allows or the device is hot, up
+     * It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
      * where there is room.
      */
     case adaptive
     /**
-     * It stays on this rung.
+     * It stays at this quality level.
      */
     case fixed(
         /**
          * 0 the best.
-         */rung: UInt32
+         */qualityLevel: UInt32
     )
 
 
@@ -6468,7 +6468,7 @@ public struct FfiConverterTypeQuality: FfiConverterRustBuffer {
         
         case 1: return .adaptive
         
-        case 2: return .fixed(rung: try FfiConverterUInt32.read(from: &buf)
+        case 2: return .fixed(qualityLevel: try FfiConverterUInt32.read(from: &buf)
         )
         
         default: throw UniffiInternalError.unexpectedEnumCase
@@ -6483,9 +6483,9 @@ public struct FfiConverterTypeQuality: FfiConverterRustBuffer {
             writeInt(&buf, Int32(1))
         
         
-        case let .fixed(rung):
+        case let .fixed(qualityLevel):
             writeInt(&buf, Int32(2))
-            FfiConverterUInt32.write(rung, into: &buf)
+            FfiConverterUInt32.write(qualityLevel, into: &buf)
             
         }
     }
@@ -6531,7 +6531,8 @@ public enum QualityReason: Equatable, Hashable {
      */
     case asked
     /**
-     * The rung that was to be taken cannot be planned: the session stays where it was, and does not try it again.
+     * The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
+     * again.
      */
     case refused
     /**
@@ -6729,13 +6730,13 @@ public enum RunningMode: Equatable, Hashable {
      */
     case image
     /**
-     * Each frame is answered; depth and brightness are steadied from one to the next. Timestamps must rise.
+     * Each frame is answered; depth and brightness are smoothed over time. Timestamps must rise.
      */
     case video
     /**
      * Frames are submitted without waiting, and the listener hears what becomes of them. Timestamps must rise.
      */
-    case liveStream
+    case live
 
 
 
@@ -6761,7 +6762,7 @@ public struct FfiConverterTypeRunningMode: FfiConverterRustBuffer {
         
         case 2: return .video
         
-        case 3: return .liveStream
+        case 3: return .live
         
         default: throw UniffiInternalError.unexpectedEnumCase
         }
@@ -6779,7 +6780,7 @@ public struct FfiConverterTypeRunningMode: FfiConverterRustBuffer {
             writeInt(&buf, Int32(2))
         
         
-        case .liveStream:
+        case .live:
             writeInt(&buf, Int32(3))
         
         }
@@ -6818,7 +6819,7 @@ public enum Stage: Equatable, Hashable {
      */
     case colour
     /**
-     * Depth: read, aligned, steadied, refined.
+     * Depth: read, aligned, smoothed over time, refined.
      */
     case depth
     /**
@@ -6842,7 +6843,7 @@ public enum Stage: Equatable, Hashable {
      */
     case gpu
     /**
-     * Plans and memory of a rung are made.
+     * Plans and memory of a quality level are made.
      */
     case plan
     /**
@@ -6965,7 +6966,7 @@ public func FfiConverterTypeStage_lower(_ value: Stage) -> RustBuffer {
 public enum Thermal: Equatable, Hashable {
     
     /**
-     * Nothing to heed.
+     * Not warm: nothing is limited.
      */
     case nominal
     /**
@@ -6977,7 +6978,7 @@ public enum Thermal: Equatable, Hashable {
      */
     case serious
     /**
-     * Too hot: the lowest rung.
+     * Too hot: the lowest quality level.
      */
     case critical
 
@@ -7444,23 +7445,23 @@ fileprivate struct FfiConverterSequenceTypePlaneInfo: FfiConverterRustBuffer {
 #if swift(>=5.8)
 @_documentation(visibility: private)
 #endif
-fileprivate struct FfiConverterSequenceTypeRung: FfiConverterRustBuffer {
-    typealias SwiftType = [Rung]
+fileprivate struct FfiConverterSequenceTypeQualityLevel: FfiConverterRustBuffer {
+    typealias SwiftType = [QualityLevel]
 
-    public static func write(_ value: [Rung], into buf: inout [UInt8]) {
+    public static func write(_ value: [QualityLevel], into buf: inout [UInt8]) {
         let len = Int32(value.count)
         writeInt(&buf, len)
         for item in value {
-            FfiConverterTypeRung.write(item, into: &buf)
+            FfiConverterTypeQualityLevel.write(item, into: &buf)
         }
     }
 
-    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [Rung] {
+    public static func read(from buf: inout (data: Data, offset: Data.Index)) throws -> [QualityLevel] {
         let len: Int32 = try readInt(&buf)
-        var seq = [Rung]()
+        var seq = [QualityLevel]()
         seq.reserveCapacity(Int(len))
         for _ in 0 ..< len {
-            seq.append(try FfiConverterTypeRung.read(from: &buf))
+            seq.append(try FfiConverterTypeQualityLevel.read(from: &buf))
         }
         return seq
     }
@@ -7505,7 +7506,7 @@ public func setLogListener(level: LogLevel, listener: LogListener?)throws   {try
 }
 }
 /**
- * The pair in int8 that comes along for a modulator at `offset_mm` and the default display's pitch, colours and
+ * The pair in int8 that is bundled for a modulator at `offset_mm` and the default display's pitch, colours and
  * volume.
  *
  * # Errors
@@ -7520,9 +7521,9 @@ public func builtInPair(offsetMm: Double)throws  -> DeepPair  {
 })
 }
 /**
- * What is usual for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
+ * The default options for `target`: holograms of its modulator's resolution by `method` and AA-DPM with one step of
  * correction, or, without a method, by the network that is built in, by the plane sweep where it was not trained for
- * the display; steady brightness, near and far by percentiles.
+ * the display; smoothed brightness, near and far by percentiles.
  */
 public func sessionOptions(target: Target, method: Method? = nil)throws  -> SessionOptions  {
     return try  FfiConverterTypeSessionOptions_lift(try rustCallWithError(FfiConverterTypePhasefrontError_lift) {
@@ -7572,10 +7573,10 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_func_set_log_listener() != 56383) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 58806) {
+    if (uniffi_phasefront_ffi_checksum_func_built_in_pair() != 38623) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_func_session_options() != 35800) {
+    if (uniffi_phasefront_ffi_checksum_func_session_options() != 39129) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_func_set_stage_listener() != 45085) {
@@ -7662,7 +7663,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_resume() != 10084) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_quality() != 14663) {
+    if (uniffi_phasefront_ffi_checksum_method_rawsession_set_quality() != 859) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_rawsession_set_thermal() != 56019) {
@@ -7680,7 +7681,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_rawsession_warm_up() != 47343) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_hologram() != 31692) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_processed() != 15891) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_dropped() != 43842) {
@@ -7689,7 +7690,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_failed() != 55596) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 25946) {
+    if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_quality_changed() != 42183) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_method_sessionlistener_on_closed() != 29025) {
@@ -7704,7 +7705,7 @@ private let initializationResult: InitializationResult = {
     if (uniffi_phasefront_ffi_checksum_method_stagelistener_on_end() != 57660) {
         return InitializationResult.apiChecksumMismatch
     }
-    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 35155) {
+    if (uniffi_phasefront_ffi_checksum_constructor_network_built_in() != 39057) {
         return InitializationResult.apiChecksumMismatch
     }
     if (uniffi_phasefront_ffi_checksum_constructor_network_from_bytes() != 39143) {
