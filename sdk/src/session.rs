@@ -12,6 +12,7 @@ mod brightness;
 mod computing;
 mod engine;
 mod event;
+mod frame_io;
 mod handle;
 mod hologram;
 mod live;

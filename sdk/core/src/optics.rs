@@ -9,4 +9,5 @@ pub mod aperture;
 pub mod asm;
 pub mod fft;
 pub mod reference;
+pub mod sub_hologram;
 pub mod zernike;

@@ -7,6 +7,7 @@ mod filter;
 mod local;
 mod mean_phase;
 mod midpoint;
+mod shared;
 
 pub(super) use mean_phase::MeanPhase;
 
@@ -14,12 +15,13 @@ use super::brightness::Smoother;
 use super::chain::ChainOptions;
 use super::device::Device;
 use super::{GpuError, Result};
-use double_phase::{DoublePhase, Shared};
+use double_phase::DoublePhase;
 use filter::Filter;
 use phasefront_core::display::response::Response;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::EncoderOptions;
 use phasefront_core::encode::brightness::{Brightness, Past};
+use shared::Shared;
 
 /// Columns of a workgroup.
 const COLUMNS: usize = 64;

@@ -10,8 +10,8 @@ pub use frame::{Colour, ColourData, Depth, DepthData, Frame};
 pub(super) use source::Source;
 
 use super::Result;
-use super::chain::{GROUP, Numbers};
 use super::device::{Device, Dispatch};
+use super::numbers::{GROUP, Numbers};
 use phasefront_core::method::network::chain::Chain;
 use source::{Frames, Reader};
 

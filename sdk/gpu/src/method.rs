@@ -1,8 +1,9 @@
 //! From a frame as it comes to the hologram's field, on the GPU: the twin of [`phasefront_core::method`].
 
-use super::chain::{ChainOptions, ChainPlan, End, Numbers};
+use super::chain::{ChainOptions, ChainPlan, End};
 use super::device::Device;
 use super::input::{Colour, Depth, Form, Frame, Packer, Source};
+use super::numbers::Numbers;
 use super::sweep::Sweeper;
 use super::{GpuError, Result};
 use phasefront_core::display::Display;

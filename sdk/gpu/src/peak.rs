@@ -1,8 +1,8 @@
 //! What a device can do at its best, measured: the yardstick of the benchmark.
 
 use super::Result;
-use super::chain::Numbers;
 use super::device::{Device, Dispatch};
+use super::numbers::Numbers;
 use std::time::Instant;
 
 /// Bytes that are copied.

@@ -4,7 +4,8 @@
 //! hidden layer yields `max(sum + bias, 0)`, plus the skip's value where there is one. Instruction sets differ in
 //! whether products are fused into sums, so they agree to rounding and not to the bit.
 
-use crate::wavefront::{self, Chain, Geometry, Rows, Scratch, SourceRow, Tiling, Window};
+use crate::rows::Rows;
+use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
 
 /// One layer.
@@ -58,13 +59,13 @@ fn kernels(isa: Isa) -> Option<Kernels> {
     match isa {
         Isa::Portable => Some(crate::portable::F32),
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx512 => crate::avx512::kernels(),
+        Isa::Avx512 => crate::x86::avx512::kernels(),
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => crate::avx2::f32_kernels(),
+        Isa::Avx2 => crate::x86::avx2::f32_kernels(),
         #[cfg(target_arch = "aarch64")]
-        Isa::Neon => Some(crate::neon::KERNELS),
+        Isa::Neon => Some(crate::arm::neon::KERNELS),
         #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => Some(crate::simd128::F32),
+        Isa::Simd128 => Some(crate::wasm::simd128::F32),
         _ => None,
     }
 }

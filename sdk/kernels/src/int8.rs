@@ -15,7 +15,8 @@
 //! A row is grouped by four channels: `[channel/4][pixel][4]`. The concatenated network input starts a group of its
 //! own.
 
-use crate::wavefront::{self, Chain, Geometry, Rows, Scratch, SourceRow, Tiling, Window};
+use crate::rows::Rows;
+use crate::wavefront::{self, Chain, Geometry, Scratch, SourceRow, Tiling, Window};
 use crate::{Isa, OUTPUTS};
 
 /// Channels that lie together.
@@ -223,17 +224,17 @@ fn kernels(isa: Isa) -> Option<Kernels> {
     match isa {
         Isa::Portable => Some(crate::portable::INT8),
         #[cfg(target_arch = "x86_64")]
-        Isa::Amx => crate::amx::kernels(),
+        Isa::Amx => crate::x86::amx::kernels(),
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx512Vnni => crate::avx512_vnni::kernels(),
+        Isa::Avx512Vnni => crate::x86::avx512_vnni::kernels(),
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => crate::avx2::int8_kernels(),
+        Isa::Avx2 => crate::x86::avx2::int8_kernels(),
         #[cfg(target_arch = "aarch64")]
-        Isa::NeonDotprod => crate::neon_dotprod::kernels(),
+        Isa::NeonDotprod => crate::arm::neon_dotprod::kernels(),
         #[cfg(target_arch = "aarch64")]
-        Isa::NeonI8mm => crate::neon_i8mm::kernels(),
+        Isa::NeonI8mm => crate::arm::neon_i8mm::kernels(),
         #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-        Isa::Simd128 => Some(crate::simd128::INT8),
+        Isa::Simd128 => Some(crate::wasm::simd128::INT8),
         _ => None,
     }
 }

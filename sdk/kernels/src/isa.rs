@@ -47,7 +47,7 @@ impl Isa {
         {
             let avx512 = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512bw");
             let vnni = avx512 && is_x86_feature_detected!("avx512vnni");
-            if vnni && crate::amx::available() {
+            if vnni && crate::x86::amx::available() {
                 found.push(Isa::Amx);
             }
             if vnni {

@@ -23,38 +23,28 @@ mod isa;
 #[cfg(feature = "peak")]
 mod peak;
 mod places;
+mod rows;
 mod tiles;
 mod wavefront;
 mod wide;
 
 mod portable;
 
-#[cfg(target_arch = "x86_64")]
-mod amx;
-#[cfg(target_arch = "x86_64")]
-mod avx2;
-#[cfg(target_arch = "x86_64")]
-mod avx512;
-#[cfg(target_arch = "x86_64")]
-mod avx512_vnni;
-
 #[cfg(target_arch = "aarch64")]
-mod neon;
-#[cfg(target_arch = "aarch64")]
-mod neon_dotprod;
-#[cfg(target_arch = "aarch64")]
-mod neon_i8mm;
-
+mod arm;
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
-mod simd128;
+mod wasm;
 
+#[cfg(target_arch = "x86_64")]
+mod x86;
 pub use f32::{F32Chain, F32Layer};
 pub use int8::{Int8Chain, Int8Layer, Quantiser, Requantise, SkipSum};
 pub use isa::Isa;
 #[cfg(feature = "peak")]
 pub use peak::{f32_peak, int8_peak};
+pub use rows::{Band, Rows};
 pub use tiles::{TILE, TILE_VALUES, TileRows, each_tile_rows};
-pub use wavefront::{Band, Rows, Scratch, Tiling};
+pub use wavefront::{Scratch, Tiling};
 pub use wide::{has_avx2, has_avx512, in_avx2, in_avx512};
 
 /// Planes of a hologram network's output: two a colour.

@@ -59,14 +59,14 @@ burn!(avx512_vnni, "avx512f,avx512bw,avx512vnni", zmm_reg "/* {0} */", 24 x 64, 
 burn!(neon, "neon", vreg "/* {0:v} */", 24 x 4, vdupq_n_f32(0.0), |sum, x| vfmaq_f32(sum, x, x));
 #[cfg(target_arch = "aarch64")]
 burn!(neon_dotprod, "neon,dotprod", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
-    |sum, x| crate::neon_dotprod::dot::<0>(sum, vreinterpretq_s8_s32(x), vreinterpretq_s8_s32(x)));
+    |sum, x| crate::arm::neon_dotprod::dot::<0>(sum, vreinterpretq_s8_s32(x), vreinterpretq_s8_s32(x)));
 #[cfg(target_arch = "aarch64")]
 burn!(neon_i8mm, "neon,i8mm", vreg "/* {0:v} */", 24 x 16, vdupq_n_s32(0),
-    |sum, x| crate::neon_i8mm::dot::<0>(sum, vreinterpretq_u8_s32(x), vreinterpretq_s8_s32(x)));
+    |sum, x| crate::arm::neon_i8mm::dot::<0>(sum, vreinterpretq_u8_s32(x), vreinterpretq_s8_s32(x)));
 
 #[cfg(target_arch = "x86_64")]
 fn amx(rounds: u64) -> u64 {
-    use crate::amx::{CONFIG, TILE};
+    use crate::x86::amx::{CONFIG, TILE};
     // SAFETY: the caller has found AMX; tiles are this thread's own until they are released.
     unsafe {
         asm!("ldtilecfg [{}]", "tilezero tmm0", "tilezero tmm1", "tilezero tmm4", "tilezero tmm6", "tilezero tmm7",

@@ -6,7 +6,7 @@
 //! repeated.
 
 use crate::OUTPUTS;
-use crate::wavefront::{Band, Rows, grown};
+use crate::rows::{Band, Rows, grown};
 
 /// The places of a frame.
 #[derive(Debug, Clone, Copy)]

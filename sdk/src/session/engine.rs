@@ -3,43 +3,14 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
+use super::frame_io::{Encoded, FrameInput, LevelsOut};
 use super::on_cpu::OnCpu;
 #[cfg(feature = "gpu")]
 use super::on_gpu::{Failure, OnGpu};
 use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
-use phasefront_core::depth::camera::CameraFrame;
-use phasefront_core::frame::RgbdFrame;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
-use std::time::Duration;
-
-/// A frame that is ready to become a hologram.
-pub(super) struct FrameInput<'a> {
-    /// None for a frame that comes from no camera. The GPU reads it itself.
-    #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
-    pub(super) camera: Option<&'a CameraFrame<'a>>,
-    /// Its colour and depth at the hologram's resolution.
-    pub(super) rgbd: &'a RgbdFrame,
-    /// How long after the frame before, where that one counts.
-    pub(super) elapsed: Option<Duration>,
-}
-
-/// Where levels go, (C, H, W).
-pub(super) struct LevelsOut<'a> {
-    pub(super) levels: &'a mut [u8],
-    /// Of a display of over 8 bits.
-    pub(super) words: Option<&'a mut [u16]>,
-}
-
-/// What became of a frame.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Encoded {
-    pub(super) scale: f32,
-    pub(super) method: Duration,
-    pub(super) propagate: Duration,
-    pub(super) encode: Duration,
-}
 
 /// What a session knows of its GPU: quality levels share the device, and none of them tries one again that is of no
 /// use.

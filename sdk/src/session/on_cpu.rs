@@ -1,7 +1,7 @@
 //! A quality level on the CPU: from amplitudes and depth to levels.
 
 use super::SessionOptions;
-use super::engine::{Encoded, LevelsOut};
+use super::frame_io::{Encoded, LevelsOut};
 use super::quality::QualityLevel;
 use super::statistics::BackendReport;
 use num_complex::Complex32;

@@ -2,7 +2,7 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
-use super::engine::{Encoded, FrameInput};
+use super::frame_io::{Encoded, FrameInput};
 use super::quality::QualityLevel;
 use super::statistics::BackendReport;
 use phasefront_core::runtime::error::Error;

@@ -2,7 +2,8 @@
 
 use super::SessionOptions;
 use super::brightness::BrightnessTracker;
-use super::engine::{Engine, FrameInput, GpuState, LevelContext, LevelsOut};
+use super::engine::{Engine, GpuState, LevelContext};
+use super::frame_io::{FrameInput, LevelsOut};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::live::guarded;
 use super::on_cpu::OnCpu;

@@ -10,21 +10,8 @@
 //!
 //! A coefficient is that of the *correction*: what makes the wave come to a tight focus. The aberration of
 //! the display has the other sign. Beyond ρ = 1 the polynomials go on, as a lens does.
-//!
-//! # Sub-holograms and the corrected transfer function
-//! The paper puts the terms on the sub-hologram φ⁰ that focuses a plane wave to the distance d (Eq. 19), takes it
-//! to its focus, and calls the Fourier transform of what it finds there Φ. The light that leaves the
-//! sub-hologram at (x, y) arrives with the frequency −(x, y)/(λd), so its pupil is ours, turned by π where
-//! d > 0. As its aperture grows Φ becomes exp(i·terms), [`Aberration::phase`]: that is what is used,
-//! for every d, 0 included, where a sub-hologram has no size; and |Φ| is 1 where diffraction at the rim of
-//! a sub-hologram ripples it. [`sub_hologram`] and [`corrected_transfer_function`] are the paper's way: the
-//! one for captures of a focused spot, the other as the oracle.
 
-use super::asm::{Padding, Propagator};
-use super::reference;
 use crate::runtime::error::{Error, Result};
-use ndarray::Array2;
-use num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
 
 /// The names of the five terms.
@@ -183,100 +170,12 @@ impl Aberrations {
     }
 }
 
-/// How far from its centre a sub-hologram reaches that focuses to `distance_m`, metres: |d|·tan(asin(λ/2p)).
-pub fn sub_hologram_radius_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
-    super::asm::reach_m(distance_m, wavelength_m, pitch_m)
-}
-
-/// The corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of (`height`, `width`) pixels: amplitude 1 in its
-/// circle, where it bends a plane wave to a focus at the signed `distance_m` (positive toward the viewer),
-/// with the correction `a` on it; 0 outside.
-///
-/// # Errors
-/// A distance of 0 or one that is not finite, or an aperture that does not fit into the plane.
-pub fn sub_hologram(
-    height: usize,
-    width: usize,
-    pitch_m: f64,
-    wavelength_m: f64,
-    distance_m: f64,
-    a: &Coefficients,
-) -> Result<Vec<Complex32>> {
-    let radius_m = sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
-    let pixels = radius_m / pitch_m;
-    if !(pixels >= 1.0 && 2.0 * pixels <= height.min(width) as f64) {
-        return Err(Error::Plan(format!(
-            "a focus at {:.3} mm from the modulator needs a sub-hologram {:.0} pixels wide; the plane is {width}×{height}, and at least 2 are needed",
-            distance_m * 1e3,
-            2.0 * pixels
-        )));
-    }
-    let centre = |n: usize| ((n - 1) / 2) as f64;
-    let mut plane = Vec::with_capacity(height * width);
-    for y in 0..height {
-        for x in 0..width {
-            let (x, y) = (x as f64 - centre(width), y as f64 - centre(height));
-            let square = (x * x + y * y) * pitch_m * pitch_m;
-            if square > radius_m * radius_m {
-                plane.push(Complex32::ZERO);
-                continue;
-            }
-            // The conjugate of the wave that a point at the focus would send here.
-            let path = square / (distance_m.abs() + (distance_m * distance_m + square).sqrt());
-            let lens = -2.0 * PI / wavelength_m * path * distance_m.signum();
-            let side = -distance_m.signum() / pixels;
-            let phase = lens + terms(a, side * x, side * y);
-            plane.push(Complex32::new(phase.cos() as f32, phase.sin() as f32));
-        }
-    }
-    Ok(plane)
-}
-
-/// Φ_d = F(ASM(φ_d, d)), the paper's way, (H, W), frequencies in the order of the discrete Fourier transform and phases
-/// against the centre of the sub-hologram; scaled so that the uncorrected one has a mean magnitude of 1 over
-/// half the pupil. Naive sums: for small planes.
-///
-/// # Errors
-/// As [`sub_hologram`].
-pub fn corrected_transfer_function(
-    height: usize,
-    width: usize,
-    pitch_m: f64,
-    wavelength_m: f64,
-    distance_m: f64,
-    a: &Coefficients,
-) -> Result<Array2<Complex64>> {
-    let spectrum = |a: &Coefficients| -> Result<Array2<Complex64>> {
-        let mut plane = sub_hologram(height, width, pitch_m, wavelength_m, distance_m, a)?;
-        let padding = Padding::Reach;
-        let plan = Propagator::new(height, width, pitch_m, wavelength_m, distance_m, padding)?;
-        plan.propagate(&mut plane, &mut plan.scratch());
-        // The centre comes to the corner, so that Φ says nothing of where the sub-hologram stood.
-        let (cy, cx) = ((height - 1) / 2, (width - 1) / 2);
-        let spot = Array2::from_shape_fn((height, width), |(y, x)| {
-            let v = plane[(y + cy) % height * width + (x + cx) % width];
-            Complex64::new(v.re.into(), v.im.into())
-        });
-        Ok(reference::dft(&spot, -1.0))
-    };
-    let ideal = spectrum(&[0.0; 5])?;
-    let frequency = |k: usize, n: usize| k.min(n - k) as f64 / n as f64;
-    let inner = ideal.indexed_iter().filter(|((ky, kx), _)| {
-        let (fx, fy) = (frequency(*kx, width), frequency(*ky, height));
-        fx * fx + fy * fy < 0.25 * 0.25
-    });
-    let (sum, count) = inner.fold((Complex64::ZERO, 0), |(sum, n), (_, v)| (sum + v, n + 1));
-    // A converging wave is also turned by a constant, which is no aberration.
-    Ok(spectrum(a)? / (sum / f64::from(count)))
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
     const PITCH: f64 = 8e-6;
-    const GREEN: f64 = 520e-9;
 
     #[test]
     fn the_terms_are_those_of_equations_14_to_18() {
@@ -334,41 +233,6 @@ mod tests {
                     }
                 }
             }
-        }
-    }
-
-    /// The paper's Φ of a sub-hologram has the phase that is used, before and behind the modulator.
-    #[test]
-    fn the_sub_hologram_has_the_transfer_function() {
-        let n = 128;
-        let a = [0.6, -0.8, 0.5, 0.7, -0.4];
-        let aberration = Aberration::new([a; 3]).unwrap();
-        for distance in [14e-3, -14e-3] {
-            let literal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &a).unwrap();
-            let ideal = corrected_transfer_function(n, n, PITCH, GREEN, distance, &[0.0; 5]).unwrap();
-            let (mut square, mut count) = (0.0, 0.0);
-            for ((ky, kx), value) in literal.indexed_iter() {
-                let signed = |k: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
-                let (fx, fy) = (signed(kx), signed(ky));
-                if fx.hypot(fy) > 0.4 {
-                    continue;
-                }
-                let expected = aberration.phase(1, fx / PITCH, fy / PITCH, PITCH);
-                // Against the uncorrected one: rim and lens are alike in both.
-                let apart = (value / ideal[(ky, kx)] * Complex64::from_polar(1.0, -expected)).arg();
-                square += apart * apart;
-                count += 1.0;
-            }
-            let rms = (square / count).sqrt();
-            assert!(rms < 0.12, "{distance}: {rms} rad");
-        }
-    }
-
-    #[test]
-    fn sub_holograms_that_cannot_be_are_named() {
-        for distance in [0.0, f64::NAN, 1.0] {
-            let e = sub_hologram(64, 64, PITCH, GREEN, distance, &[0.0; 5]).unwrap_err();
-            assert!(e.to_string().contains("sub-hologram"), "{e}");
         }
     }
 }

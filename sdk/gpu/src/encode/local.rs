@@ -1,8 +1,8 @@
 //! Correction: one dispatch for the start, one for each local step, and steps at the midpoint behind them. The last
 //! writes levels. The twin of [`phasefront_core::encode::local`].
 
-use super::double_phase::Shared;
 use super::midpoint::Midpoint;
+use super::shared::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Device, Dispatch};

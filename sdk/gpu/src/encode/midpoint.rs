@@ -1,7 +1,7 @@
 //! Steps at the midpoint: two convolutions a step, each with a dispatch behind it. The twin of
 //! [`phasefront_core::encode::midpoint`].
 
-use super::double_phase::Shared;
+use super::shared::Shared;
 use super::{COLUMNS, EncoderJob, LevelsBuffers};
 use crate::Result;
 use crate::device::{Constants, Device, Dispatch};

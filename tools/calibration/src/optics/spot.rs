@@ -13,6 +13,7 @@ use ndarray::Array2;
 use num_complex::Complex32;
 use phasefront::{Display, Target};
 use phasefront_core::encode::double_phase;
+use phasefront_core::optics::sub_hologram;
 use phasefront_core::optics::zernike::{self, Coefficients, TERMS};
 use phasefront_io::dice::Dice;
 use phasefront_io::{Error, Result};
@@ -124,10 +125,10 @@ pub fn levels(target: &Target, colour: usize, z_m: f64, place: [f64; 2], a: &Coe
     let (height, width) = (display.height(), display.width());
     let (pitch_m, wavelength_m) = (display.pitch_m(), display.wavelengths_m()[colour]);
     let distance_m = z_m - display.offset_m();
-    let radius_m = zernike::sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
+    let radius_m = sub_hologram::sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
     let radius = (radius_m / pitch_m).ceil().min(65536.0) as usize;
     let side = 2 * radius + 1;
-    let part = zernike::sub_hologram(side, side, pitch_m, wavelength_m, distance_m, a)?;
+    let part = sub_hologram::sub_hologram(side, side, pitch_m, wavelength_m, distance_m, a)?;
     let corner = |at: f64, n: usize| ((at * n as f64) as usize).checked_sub(radius);
     let (Some(left), Some(top)) = (corner(place[0], width), corner(place[1], height)) else {
         return Err(outside(place, side, (width, height)));
@@ -216,7 +217,7 @@ fn brightest(photograph: &Photograph) -> (usize, usize) {
 pub fn exposure(display: &Display, colour: usize, z_m: f64) -> f64 {
     let distance_m = z_m - display.offset_m();
     let wavelength_m = display.wavelengths_m()[colour];
-    let radius_m = zernike::sub_hologram_radius_m(distance_m, wavelength_m, display.pitch_m());
+    let radius_m = sub_hologram::sub_hologram_radius_m(distance_m, wavelength_m, display.pitch_m());
     let gain = std::f64::consts::PI * radius_m * radius_m / (wavelength_m * distance_m.abs());
     0.7 / (gain * gain).max(1.0)
 }

@@ -2,9 +2,9 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
-use crate::avx2::{quantise_row, rescale_row};
 use crate::int8::{GROUP, Kernels, Packed, SkipSum, Taps};
 use crate::wavefront::{BLOCK, Geometry, MARGIN, Window, last_row_by_blocks};
+use crate::x86::avx2::{quantise_row, rescale_row};
 use std::arch::x86_64::*;
 
 /// The kernels, where the processor has what they need.

@@ -3,8 +3,8 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
+use crate::arm::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, requantise, store};
 use crate::int8::{GROUP, Kernels, Packed, quantise_row, rescale_row};
-use crate::neon::{BLOCKS, Constants, Dots, FILTERS, SPAN, int8_kernels, pack, requantise, store};
 use crate::wavefront::{BLOCK, Geometry, Window, last_row_by_blocks};
 use std::arch::aarch64::*;
 use std::arch::asm;

@@ -10,10 +10,10 @@
 #![allow(unsafe_code)]
 
 use crate::OUTPUTS;
-use crate::avx2::{quantise_row, rescale_row};
-use crate::avx512_vnni::{self, check_rows, requantise};
 use crate::int8::{GROUP, Kernels, Packed, Taps};
 use crate::wavefront::{BLOCK, Geometry, Window};
+use crate::x86::avx2::{quantise_row, rescale_row};
+use crate::x86::avx512_vnni::{self, check_rows, requantise};
 use std::arch::asm;
 use std::arch::x86_64::*;
 use std::cell::RefCell;
