@@ -5,18 +5,10 @@ mod sync {
     pub(super) use shuttle::thread::{Builder, JoinHandle};
     pub(super) use shuttle::thread_local;
 }
-mod event {
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub enum DropReason {
-        Superseded,
-        AboveTargetRate,
-        Paused,
-        Reset,
-        Closed,
-    }
-}
 #[path = "../../sdk/src/session/computing.rs"]
 mod computing;
+#[path = "../../sdk/src/session/drop_reason.rs"]
+mod drop_reason;
 #[path = "../../sdk/src/session/live.rs"]
 mod live;
 #[path = "../../sdk/src/session/process_id.rs"]

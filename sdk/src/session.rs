@@ -10,6 +10,7 @@
 
 mod brightness;
 mod computing;
+mod drop_reason;
 mod engine;
 mod event;
 mod frame_io;
@@ -25,12 +26,14 @@ mod owned_frame;
 mod process_id;
 mod quality;
 mod queue;
+mod shared;
 mod stages;
 mod statistics;
 mod sync;
 mod threads;
 
-pub use event::{DropReason, Event};
+pub use drop_reason::DropReason;
+pub use event::Event;
 pub use handle::SessionHandle;
 pub use hologram::Hologram;
 #[cfg(feature = "gpu")]
@@ -41,13 +44,14 @@ pub use phasefront_gpu::{Device, DeviceOptions};
 pub use quality::{Backend, Quality, QualityChange, QualityLevel, QualityReason, Thermal};
 pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
 
-use handle::{Frames, Shared};
+use handle::Frames;
 use live::{Live, guarded, lock};
 use live_work::{LiveWork, tell};
 use owned_frame::OwnedFrame;
 use phasefront_core::depth::camera::CameraFrame;
 use phasefront_core::runtime::error::{Error, Result};
 use queue::Gate;
+use shared::Shared;
 use stages::Stages;
 use std::fmt::{Debug, Formatter};
 use std::ops::Deref;

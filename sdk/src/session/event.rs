@@ -1,24 +1,9 @@
 //! What a live session tells its listener.
 
+use super::drop_reason::DropReason;
 use super::hologram::Hologram;
 use super::quality::QualityChange;
 use phasefront_core::runtime::error::Error;
-
-/// Why a frame was not made into a hologram, without fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum DropReason {
-    /// A newer frame came while it waited.
-    Superseded,
-    /// It came sooner than the target rate asks for.
-    AboveTargetRate,
-    /// The session was paused.
-    Paused,
-    /// The session was reset before it was done.
-    Reset,
-    /// The session was closed before it was done.
-    Closed,
-}
 
 /// One thing that happened in a live session. Events come one after another, on the session's own thread, in the
 /// order in which things happened. While the listener is busy no frame is processed.

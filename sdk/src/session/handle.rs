@@ -5,18 +5,14 @@ use super::live::{Live, guarded, lock};
 use super::live_work::LiveWork;
 #[cfg(doc)]
 use super::on_gpu::GpuOptions;
-use super::options::SessionOptions;
-use super::process_id::ProcessId;
 use super::quality::{Quality, Thermal};
 use super::queue::{self, Gate, Queue};
-use super::stages::{FrameResult, Stages};
-use super::statistics::{Recent, Statistics};
-use phasefront_core::depth::camera::CameraFrame;
-use phasefront_core::runtime::cancel::Cancel;
-use phasefront_core::runtime::clock::Instant;
+use super::shared::Shared;
+use super::stages::Stages;
+use super::statistics::Statistics;
 use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
-use std::sync::{Arc, Mutex, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex};
 
 /// Controls a session: every kind of session dereferences to it. A clone controls the same session from any thread, a
 /// listener's too. It does not keep the session open: a session closes when it is dropped, whatever handles there are.
@@ -33,83 +29,6 @@ pub(super) enum Frames {
     Answered(Arc<Mutex<Gate>>),
     /// A thread takes them from a queue.
     Live(Arc<Live<LiveWork>>),
-}
-
-/// What callers and the session's thread share.
-pub(super) struct Shared {
-    pub(super) process: ProcessId,
-    /// None when the session has ended: its memory went back.
-    pub(super) stages: Mutex<Option<Stages>>,
-    control: Mutex<Control>,
-    pub(super) recent: Mutex<Recent>,
-    pub(super) cancel: Cancel,
-}
-
-/// What the caller may change while a session runs.
-#[derive(Debug, Clone, Copy)]
-struct Control {
-    /// How many quality levels there are.
-    quality_levels: usize,
-    quality: Quality,
-    thermal: Thermal,
-}
-
-impl Shared {
-    /// # Errors
-    /// Options that cannot be meant or planned for, or threads that cannot be started.
-    pub(super) fn new(options: SessionOptions) -> Result<Arc<Self>> {
-        options.check()?;
-        let control = Control {
-            quality_levels: options.quality_levels.len(),
-            quality: options.quality,
-            thermal: Thermal::Nominal,
-        };
-        let cancel = Cancel::default();
-        let mut stages = Stages::new(options, cancel.clone())?;
-        let recent = Recent::new(stages.new_report().unwrap_or_default(), stages.quality_level());
-        Ok(Arc::new(Shared {
-            process: ProcessId::current(),
-            stages: Mutex::new(Some(stages)),
-            control: Mutex::new(control),
-            recent: Mutex::new(recent),
-            cancel,
-        }))
-    }
-
-    pub(super) fn process(&self, stages: &mut Stages, frame: &CameraFrame<'_>, past: bool) -> Result<FrameResult> {
-        let Control { quality, thermal, .. } = *lock(&self.control);
-        let made = stages.process(frame, past, thermal, quality)?;
-        let mut recent = lock(&self.recent);
-        recent.push(Instant::now(), made.hologram.times());
-        recent.quality_level = stages.quality_level();
-        if let Some(backend) = stages.new_report() {
-            recent.backend = backend;
-        }
-        Ok(made)
-    }
-
-    pub(super) fn recover(&self) {
-        let _computing = Computing::begin();
-        if let Some(stages) = &mut *lock(&self.stages) {
-            stages.recover();
-        }
-    }
-
-    /// Gives back all memory but the statistics'; waits for a frame that is being processed, but not on a thread that
-    /// computes: whoever processes it does this when the frame is done.
-    pub(super) fn end(&self) {
-        let stages = if computing::here() {
-            match self.stages.try_lock() {
-                Ok(mut stages) => stages.take(),
-                Err(TryLockError::Poisoned(stages)) => PoisonError::into_inner(stages).take(),
-                Err(TryLockError::WouldBlock) => None,
-            }
-        } else {
-            lock(&self.stages).take()
-        };
-        // Not under the lock: what is logged meanwhile may come back here.
-        drop(stages);
-    }
 }
 
 impl SessionHandle {

@@ -2,7 +2,7 @@
 //! is not known here.
 
 use super::computing;
-use super::event::DropReason;
+use super::drop_reason::DropReason;
 use super::process_id::ProcessId;
 use super::queue::{Queue, Ticket};
 use super::sync::{Arc, Builder, Condvar, JoinHandle, Mutex, MutexGuard, thread_local};

@@ -2,10 +2,10 @@
 
 use super::computing::Computing;
 use super::event::Event;
-use super::handle::Shared;
 use super::live::{Report, Work, lock};
 use super::owned_frame::OwnedFrame;
 use super::queue;
+use super::shared::Shared;
 use super::stages::FrameResult;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;

@@ -1,7 +1,7 @@
 //! Which frame is next: one in flight, the newest waiting, the others dropped with a reason. A state machine without
 //! threads; [`super::live`] runs it, and its tests run it through every order of events.
 
-use super::event::DropReason;
+use super::drop_reason::DropReason;
 use super::statistics::Counts;
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::{Error, Result};

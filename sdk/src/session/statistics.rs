@@ -1,6 +1,6 @@
 //! What a session has done so far, and how fast.
 
-use super::event::DropReason;
+use super::drop_reason::DropReason;
 use phasefront_core::runtime::clock::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;

@@ -17,6 +17,7 @@ mod ground;
 mod model;
 mod natural;
 mod obj_file;
+mod part;
 mod parts;
 pub mod pattern;
 mod peel;
@@ -32,8 +33,9 @@ mod varied;
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
-pub use model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, read_model};
+pub use model::read_model;
 pub use natural::natural_scene;
+pub use part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES};
 pub use peel::DepthPeeler;
 pub use photographs::{fingerprint, read_photographs};
 pub use random::random_scene;

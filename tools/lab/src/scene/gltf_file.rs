@@ -11,7 +11,7 @@ use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
 
 use super::beside::Beside;
-use super::model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
+use super::part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
 use super::{Texture, texture};
 use phasefront_core::runtime::file;
 

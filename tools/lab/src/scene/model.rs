@@ -1,38 +1,17 @@
 //! Models from files as scenes: what glTF and OBJ have in common. Each format's own reading is in `gltf_file` and
 //! `obj_file`.
 
+use super::part::{MAX_MODEL_BYTES, Part};
 use super::shapes::Light;
 use super::{Mesh, Scene, Texture, gltf_file, obj_file};
 use phasefront_io::{Error, Result, output};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Most triangles that a model file may hold.
-pub const MAX_MODEL_TRIANGLES: usize = 10_000_000;
-/// Most bytes of a model file, its buffers and pictures not counted.
-pub const MAX_MODEL_BYTES: u64 = 2 << 30;
-
 /// Part of the frame's height or width that a model fills, whichever it fills first.
 const FILL: f64 = 0.9;
 /// Part of the volume's depth that a model fills.
 const DEPTH_FILL: f64 = 0.96;
-
-/// A model's surface of one material, in the file's axes: x right, y up, z toward the viewer.
-#[derive(Debug, Default)]
-pub(super) struct Part {
-    pub(super) positions: Vec<[f32; 3]>,
-    pub(super) triangles: Vec<[u32; 3]>,
-    /// As many as positions, or none.
-    pub(super) normals: Vec<[f32; 3]>,
-    /// As many as positions, or none: then `texture` has one texel.
-    pub(super) uv: Vec<[f32; 2]>,
-    /// As many as positions, or none.
-    pub(super) colour: Vec<[f32; 3]>,
-    /// The picture; white where there is none.
-    pub(super) texture: Option<Arc<Texture>>,
-    /// Whether its back is seen as well.
-    pub(super) two_sided: bool,
-}
 
 /// Reads a model from a `.gltf`, `.glb` or `.obj` file as a scene for a frame of `height` x `width` pixels: upright,
 /// seen along its −z axis, in the middle of the frame and as large as fits, its depth stretched or pressed to the
@@ -43,7 +22,7 @@ pub(super) struct Part {
 /// Textures repeat, whatever the file says. Lines, points and animations are left out.
 ///
 /// The error names the file: absent, not such a model, without triangles, not finite, without height and width,
-/// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
+/// larger than [`MAX_MODEL_TRIANGLES`](super::MAX_MODEL_TRIANGLES) or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
     output::reading(path)?;
     let fail = |reason: String| Error::file(path, reason);
@@ -74,16 +53,6 @@ pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>
     };
     scene.check().map_err(|e| fail(e.to_string()))?;
     Ok(scene)
-}
-
-/// An error if a model of that many triangles is too large.
-pub(super) fn check_count(triangles: usize) -> std::result::Result<(), String> {
-    if triangles > MAX_MODEL_TRIANGLES {
-        return Err(format!(
-            "{triangles} triangles; a model may have {MAX_MODEL_TRIANGLES} at most"
-        ));
-    }
-    Ok(())
 }
 
 /// How a model's own lengths become the scene's.

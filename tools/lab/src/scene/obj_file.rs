@@ -11,7 +11,7 @@ use phasefront_core::runtime::file;
 
 use super::Texture;
 use super::beside::Beside;
-use super::model::{MAX_MODEL_BYTES, Part, check_count};
+use super::part::{MAX_MODEL_BYTES, Part, check_count};
 
 type Result<T> = std::result::Result<T, String>;
 
