@@ -8,19 +8,15 @@
 //! happens to a frame; `engine` is where CPU and GPU meet; `quality` chooses the quality level. One frame by itself,
 //! without a camera's formats, is [`phasefront_core::pipeline::Pipeline`]'s.
 
-mod brightness;
 mod computing;
 mod drop_reason;
 mod engine;
 mod event;
-mod frame_io;
 mod handle;
 mod hologram;
 mod live;
 mod live_work;
-mod on_cpu;
 #[cfg(feature = "gpu")]
-mod on_gpu;
 mod options;
 mod owned_frame;
 mod process_id;
@@ -33,11 +29,11 @@ mod sync;
 mod threads;
 
 pub use drop_reason::DropReason;
+#[cfg(feature = "gpu")]
+pub use engine::GpuOptions;
 pub use event::Event;
 pub use handle::SessionHandle;
 pub use hologram::Hologram;
-#[cfg(feature = "gpu")]
-pub use on_gpu::GpuOptions;
 pub use options::SessionOptions;
 #[cfg(feature = "gpu")]
 pub use phasefront_gpu::{Device, DeviceOptions};

@@ -1,14 +1,24 @@
 //! Where CPU and GPU meet: what takes a frame on one quality level from amplitudes and depth to levels, and which
 //! of the two it is. The one place that falls back from the GPU to the CPU.
 
-use super::SessionOptions;
-use super::brightness::BrightnessTracker;
-use super::frame_io::{Encoded, FrameInput, LevelsOut};
-use super::on_cpu::OnCpu;
+mod brightness;
+mod frame_io;
+mod on_cpu;
 #[cfg(feature = "gpu")]
-use super::on_gpu::{Failure, OnGpu};
+mod on_gpu;
+
+pub(super) use brightness::BrightnessTracker;
+pub(super) use frame_io::{FrameInput, LevelsOut};
+pub(super) use on_cpu::OnCpu;
+#[cfg(feature = "gpu")]
+pub use on_gpu::GpuOptions;
+
+use super::SessionOptions;
 use super::quality::{Backend, QualityLevel};
 use super::statistics::BackendReport;
+use frame_io::Encoded;
+#[cfg(feature = "gpu")]
+use on_gpu::{Failure, OnGpu};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 

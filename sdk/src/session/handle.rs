@@ -1,10 +1,10 @@
 //! Controls of a session that all three kinds share.
 
 use super::computing::{self, Computing};
+#[cfg(doc)]
+use super::engine::GpuOptions;
 use super::live::{Live, guarded, lock};
 use super::live_work::LiveWork;
-#[cfg(doc)]
-use super::on_gpu::GpuOptions;
 use super::quality::{Quality, Thermal};
 use super::queue::{self, Gate, Queue};
 use super::shared::Shared;

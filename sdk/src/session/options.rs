@@ -1,7 +1,7 @@
 //! What a session makes, and how.
 
 #[cfg(feature = "gpu")]
-use super::on_gpu::GpuOptions;
+use super::engine::GpuOptions;
 use super::quality::{self, Backend, Quality, QualityLevel};
 use phasefront_core::depth::stream::DepthOptions;
 use phasefront_core::display::target::Target;

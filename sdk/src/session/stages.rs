@@ -1,12 +1,12 @@
 //! All stages of a session's frames, and what one frame leaves for the next. Which frame is next is not known here.
 
 use super::SessionOptions;
-use super::brightness::BrightnessTracker;
+use super::engine::BrightnessTracker;
+use super::engine::OnCpu;
 use super::engine::{Engine, GpuState, LevelContext};
-use super::frame_io::{FrameInput, LevelsOut};
+use super::engine::{FrameInput, LevelsOut};
 use super::hologram::{Hologram, Pool, Viewer};
 use super::live::guarded;
-use super::on_cpu::OnCpu;
 use super::quality::{LevelControl, Quality, QualityChange, Thermal};
 use super::statistics::{BackendReport, FrameTimes};
 use super::threads::Threads;

@@ -1,10 +1,10 @@
 //! A quality level on the GPU: from a camera's colour and refined depth to levels.
 
-use super::SessionOptions;
-use super::brightness::BrightnessTracker;
-use super::frame_io::{Encoded, FrameInput};
-use super::quality::QualityLevel;
-use super::statistics::BackendReport;
+use crate::session::SessionOptions;
+use crate::session::engine::brightness::BrightnessTracker;
+use crate::session::engine::frame_io::{Encoded, FrameInput};
+use crate::session::quality::QualityLevel;
+use crate::session::statistics::BackendReport;
 use phasefront_core::runtime::error::Error;
 use phasefront_core::runtime::stage::{Stage, stage};
 use phasefront_gpu::{
@@ -24,7 +24,7 @@ pub struct GpuOptions {
 
 /// A frame that came to nothing.
 #[derive(Debug)]
-pub(super) enum Failure {
+pub(in crate::session) enum Failure {
     /// It is lost or wrong; the next one goes on.
     Frame(Error),
     /// The GPU is of no use for this quality level.
@@ -41,11 +41,11 @@ impl From<GpuError> for Failure {
 }
 
 /// Plans and memory.
-pub(super) struct OnGpu(Renderer);
+pub(in crate::session) struct OnGpu(Renderer);
 
 impl OnGpu {
     /// Plans `quality_level` on `device`, or on one that is opened and tried out.
-    pub(super) fn new(
+    pub(in crate::session) fn new(
         options: &SessionOptions,
         quality_level: &QualityLevel,
         device: Option<Arc<Device>>,
@@ -65,11 +65,11 @@ impl OnGpu {
         Renderer::new(device, options.gpu.device.clone(), job).map(OnGpu)
     }
 
-    pub(super) fn device(&self) -> Option<&Arc<Device>> {
+    pub(in crate::session) fn device(&self) -> Option<&Arc<Device>> {
         self.0.pipeline().map(|pipeline| pipeline.device())
     }
 
-    pub(super) fn report(&self) -> BackendReport {
+    pub(in crate::session) fn report(&self) -> BackendReport {
         let Some(pipeline) = self.0.pipeline() else {
             return BackendReport {
                 name: "no GPU at this moment".into(),
@@ -87,17 +87,17 @@ impl OnGpu {
     }
 
     /// How often a device was opened.
-    pub(super) fn openings(&self) -> usize {
+    pub(in crate::session) fn openings(&self) -> usize {
         self.0.openings()
     }
 
     /// Gives the GPU's memory back.
-    pub(super) fn release(&mut self) {
+    pub(in crate::session) fn release(&mut self) {
         self.0.release();
     }
 
     /// Makes the levels of a frame, whose colour is the camera's where it comes from one.
-    pub(super) fn process(
+    pub(in crate::session) fn process(
         &mut self,
         input: &FrameInput<'_>,
         brightness: &mut BrightnessTracker,
@@ -156,7 +156,7 @@ impl OnGpu {
 }
 
 #[cfg(test)]
-#[path = "../../../tests/driver.rs"]
+#[path = "../../../../tests/driver.rs"]
 mod driver;
 
 #[cfg(test)]
@@ -174,7 +174,7 @@ mod tests {
     /// A device that goes while a frame is on it takes this frame along and no other.
     #[test]
     fn a_frame_in_flight_is_lost_with_its_device_and_the_next_goes_on() {
-        let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
+        let network = Network::from_onnx(include_bytes!("../../../../models/rgbd-8-int8.onnx"));
         let method = Method::Network(Arc::new(network.unwrap()));
         let display = Display::from_toml("width = 34\nheight = 21").unwrap();
         let mut options = SessionOptions::new(display, method);

@@ -11,20 +11,20 @@ const TIME_CONSTANT: Duration = Duration::from_secs(1);
 
 /// The scale of a sequence of frames.
 #[derive(Debug, Default)]
-pub(super) struct BrightnessTracker {
+pub(in crate::session) struct BrightnessTracker {
     current: Option<f32>,
 }
 
 impl BrightnessTracker {
     /// Where the scale of a frame comes from that follows the last one after `elapsed`.
-    pub(super) fn past(&self, elapsed: Option<Duration>) -> Option<Past> {
+    pub(in crate::session) fn past(&self, elapsed: Option<Duration>) -> Option<Past> {
         let (scale, elapsed) = self.current.zip(elapsed)?;
         let share = 1.0 - (-elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp();
         Some(Past { scale, share })
     }
 
     /// Hears which scale a frame got.
-    pub(super) fn set_scale(&mut self, scale: f32) {
+    pub(in crate::session) fn set_scale(&mut self, scale: f32) {
         self.current = Some(scale);
     }
 }

@@ -5,28 +5,28 @@ use phasefront_core::frame::RgbdFrame;
 use std::time::Duration;
 
 /// A frame that is ready to become a hologram.
-pub(super) struct FrameInput<'a> {
+pub(in crate::session) struct FrameInput<'a> {
     /// None for a frame that comes from no camera. The GPU reads it itself.
     #[cfg_attr(not(feature = "gpu"), expect(dead_code))]
-    pub(super) camera: Option<&'a CameraFrame<'a>>,
+    pub(in crate::session) camera: Option<&'a CameraFrame<'a>>,
     /// Its colour and depth at the hologram's resolution.
-    pub(super) rgbd: &'a RgbdFrame,
+    pub(in crate::session) rgbd: &'a RgbdFrame,
     /// How long after the frame before, where that one counts.
-    pub(super) elapsed: Option<Duration>,
+    pub(in crate::session) elapsed: Option<Duration>,
 }
 
 /// Where levels go, (C, H, W).
-pub(super) struct LevelsOut<'a> {
-    pub(super) levels: &'a mut [u8],
+pub(in crate::session) struct LevelsOut<'a> {
+    pub(in crate::session) levels: &'a mut [u8],
     /// Of a display of over 8 bits.
-    pub(super) words: Option<&'a mut [u16]>,
+    pub(in crate::session) words: Option<&'a mut [u16]>,
 }
 
 /// What became of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Encoded {
-    pub(super) scale: f32,
-    pub(super) method: Duration,
-    pub(super) propagate: Duration,
-    pub(super) encode: Duration,
+pub(in crate::session) struct Encoded {
+    pub(in crate::session) scale: f32,
+    pub(in crate::session) method: Duration,
+    pub(in crate::session) propagate: Duration,
+    pub(in crate::session) encode: Duration,
 }

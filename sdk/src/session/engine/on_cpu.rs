@@ -1,9 +1,9 @@
 //! A quality level on the CPU: from amplitudes and depth to levels.
 
-use super::SessionOptions;
-use super::frame_io::{Encoded, LevelsOut};
-use super::quality::QualityLevel;
-use super::statistics::BackendReport;
+use crate::session::SessionOptions;
+use crate::session::engine::frame_io::{Encoded, LevelsOut};
+use crate::session::quality::QualityLevel;
+use crate::session::statistics::BackendReport;
 use num_complex::Complex32;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::frame::RgbdFrame;
@@ -12,7 +12,7 @@ use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
 /// Plan and memory.
-pub(super) struct OnCpu {
+pub(in crate::session) struct OnCpu {
     pipeline: Pipeline,
     scratch: PipelineScratch,
     field: Vec<Complex32>,
@@ -22,7 +22,11 @@ pub(super) struct OnCpu {
 }
 
 impl OnCpu {
-    pub(super) fn new(options: &SessionOptions, quality_level: &QualityLevel, cancel: &Cancel) -> Result<Self> {
+    pub(in crate::session) fn new(
+        options: &SessionOptions,
+        quality_level: &QualityLevel,
+        cancel: &Cancel,
+    ) -> Result<Self> {
         let (height, width) = (quality_level.height, quality_level.width);
         let pipeline = Self::plan(options, quality_level)?;
         let display = &options.target.display;
@@ -45,7 +49,7 @@ impl OnCpu {
     ///
     /// # Errors
     /// As [`Self::new`], for less memory.
-    pub(super) fn check(options: &SessionOptions, quality_level: &QualityLevel) -> Result<()> {
+    pub(in crate::session) fn check(options: &SessionOptions, quality_level: &QualityLevel) -> Result<()> {
         Self::plan(options, quality_level).map(|_| ())
     }
 
@@ -57,7 +61,7 @@ impl OnCpu {
         Pipeline::new(shape, method, &options.target, quality_level.encoder(options))
     }
 
-    pub(super) fn report(&self) -> BackendReport {
+    pub(in crate::session) fn report(&self) -> BackendReport {
         let engine = self.pipeline.method().engine();
         engine.map_or_else(BackendReport::default, |engine| BackendReport {
             name: engine.name.into(),
@@ -66,7 +70,12 @@ impl OnCpu {
     }
 
     /// Makes the levels of `frame`, which follows another where there is a `past`.
-    pub(super) fn process(&mut self, frame: &RgbdFrame, past: Option<Past>, out: LevelsOut<'_>) -> Result<Encoded> {
+    pub(in crate::session) fn process(
+        &mut self,
+        frame: &RgbdFrame,
+        past: Option<Past>,
+        out: LevelsOut<'_>,
+    ) -> Result<Encoded> {
         let OnCpu {
             pipeline,
             scratch,
