@@ -4,6 +4,8 @@
 
 mod cache;
 mod memory;
+pub(crate) mod peak;
+
 mod program;
 #[cfg(test)]
 pub(super) mod testing;

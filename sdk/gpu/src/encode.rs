@@ -12,9 +12,9 @@ mod shared;
 pub(super) use mean_phase::MeanPhase;
 
 use super::brightness::Smoother;
-use super::chain::ChainOptions;
 use super::device::Device;
 use super::{GpuError, Result};
+use crate::method::chain::ChainOptions;
 use double_phase::DoublePhase;
 use filter::Filter;
 use phasefront_core::display::response::Response;

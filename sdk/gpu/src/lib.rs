@@ -42,26 +42,22 @@
 //! ```
 
 mod brightness;
-mod chain;
 mod device;
 mod encode;
 mod fft;
-mod hidden;
 mod input;
 mod method;
 mod numbers;
-mod peak;
 mod pipeline;
 mod probe;
 mod renderer;
-mod sweep;
 mod watch;
 
-pub use chain::{ChainOptions, Fusion, GpuNetworkPlan};
+pub use device::peak::Peak;
 pub use device::{Device, DeviceOptions};
 pub use input::{Colour, ColourData, Depth, DepthData, Frame};
+pub use method::chain::{ChainOptions, Fusion, GpuNetworkPlan};
 pub use numbers::Float;
-pub use peak::Peak;
 pub use phasefront_core::encode::brightness::Past;
 pub use pipeline::{Deliver, FLIGHTS, GpuPipeline, GpuReport, Job, Ticket};
 pub use probe::probe;

@@ -1,17 +1,21 @@
 //! From a frame as it comes to the hologram's field, on the GPU: the twin of [`phasefront_core::method`].
 
-use super::chain::{ChainOptions, ChainPlan, End};
+pub(crate) mod chain;
+mod hidden;
+mod sweep;
+
 use super::device::Device;
 use super::input::{Colour, Depth, Form, Frame, Packer, Source};
 use super::numbers::Numbers;
-use super::sweep::Sweeper;
 use super::{GpuError, Result};
+use chain::{ChainOptions, ChainPlan, End};
 use phasefront_core::display::Display;
 use phasefront_core::method::network::Network;
 use phasefront_core::method::seeded::seed;
 use phasefront_core::method::sweep::SweepPlan;
 use phasefront_core::method::{Method, sweep_plan};
 use std::sync::Arc;
+use sweep::Sweeper;
 
 /// A method for one frame size.
 pub(super) struct MethodPlan {

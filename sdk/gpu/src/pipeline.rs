@@ -1,13 +1,13 @@
 //! One RGB-D frame through all stages on the GPU, several frames in flight: the twin of [`phasefront_core::pipeline`].
 
-use super::chain::ChainOptions;
 use super::device::{Device, copy_mapped};
 use super::encode::{Encoder, EncoderJob, LevelsBuffers, MeanPhase};
 use super::fft::{Convolution, Planes};
 use super::input::{Colour, Depth, Frame};
 use super::method::MethodPlan;
-use super::peak::Peak;
 use super::{GpuError, Result};
+use crate::device::peak::Peak;
+use crate::method::chain::ChainOptions;
 use phasefront_core::display::target::Target;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::{EncoderOptions, Encoding};
@@ -232,7 +232,7 @@ impl GpuPipeline {
     /// # Errors
     /// What the device refuses; [`GpuError::Lost`].
     pub fn peak(&self) -> Result<Peak> {
-        super::peak::measure(&self.device, self.method.numbers())
+        crate::device::peak::measure(&self.device, self.method.numbers())
     }
 
     /// Bytes that the method's dispatches read and write in a frame, each value once.

@@ -2,10 +2,10 @@
 
 use super::EncoderJob;
 use super::blur::Blur;
-use crate::chain::{ChainPlan, End};
 use crate::device::{Constants, Device, Dispatch};
 use crate::fft::{Convolution, Planes, quadrant};
 use crate::input::{Form, Packer, Source};
+use crate::method::chain::{ChainPlan, End};
 use crate::numbers::Numbers;
 use crate::{GpuError, Result};
 use phasefront_core::encode::Encoding;

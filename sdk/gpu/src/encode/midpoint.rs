@@ -134,7 +134,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::super::super::device::testing::{device, field, run, upload};
     use super::super::{Encoder, EncoderJob, LevelsBuffers};
-    use crate::chain::ChainOptions;
+    use crate::method::chain::ChainOptions;
     use ndarray::Array3;
     use num_complex::Complex32;
     use phasefront_core::display::Display;

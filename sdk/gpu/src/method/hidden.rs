@@ -1,7 +1,7 @@
 //! Hidden surfaces on the GPU: the twin of [`phasefront_core::method::sweep::hidden`], to the bit.
 
-use super::Result;
-use super::device::{Device, Dispatch};
+use crate::Result;
+use crate::device::{Device, Dispatch};
 use phasefront_core::method::sweep::hidden::JUMP;
 
 /// Pixels that a thread finds the sources of, in a line.
@@ -10,15 +10,15 @@ const PART: usize = 64;
 const LINES: usize = 64;
 
 /// A search for one frame size: a dispatch for each side.
-pub(super) struct Search {
+pub(crate) struct Search {
     sides: [Dispatch; 4],
     /// (2, H, W): the pixels that hidden layers continue, as [`phasefront_core::method::sweep::hidden::Hidden::find`] gives them.
-    pub(super) sources: wgpu::Buffer,
+    pub(crate) sources: wgpu::Buffer,
 }
 
 impl Search {
     /// In the depth of `surfaces`, (H, W) of red, green, blue and depth, as far as `reach` pixels.
-    pub(super) fn new(
+    pub(crate) fn new(
         device: &Device,
         surfaces: &wgpu::Buffer,
         (height, width): (usize, usize),
@@ -59,12 +59,12 @@ impl Search {
         Ok(Search { sides, sources })
     }
 
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.sides.iter().for_each(|side| side.run(pass));
     }
 
     /// Dispatches a frame.
-    pub(super) fn dispatches(&self) -> usize {
+    pub(crate) fn dispatches(&self) -> usize {
         self.sides.len()
     }
 }
@@ -72,7 +72,7 @@ impl Search {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::super::device::testing::{device, run};
+    use crate::device::testing::{device, run};
     use super::*;
     use phasefront_core::method::sweep::hidden::{Hidden, NOTHING, reference};
 

@@ -1,8 +1,8 @@
 //! What a device can do at its best, measured: the yardstick of the benchmark.
 
-use super::Result;
-use super::device::{Device, Dispatch};
-use super::numbers::Numbers;
+use crate::Result;
+use crate::device::{Device, Dispatch};
+use crate::numbers::Numbers;
 use std::time::Instant;
 
 /// Bytes that are copied.
@@ -22,7 +22,7 @@ pub struct Peak {
     pub bytes_per_s: f64,
 }
 
-pub(super) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
+pub(crate) fn measure(device: &Device, numbers: Numbers) -> Result<Peak> {
     device.guarded(|| {
         let [from, to] = [device.buffer("source", COPIED)?, device.buffer("copy", COPIED)?];
         let arguments = [(0, from.as_entire_binding()), (1, to.as_entire_binding())];

@@ -1,10 +1,10 @@
 //! The convolution chain on the GPU: one dispatch a layer, or one for two layers and the skip around them where that
 //! is faster on this device. Its twins are [`phasefront_core::method::network::reference`] and the kernels' int8 module.
 
-use super::device::{Constants, Device, Dispatch};
-use super::input::{ChainInput, Form, Packer, Source};
-use super::numbers::{Float, GROUP, Numbers};
-use super::{GpuError, Result};
+use crate::device::{Constants, Device, Dispatch};
+use crate::input::{ChainInput, Form, Packer, Source};
+use crate::numbers::{Float, GROUP, Numbers};
+use crate::{GpuError, Result};
 use phasefront_core::method::network::chain::{Chain, Layer, Weights};
 use phasefront_core::method::network::{Head, InputKind, Network};
 use std::sync::Arc;
@@ -43,7 +43,7 @@ pub struct ChainOptions {
 
 /// What the last layer writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum End {
+pub(crate) enum End {
     /// The six planes.
     Planes,
     /// The complex field that they stand for, and its sums by workgroup.
@@ -51,18 +51,18 @@ pub(super) enum End {
 }
 
 /// A chain on the GPU for one frame size.
-pub(super) struct ChainPlan {
+pub(crate) struct ChainPlan {
     steps: Vec<Dispatch>,
-    pub(super) fusion: Fusion,
+    pub(crate) fusion: Fusion,
     /// (6, H, W) f32 of [`End::Planes`].
-    pub(super) planes: wgpu::Buffer,
+    pub(crate) planes: wgpu::Buffer,
     /// (3, H, W) complex f32 of [`End::Field`].
-    pub(super) field: wgpu::Buffer,
+    pub(crate) field: wgpu::Buffer,
     /// Sums of the field: three complex f32 for each of `parts` workgroups.
-    pub(super) partial: wgpu::Buffer,
-    pub(super) parts: usize,
+    pub(crate) partial: wgpu::Buffer,
+    pub(crate) parts: usize,
     /// What the dispatches read and write, each value once.
-    pub(super) bytes: usize,
+    pub(crate) bytes: usize,
 }
 
 /// What all steps of a chain share while they are made.
@@ -95,7 +95,7 @@ struct Tables {
 
 impl ChainPlan {
     /// Plans `chain` for frames of `size` (height, width) from `input`, fused as asked or as is measured to be faster.
-    pub(super) fn new(
+    pub(crate) fn new(
         device: &Device,
         chain: &Chain,
         numbers: Numbers,
@@ -172,18 +172,18 @@ impl ChainPlan {
         Ok(plan)
     }
 
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
         self.steps.iter().for_each(|step| step.run(pass));
     }
 
     /// Dispatches a frame.
-    pub(super) fn dispatches(&self) -> usize {
+    pub(crate) fn dispatches(&self) -> usize {
         self.steps.len()
     }
 }
 
 /// The shortest of three runs, after one that is not counted.
-pub(super) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
+pub(crate) fn time(device: &Device, steps: &[Dispatch]) -> Result<Duration> {
     let run = || {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_compute_pass(&Default::default());

@@ -4,10 +4,10 @@
 //! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged
 //! steps, only the tiles are passed over here in which there is neither light nor a point yet.
 
-use super::chain::time;
-use super::device::{Device, Dispatch};
-use super::hidden::Search;
-use super::{GpuError, Result};
+use crate::device::{Device, Dispatch};
+use crate::method::chain::time;
+use crate::method::hidden::Search;
+use crate::{GpuError, Result};
 use phasefront_core::display::Display;
 use phasefront_core::method::sweep::{self, MARGIN, SweepPlan};
 
@@ -20,28 +20,28 @@ const COLUMNS: usize = 64;
 const HOME_ROWS: usize = 4;
 
 /// A sweep for one frame size, ready to run.
-pub(super) struct Sweeper {
+pub(crate) struct Sweeper {
     /// None without hidden layers.
     search: Option<Search>,
     /// Which planes hold each pixel's points, then all planes.
     steps: Vec<Dispatch>,
     home: [Dispatch; 2],
     /// How many planes a dispatch does.
-    pub(super) together: usize,
+    pub(crate) together: usize,
     /// Where the field stands, metres from the midpoint toward the viewer.
-    pub(super) z_m: f64,
+    pub(crate) z_m: f64,
     /// (3, H, W) complex f32.
-    pub(super) field: wgpu::Buffer,
+    pub(crate) field: wgpu::Buffer,
     /// Sums of the field: three complex f32 for each of `parts` workgroups.
-    pub(super) partial: wgpu::Buffer,
-    pub(super) parts: usize,
+    pub(crate) partial: wgpu::Buffer,
+    pub(crate) parts: usize,
     /// What the dispatches read and write, each value once.
-    pub(super) bytes: usize,
+    pub(crate) bytes: usize,
 }
 
 impl Sweeper {
     /// The twin of `plan`, which is for `display`, of a frame's `surfaces`: (H, W) of red, green, blue and depth, f32.
-    pub(super) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
+    pub(crate) fn new(device: &Device, plan: &SweepPlan, display: &Display, surfaces: &wgpu::Buffer) -> Result<Self> {
         Self::planned(device, plan, display, surfaces, !device.is_software())
     }
 
@@ -115,7 +115,7 @@ impl Sweeper {
         })
     }
 
-    pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
+    pub(crate) fn run(&self, pass: &mut wgpu::ComputePass<'_>) {
         if let Some(search) = &self.search {
             search.run(pass);
         }
@@ -124,7 +124,7 @@ impl Sweeper {
     }
 
     /// Dispatches a frame.
-    pub(super) fn dispatches(&self) -> usize {
+    pub(crate) fn dispatches(&self) -> usize {
         self.search.as_ref().map_or(0, Search::dispatches) + self.steps.len() + self.home.len()
     }
 }
@@ -304,7 +304,7 @@ fn packed<'a>(colours: impl Iterator<Item = (f32, &'a [[f32; 2]])>, radius: usiz
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use super::super::device::testing::{apart, device, read, run};
+    use crate::device::testing::{apart, device, read, run};
     use super::*;
     use ndarray::{Array2, Array3};
     use num_complex::Complex32;
