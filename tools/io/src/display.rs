@@ -3,13 +3,10 @@
 use crate::display::calibration::AberrationFile;
 use crate::output::has_extension;
 use crate::{Error, Result, input};
-use ndarray_npy::WriteNpyExt;
 use phasefront::output::ModulatorSpec;
 use phasefront::target::Response;
 use phasefront::{Display, Target};
 use phasefront_core::runtime::keys;
-use serde::{Deserialize, Serialize};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
