@@ -65,6 +65,10 @@ impl DisplayFlags {
         }
     }
 
+    /// The display, or the default one, at the offset that is asked for.
+    ///
+    /// # Errors
+    /// A display that cannot be read; an offset too far away.
     pub fn read(&self) -> Result<DisplayFile> {
         let mut file = match &self.display {
             Some(name) => display::find_display(name)?,
@@ -129,6 +133,10 @@ impl EncoderName {
         Encoding::BY_NAME.iter().find(|(name, ..)| *name == self.0)
     }
 
+    /// The encoding, with its `prefilter` if it has one.
+    ///
+    /// # Errors
+    /// A pre-filter for an encoding without one, or none for one that needs it.
     pub fn encoding(self, prefilter: Option<Arc<Network>>) -> Result<Encoding> {
         Ok(match (self.known(), prefilter) {
             (Some((.., encoding)), None) => encoding.clone(),
@@ -144,6 +152,7 @@ impl EncoderName {
         })
     }
 
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         self.0
     }
@@ -169,6 +178,7 @@ pub struct OverwriteFlag {
 }
 
 impl OverwriteFlag {
+    /// Whether --overwrite is given.
     pub fn is_given(&self) -> bool {
         self.overwrite
     }
@@ -201,6 +211,7 @@ pub enum PrecisionName {
 }
 
 impl PrecisionName {
+    /// The precision of this name.
     pub fn precision(self) -> Precision {
         match self {
             PrecisionName::Int8 => Precision::Int8,

@@ -30,7 +30,7 @@ impl Write for Kept {
 ///
 /// # Errors
 /// Those of `work`, or a place that cannot be written.
-pub fn traced<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(crate) fn traced<T>(path: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
     output::file(path, &["json"])?;
     let kept = Kept::default();
     let builder = ChromeLayerBuilder::new().writer(kept.clone());

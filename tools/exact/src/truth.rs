@@ -7,7 +7,6 @@ use phasefront_core::method::sweep::hidden::{Hidden, NOTHING};
 use phasefront_core::method::sweep::hidden_reach;
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Result, metrics};
-use rayon::prelude::*;
 use serde::Serialize;
 
 /// The front layer's amplitudes, black where nothing is.

@@ -1,5 +1,9 @@
 //! Display files: the TOML of a display, and the files that it names.
 
+pub mod calibration;
+mod panel;
+pub mod spatial;
+
 use crate::display::calibration::AberrationFile;
 use crate::output::has_extension;
 use crate::{Error, Result, input};
@@ -9,10 +13,6 @@ use phasefront::{Display, Target};
 use phasefront_core::runtime::keys;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-pub mod calibration;
-mod panel;
-pub mod spatial;
 
 /// A display file and what it refers to.
 #[derive(Debug, Clone)]

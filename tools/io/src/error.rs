@@ -1,10 +1,10 @@
-//! The one error type of the laboratory. Each message is one line that names what is wrong and what would be right.
+//! The one error type of the tools. Each message is one line that names what is wrong and what would be right.
 
 use phasefront_core::runtime::error::Line;
 use phasefront_gpu::GpuError;
 use std::path::PathBuf;
 
-/// Why the laboratory refused to go on.
+/// Why a tool refused to go on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -34,7 +34,7 @@ impl Error {
     }
 }
 
-/// The laboratory's result.
+/// A tool's result.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl From<GpuError> for Error {

@@ -1,5 +1,10 @@
 //! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with what is needed to look at them again.
 
+pub mod packed;
+mod views;
+
+pub use views::AberratedOptics;
+
 use crate::display::{DisplayFile, lut_of};
 use crate::input::{self, MOST_ARRAY, MOST_PICTURE, npy};
 use crate::output::{self, Pending, has_extension};
@@ -16,11 +21,6 @@ use phasefront_core::runtime::file;
 use serde::{Deserialize, Serialize};
 use std::io::Write;
 use std::path::{Path, PathBuf};
-
-pub mod packed;
-mod views;
-
-pub use views::AberratedOptics;
 
 /// Name of the PNG text chunk that holds a [`HologramInfo`].
 const PNG_CHUNK: &str = "phasefront";

@@ -1,5 +1,4 @@
-//! Files that are read. All of the laboratory's reading begins here or in [`crate::input::decode`]: only regular files are
-//! opened, and only up to a size.
+//! Files that are read. All reading begins here or in [`decode`], which open only regular files, and only up to a size.
 
 pub mod decode;
 pub mod npy;

@@ -1,17 +1,16 @@
 //! Colour pictures: read as amplitudes or bytes, written as PNG.
 
+pub mod depth_map;
+pub mod export;
+pub mod photo;
+pub mod plot;
+
 use crate::Result;
 use crate::input::decode::{self, Reading};
 use crate::output::Pending;
 use image::{DynamicImage, RgbImage};
 use ndarray::{Array3, ArrayView3};
-use std::io::Write;
 use std::path::Path;
-
-pub mod depth_map;
-pub mod export;
-pub mod photo;
-pub mod plot;
 
 /// The picture in the file at `path`, upright.
 pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {

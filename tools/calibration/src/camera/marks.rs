@@ -365,7 +365,7 @@ fn spots(is_dark: &[bool], height: usize, width: usize) -> Vec<Spot> {
     spots
 }
 
-/// [`Registration::find`] as the laboratory's error.
+/// [`Registration::find`], with an error of this crate.
 ///
 /// # Errors
 /// Marks that are not there, or not upright.

@@ -131,8 +131,8 @@ impl HologramRequest {
         "gpu",
     ];
 
-    /// Of images that are read already, for `display`.
-    pub fn of(display: DisplayFlags) -> Self {
+    /// The request for `display` of images that are read already.
+    pub(crate) fn of(display: DisplayFlags) -> Self {
         HologramRequest {
             frame: FrameFlags::default(),
             ldi: None,

@@ -164,7 +164,7 @@ struct AberrationToml {
 pub enum AberrationFile {
     /// The same over the whole frame.
     Uniform(Aberrations),
-    /// Different from place to place: for the laboratory's methods.
+    /// Different from place to place, which only exact waves correct.
     Spatial(SpatialAberrations),
 }
 

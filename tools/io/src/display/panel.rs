@@ -92,7 +92,7 @@ impl PanelToml {
 ///
 /// # Errors
 /// A file that is missing, of another kind or size.
-pub fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
+fn read_flatness(path: &Path, (height, width): (usize, usize)) -> Result<Vec<u16>> {
     let (shape, turns) = match has_extension(path, "csv") {
         true => read_csv(path)?,
         false => read_image(path)?,

@@ -3,7 +3,6 @@
 use crate::{Error, Result};
 use phasefront::target::Aberration;
 use phasefront_core::optics::zernike::Aberrations;
-use rayon::prelude::*;
 
 /// Corrections at the points of a grid over the frame; between them linear in x and y, beyond them the nearest.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,4 +1,4 @@
-//! Pictures and depth maps, decoded: all that the laboratory reads comes through [`decode`], which bounds their pixels,
+//! Pictures and depth maps, decoded: all that is read comes through [`decode`], which bounds their pixels,
 //! turns them upright as their Exif data say, and makes an error of a decoder's panic.
 
 use crate::input::{self, MOST_PICTURE, quiet};

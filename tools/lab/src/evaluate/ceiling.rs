@@ -23,7 +23,7 @@ const MOMENTUM: f32 = 0.9;
 const SPREAD: f32 = 0.99;
 
 /// A plan for one shape and display.
-pub struct Ceiling {
+pub(crate) struct Ceiling {
     size: usize,
     aperture_radius: f64,
     /// z, the way there from the modulator and the way back: the midpoint's first.
@@ -35,7 +35,7 @@ impl Ceiling {
     ///
     /// # Errors
     /// A distance that cannot be propagated.
-    pub fn new(size: usize, display: &Display) -> Result<Self> {
+    pub(crate) fn new(size: usize, display: &Display) -> Result<Self> {
         let ways = |distance_m: f64| {
             let (pitch_m, colours) = (display.pitch_m(), display.wavelengths_m());
             Propagator::for_colours(size, size, pitch_m, colours, distance_m, Padding::Reach)
@@ -54,13 +54,13 @@ impl Ceiling {
     }
 
     /// z of the planes whose amplitudes are asked for, metres.
-    pub fn z_m(&self) -> Vec<f64> {
+    pub(crate) fn z_m(&self) -> Vec<f64> {
         self.planes.iter().map(|(z_m, ..)| *z_m).collect()
     }
 
     /// Takes `phases`, (C, H, W), toward the amplitudes `wanted`, (C, H, W) at each of [`Self::z_m`], over the
     /// amplitude that full light stands for.
-    pub fn optimise(&self, phases: &mut [f32], wanted: &[Vec<f32>], steps: usize) {
+    pub(crate) fn optimise(&self, phases: &mut [f32], wanted: &[Vec<f32>], steps: usize) {
         let plane = self.size * self.size;
         let colours = phases.par_chunks_exact_mut(plane).enumerate();
         colours.for_each(|(colour, phases)| {

@@ -114,7 +114,7 @@ impl Source {
     }
 
     /// What a frame is called in messages.
-    pub fn name(&self, frame: usize) -> String {
+    pub(crate) fn name(&self, frame: usize) -> String {
         match &self.input {
             Input::Folder(folder) => {
                 let (colour, depth) = &folder.paths[frame % folder.paths.len()];
