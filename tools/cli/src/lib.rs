@@ -5,7 +5,5 @@ pub mod bench;
 pub mod depth_network;
 pub mod doctor;
 pub mod gpu;
-pub mod link;
-pub mod multiplex;
-pub mod show;
+pub mod modulator;
 pub mod viewer;

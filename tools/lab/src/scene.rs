@@ -11,37 +11,20 @@
 //! pixel (row, column) lies at (column + ½, row + ½); z in parts of the volume's depth, toward the viewer, from
 //! +½ (nearest) to −½ (farthest). Normalized depth is d = ½ − z. A scene so described fits any display.
 
-mod beside;
-mod gltf_file;
-mod ground;
 mod model;
-mod natural;
-mod obj_file;
-mod part;
-mod parts;
 pub mod pattern;
-mod peel;
-mod photographs;
 mod random;
-mod raster;
+mod render;
 pub mod shapes;
-mod surface;
 mod texture;
-mod thin;
-mod varied;
 
 use phasefront_io::{Error, Result};
 use std::sync::Arc;
 
-pub use model::read_model;
-pub use natural::natural_scene;
-pub use part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES};
-pub use peel::DepthPeeler;
-pub use photographs::{fingerprint, read_photographs};
-pub use random::random_scene;
-pub use raster::render_ldi_reference;
+pub use model::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, read_model};
+pub use random::{fingerprint, natural_scene, random_scene, read_photographs, varied_scene};
+pub use render::{DepthPeeler, render_ldi_reference};
 pub use texture::Texture;
-pub use varied::varied_scene;
 
 /// Farthest from the frame's corner that a vertex may lie, in pixels.
 pub const MAX_COORDINATE_PX: f32 = 1_048_576.0;

@@ -72,8 +72,8 @@ impl Search {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use crate::device::testing::{device, run};
     use super::*;
+    use crate::device::testing::{device, run};
     use phasefront_core::method::sweep::hidden::{Hidden, NOTHING, reference};
 
     /// Depths with edges, some blurred, and with noise at every pixel.

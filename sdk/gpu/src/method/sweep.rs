@@ -304,8 +304,8 @@ fn packed<'a>(colours: impl Iterator<Item = (f32, &'a [[f32; 2]])>, radius: usiz
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use crate::device::testing::{apart, device, read, run};
     use super::*;
+    use crate::device::testing::{apart, device, read, run};
     use ndarray::{Array2, Array3};
     use num_complex::Complex32;
     use phasefront_core::frame::RgbdFrame;

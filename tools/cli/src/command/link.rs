@@ -1,7 +1,7 @@
 //! `phasefront link`: whether pixels reach the modulator as they are.
 
 use clap::{Args, Subcommand};
-use phasefront_cli::link;
+use phasefront_cli::modulator::link;
 use phasefront_command::flags::parse_size;
 use phasefront_command::terminal;
 use phasefront_io::hologram::packed;

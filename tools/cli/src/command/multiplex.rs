@@ -8,7 +8,7 @@ use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::Pipeline;
 use phasefront::output::Packing;
-use phasefront_cli::multiplex::{Differ, Map, Multiplex};
+use phasefront_cli::modulator::multiplex::{Differ, Map, Multiplex};
 use phasefront_command::flags::{DisplayFlags, OverwriteFlag, PrecisionName, sweep_for};
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;

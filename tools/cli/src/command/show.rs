@@ -1,7 +1,7 @@
 //! `phasefront show` and `phasefront screens`: frames on a modulator that is a screen to the computer.
 
 use clap::Args;
-use phasefront_cli::show::{self, Screen, Showing};
+use phasefront_cli::modulator::show::{self, Screen, Showing};
 use phasefront_command::flags::DisplayFlags;
 use phasefront_command::terminal;
 use phasefront_io::display::DisplayFile;

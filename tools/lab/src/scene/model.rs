@@ -1,9 +1,16 @@
 //! Models from files as scenes: what glTF and OBJ have in common. Each format's own reading is in `gltf_file` and
 //! `obj_file`.
 
-use super::part::{MAX_MODEL_BYTES, Part};
-use super::shapes::Light;
-use super::{Mesh, Scene, Texture, gltf_file, obj_file};
+mod beside;
+mod gltf_file;
+mod obj_file;
+mod part;
+
+pub use part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES};
+
+use crate::scene::model::part::Part;
+use crate::scene::shapes::Light;
+use crate::scene::{Mesh, Scene, Texture};
 use phasefront_io::{Error, Result, output};
 use std::path::Path;
 use std::sync::Arc;
@@ -22,7 +29,7 @@ const DEPTH_FILL: f64 = 0.96;
 /// Textures repeat, whatever the file says. Lines, points and animations are left out.
 ///
 /// The error names the file: absent, not such a model, without triangles, not finite, without height and width,
-/// larger than [`MAX_MODEL_TRIANGLES`](super::MAX_MODEL_TRIANGLES) or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
+/// larger than [`MAX_MODEL_TRIANGLES`] or [`MAX_MODEL_BYTES`], or naming a picture that cannot be read.
 pub fn read_model(path: &Path, height: usize, width: usize, light: Option<Light>) -> Result<Scene> {
     output::reading(path)?;
     let fail = |reason: String| Error::file(path, reason);

@@ -1,7 +1,7 @@
 //! Procedural pictures for surfaces: a [`Pattern`] is one value a texel, which a ramp of colours makes a [`Texture`].
 //! Most of them join their own repeats without a seam; those that do not say so.
 
-use super::Texture;
+use crate::scene::Texture;
 use phasefront_io::dice::Dice;
 
 /// One value in [0, 1] a texel, row by row.

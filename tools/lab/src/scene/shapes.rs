@@ -6,7 +6,7 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use super::{Mesh, Texture};
+use crate::scene::{Mesh, Texture};
 
 /// A mesh about the origin, with outward normals.
 #[derive(Debug, Clone, Default)]
@@ -366,8 +366,8 @@ fn unit(a: [f64; 3]) -> [f64; 3] {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::{Scene, render_ldi_reference};
     use super::*;
+    use crate::scene::{Scene, render_ldi_reference};
 
     fn solids() -> Vec<(&'static str, Shape, f64)> {
         let knot = |t: f64| {

@@ -1,6 +1,6 @@
 //! Parts of a model, and how large a model may be.
 
-use super::Texture;
+use crate::scene::Texture;
 use std::sync::Arc;
 
 /// Most triangles that a model file may hold.

@@ -9,9 +9,9 @@ use tobj::{LoadOptions, Material};
 
 use phasefront_core::runtime::file;
 
-use super::Texture;
-use super::beside::Beside;
-use super::part::{MAX_MODEL_BYTES, Part, check_count};
+use crate::scene::Texture;
+use crate::scene::model::beside::Beside;
+use crate::scene::model::part::{MAX_MODEL_BYTES, Part, check_count};
 
 type Result<T> = std::result::Result<T, String>;
 

@@ -10,9 +10,9 @@ use gltf::material::AlphaMode;
 use gltf::mesh::Mode;
 use gltf::{Accessor, Gltf, Node, Primitive, Semantic, buffer};
 
-use super::beside::Beside;
-use super::part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
-use super::{Texture, texture};
+use crate::scene::model::beside::Beside;
+use crate::scene::model::part::{MAX_MODEL_BYTES, MAX_MODEL_TRIANGLES, Part, check_count};
+use crate::scene::{Texture, texture};
 use phasefront_core::runtime::file;
 
 type Result<T> = std::result::Result<T, String>;

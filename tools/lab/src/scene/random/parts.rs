@@ -1,8 +1,8 @@
 //! What random scenes of every kind are made of: shapes, poses and patterns drawn by chance.
 
-use super::Mesh;
-use super::pattern::Pattern;
-use super::shapes::{Light, Shape, quaternion, star, turn};
+use crate::scene::Mesh;
+use crate::scene::pattern::Pattern;
+use crate::scene::shapes::{Light, Shape, quaternion, star, turn};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 

@@ -3,10 +3,10 @@
 //!
 //! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
 
-use super::Texture;
-use super::parts::pattern;
-use super::pattern::Pattern;
-use super::photographs::piece;
+use crate::scene::Texture;
+use crate::scene::pattern::Pattern;
+use crate::scene::random::parts::pattern;
+use crate::scene::random::photographs::piece;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 

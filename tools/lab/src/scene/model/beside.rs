@@ -1,7 +1,7 @@
 //! What a model names beside itself. A model may come from anywhere: only regular files of its own folder are read, and
 //! no more of them than a model may have.
 
-use super::part::MAX_MODEL_BYTES;
+use crate::scene::model::part::MAX_MODEL_BYTES;
 use image::DynamicImage;
 use phasefront_core::runtime::file;
 use phasefront_io::input::decode::{self, Reading};

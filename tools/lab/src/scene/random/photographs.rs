@@ -1,6 +1,6 @@
 //! Pictures that the surfaces of random scenes show: a folder of the user's own.
 
-use super::Texture;
+use crate::scene::Texture;
 use phasefront_io::dice::Dice;
 use phasefront_io::fingerprint::Fingerprint;
 use phasefront_io::{Error, Result, output, picture};

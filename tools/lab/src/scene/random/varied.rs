@@ -3,11 +3,12 @@
 //!
 //! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
 
-use super::ground::Ground;
-use super::parts::{DEPTH_PER_PX, holes, light, settle, shape, stretch, turned};
-use super::shapes::{Light, Place, Shape, star, turn};
-use super::surface::Surfaces;
-use super::{Mesh, Scene, Texture, thin};
+use crate::scene::random::ground::Ground;
+use crate::scene::random::parts::{DEPTH_PER_PX, holes, light, settle, shape, stretch, turned};
+use crate::scene::random::surface::Surfaces;
+use crate::scene::random::thin;
+use crate::scene::shapes::{Light, Place, Shape, star, turn};
+use crate::scene::{Mesh, Scene, Texture};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -231,9 +232,9 @@ fn texels(radius: f64, dice: &mut Dice) -> (usize, usize) {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::random::tests::fingerprint;
-    use super::super::render_ldi_reference;
     use super::*;
+    use crate::scene::random::objects::tests::fingerprint;
+    use crate::scene::render_ldi_reference;
     use phasefront_io::ldi::Ldi;
 
     fn rendered(seed: u64, size: usize, photographs: &[Texture]) -> Ldi {

@@ -3,8 +3,8 @@
 //! Coverage is decided in integers (vertices rounded to 1/256 pixel, edges by the top-left rule), so the pixels that
 //! a triangle covers are the same on every machine and neighbouring triangles share no pixel and miss none.
 
-use super::texture::ALPHA_CUT;
-use super::{Mesh, Scene};
+use crate::scene::texture::ALPHA_CUT;
+use crate::scene::{Mesh, Scene};
 use ndarray::{Array2, Array3};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};
@@ -176,8 +176,8 @@ mod tests {
 
     use std::sync::Arc;
 
-    use super::super::{Texture, random_scene};
     use super::*;
+    use crate::scene::{Texture, random_scene};
 
     /// A mesh of one colour.
     fn plain(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, rgb: [f32; 3]) -> Mesh {

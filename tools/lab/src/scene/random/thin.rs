@@ -1,6 +1,6 @@
 //! Thin things: threads, sticks and twigs, as shapes whose x and y are pixels and whose z is depth already.
 
-use super::shapes::{Shape, turn};
+use crate::scene::shapes::{Shape, turn};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 

@@ -3,12 +3,13 @@
 //!
 //! Nothing here depends on the machine: chance comes from [`Dice`], sines and powers from `libm`.
 
-use super::ground::Ground;
-use super::parts::{DEPTH_PER_PX, holes, light, pattern, settle, shape, stretch, turned};
-use super::pattern::Pattern;
-use super::photographs::piece;
-use super::shapes::{Light, Place, Shape, turn};
-use super::{Mesh, Scene, Texture, thin};
+use crate::scene::pattern::Pattern;
+use crate::scene::random::ground::Ground;
+use crate::scene::random::parts::{DEPTH_PER_PX, holes, light, pattern, settle, shape, stretch, turned};
+use crate::scene::random::photographs::piece;
+use crate::scene::random::thin;
+use crate::scene::shapes::{Light, Place, Shape, turn};
+use crate::scene::{Mesh, Scene, Texture};
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -266,9 +267,9 @@ fn texels(radius: f64) -> (usize, usize) {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use super::super::random::tests::fingerprint;
-    use super::super::render_ldi_reference;
     use super::*;
+    use crate::scene::random::objects::tests::fingerprint;
+    use crate::scene::render_ldi_reference;
     use phasefront_io::ldi::Ldi;
 
     fn rendered(seed: u64, size: usize, photographs: &[Texture]) -> Ldi {

@@ -1,8 +1,8 @@
 //! LDI rendering by depth peeling (paper, Methods, Algorithm 1) on the render pipeline of a GPU, or of a software
-//! driver in its place. What it renders, [`render_ldi_reference`](super::render_ldi_reference) defines.
+//! driver in its place. What it renders, [`render_ldi_reference`](crate::scene::render_ldi_reference) defines.
 
-use super::raster::check_size;
-use super::{Scene, Texture};
+use crate::scene::render::raster::check_size;
+use crate::scene::{Scene, Texture};
 use ndarray::{Array2, Array3};
 use phasefront_io::ldi::{Ldi, LdiLayer};
 use phasefront_io::{Error, Result};

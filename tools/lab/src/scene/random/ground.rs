@@ -1,8 +1,8 @@
 //! The background that fills a random scene's frame: planes, floors, corners, reliefs, curved and stepped surfaces.
 
-use super::parts::{DEPTH_PER_PX, MARGIN};
-use super::pattern::Pattern;
-use super::shapes::Shape;
+use crate::scene::pattern::Pattern;
+use crate::scene::random::parts::{DEPTH_PER_PX, MARGIN};
+use crate::scene::shapes::Shape;
 use phasefront_io::dice::Dice;
 use std::f64::consts::TAU;
 
