@@ -8,5 +8,5 @@ mod session;
 fn main() {
     let schedules = std::env::var("PHASEFRONT_SCHEDULES").map_or(40_000, |count| count.parse().expect("a number"));
     session::check(schedules);
-    println!("{schedules} schedules of each situation: every frame is told of once, and nobody waits for ever");
+    println!("{schedules} schedules of each situation: every frame is reported exactly once, and nobody waits for ever");
 }

@@ -37,7 +37,7 @@ impl Numbers<'_> {
         }
     }
 
-    /// Any float, often a usual one.
+    /// Any float, often an ordinary one.
     fn float(&mut self) -> f64 {
         match self.byte() % 4 {
             0 => f64::from_bits(

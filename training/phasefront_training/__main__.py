@@ -58,7 +58,7 @@ def parser():
     p = add("seeds", run_seeds, "Make the seeds of a data set by the lab's command; what follows -- goes to `phasefront-lab seeds`.")
     p.add_argument("--data", required=True, help="folder of the data set")
     p.add_argument("-o", "--output", required=True, help="folder of the seeds")
-    p.add_argument("--variants", type=int, default=4, help="depths a scene: clean, and degraded ones (default 4)")
+    p.add_argument("--variants", type=int, default=4, help="depths a scene: the clean one, and simulated sensor depths (default 4)")
     p.add_argument("--phasefront", default="phasefront-lab", metavar="FILE", help="the lab's command (default: phasefront-lab on the PATH)")
     p.add_argument("arguments", nargs=argparse.REMAINDER, help="such as: -- --planes 32")
 
@@ -105,13 +105,13 @@ def parser():
 
     p = add("evaluate", run_evaluate, "PSNR and SSIM of networks on scenes not trained on, beside the RGB as the field.")
     p.add_argument("networks", nargs="*", metavar="NETWORK", help="checkpoints or .onnx files, all for the same input")
-    p.add_argument("--clean-only", action="store_true", help="leave degraded depth out")
+    p.add_argument("--clean-only", action="store_true", help="leave simulated sensor depth out")
     evaluation_flags(p)
 
     p = add("evaluate-encoding", run_evaluate_encoding, "What encoded holograms show: deep double phase of a stage 2 checkpoint beside AA-DPM and plain double phase.")
     p.add_argument("checkpoint")
     p.add_argument("--prefilter", metavar="FILE", help="an .onnx to judge instead of the checkpoint's own pre-filter, such as its int8 form")
-    p.add_argument("--degraded", action="store_true", help="on depth as phones give it")
+    p.add_argument("--sensor-depth", action="store_true", help="on simulated sensor depth")
     p.add_argument("--picture", metavar="FILE", help="draw the scene there on which deep double phase is worst, by all encodings (.png, .jpg)")
     evaluation_flags(p)
 
@@ -120,7 +120,7 @@ def parser():
     p.add_argument("figures", nargs="+", help="files that evaluate --json and evaluate-encoding --json wrote")
     p.add_argument("-o", "--output", required=True, help="the card, NAME.md beside NAME.onnx")
 
-    p = add("recipe", run_recipe, "Make data, train the networks that come along, round them, judge them and write their cards; called again it goes on. What follows -- goes to every training.")
+    p = add("recipe", run_recipe, "Make data, train the bundled networks, round them, judge them and write their cards; called again, it resumes. What follows -- goes to every training.")
     p.add_argument("-o", "--output", required=True, help="folder of all of it")
     p.add_argument("--phasefront", default="phasefront-lab", metavar="FILE", help="the lab's command (default: phasefront-lab on the PATH)")
     p.add_argument("--networks", nargs="+", default=list(recipe.NETWORKS), metavar="NAME", help=f"some of {', '.join(recipe.NETWORKS)} (default all)")
@@ -155,7 +155,7 @@ def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e
     scenes = p.add_mutually_exclusive_group(required=True)
     scenes.add_argument("--data", nargs="+", help="folder of the data set, or of several that are trained on together")
     scenes.add_argument("--pool", metavar="DIR", help="a pool of scenes instead, which may grow meanwhile")
-    p.add_argument("--seeds", nargs="+", help="folder of the seeds of each: for seeded networks, and for refined depth among the degraded")
+    p.add_argument("--seeds", nargs="+", help="folder of the seeds of each: for seeded networks, and for refined depth beside simulated sensor depth")
     p.add_argument("-o", "--output", required=True, help=output)
     budget = p.add_mutually_exclusive_group()
     budget.add_argument("--minutes", type=float, help="budget in minutes of wall clock, resumptions included")
@@ -163,7 +163,7 @@ def training_flags(p, output="folder for checkpoint.pt and curve.jsonl", rate=2e
     p.add_argument("--batch", type=int, default=1, help="samples a step and process (default 1)")
     p.add_argument("--crop", type=int, default=crop, help="pixels a side of a sample (default %(default)s)")
     p.add_argument("--planes", type=int, help="focal planes a step, 0 to 20 (default 1 on a CPU, 20 on a GPU)")
-    p.add_argument("--degraded", type=float, default=0.0, help="share of samples with depth as phones give it (default 0)")
+    p.add_argument("--sensor-depth", type=float, default=0.0, help="share of samples with simulated sensor depth (default 0)")
     p.add_argument("--rate", type=float, default=rate, help="learning rate (default %(default)s)")
     p.add_argument("--scenes", type=int, help="only the first so many training scenes of each data set or shard")
     p.add_argument("--seed", type=int, default=0)
@@ -194,7 +194,7 @@ def run_pool(args):
 
 def run_seeds(args):
     if args.variants < 2:
-        raise ValueError("seeds need 2 variants a scene at least: clean, and degraded")
+        raise ValueError("seeds need at least 2 variants a scene: clean and simulated sensor depth")
     seeds.make(data.Manifest.read(args.data), args.output, args.variants, passed_on(args), args.phasefront)
 
 
@@ -292,7 +292,7 @@ def begun_prefilter(args, display):
 
 def sampling(args):
     """What a step takes, as the tasks name it."""
-    return {name: getattr(args, name) for name in ("batch", "crop", "planes", "degraded", "seed")}
+    return {name: getattr(args, name) for name in ("batch", "crop", "planes", "sensor_depth", "seed")}
 
 
 def load(args, architecture):
@@ -467,7 +467,7 @@ def run_evaluate_encoding(args):
         del model.prefilter  # a module, which the file is not
         model.prefilter = evaluate.OnnxNetwork(args.prefilter)
     scenes = scenes_for(args.data, args.seeds, args.split, {model.hologram.architecture.input}, args.scenes)
-    depth = "degraded" if args.degraded else "clean"
+    depth = evaluate.SENSOR if args.sensor_depth else "clean"
     results = evaluate_encoding.encoding_figures(model, scenes, depth)
     if args.picture:
         evaluate_encoding.draw_worst(model, scenes, results, args.picture, depth)

@@ -11,8 +11,8 @@ from .files import replacing
 from .networks import multiplies_per_pixel
 from .optics import Display
 
-USUAL = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront-lab dataset`
-SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "degraded", "dimmed", "average", "rate", "seed", "scenes", "f32")
+DATASET_DISPLAY = Display.from_manifest({"pitch_um": 8.0, "wavelengths_nm": [638.0, 520.0, 450.0], "volume_depth_mm": 6.0})  # of `phasefront-lab dataset`
+SAMPLING = ("minutes", "steps", "batch", "crop", "planes", "sensor_depth", "dimmed", "average", "rate", "seed", "scenes", "f32")
 
 
 def sets(last):
@@ -44,11 +44,11 @@ def command(last, init):
     if init:
         parts += ["--init", Path(init).name]
     for name in SAMPLING:
-        value = last.options.get(name)
+        flag, value = f"--{name.replace('_', '-')}", last.options.get(name)
         if value is True:
-            parts.append(f"--{name}")
+            parts.append(flag)
         elif value not in (None, False):
-            parts += [f"--{name}", value]
+            parts += [flag, value]
     return shlex.join(map(str, parts))
 
 
@@ -89,7 +89,7 @@ def describe(name, last, figures):
     lines.append(
         f"- Training ({last.kind}): "
         f"{last.step:,} steps of {counted(last.options['batch'], 'crop')} of {last.options['crop']}² pixels in {last.elapsed_s / 60:.0f} minutes"
-        f" on {last.options['device']} with {counted(last.options['threads'], 'thread')}; {last.options['degraded']:.0%} of the samples had degraded depth."
+        f" on {last.options['device']} with {counted(last.options['threads'], 'thread')}; {last.options['sensor_depth']:.0%} of the samples had simulated sensor depth."
     )
     trained_on = "; ".join(
         f"{each['scenes']} scenes{like(each)} of {each['size']}² pixels, {each['planes']} planes, seed {each['seed']}{depth_of(each, last)}" for each in sets(last)
@@ -123,7 +123,7 @@ def scenes_again(last):
     for each, folder, seeds in zip(sets(last), names("DATA", last), names("SEEDS", last)):
         flags = f"--seed {each['seed']} --size {each['size']} --planes {each['planes']} --scenes …"
         flags += f" --scenes-like {each['like']}" if like(each) else ""
-        flags += "" if replace(display_of(each, last), corrected=False) == USUAL else " --display …"
+        flags += "" if replace(display_of(each, last), corrected=False) == DATASET_DISPLAY else " --display …"
         lines.append(f"    python -m phasefront_training data -o {folder} -- {flags}")
         if seeded:
             refined = f"--planes {each['seed_planes']} --refined {each['refined']}"

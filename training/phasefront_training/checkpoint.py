@@ -13,6 +13,7 @@ from .networks import Architecture, Chain
 from .optics import Display
 
 FORMAT = "phasefront-checkpoint-1"
+RENAMED = {"degraded": "sensor_depth"}  # options that early checkpoints name otherwise
 
 
 class CheckpointError(Exception):
@@ -65,6 +66,7 @@ class Checkpoint:
         del table["format"]
         table["networks"] = {name: (Architecture(**a), weights) for name, (a, weights) in table["networks"].items()}
         table["display"] = Display(**table["display"])
+        table["options"] = {RENAMED.get(name, name): value for name, value in table["options"].items()}
         return cls(**table)
 
     def network(self, name="hologram"):

@@ -24,8 +24,8 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from .degrade import degrade_depth
 from .optics import Display, stretched
+from .sensor_depth import simulate_sensor_depth
 
 FORMAT = "phasefront-dataset-1"
 _HEADER = threading.Lock()
@@ -292,11 +292,11 @@ class Sampler:
     of a scene whose red is halved is the hologram with its red halved, exactly. (More contrast is no such change.)
     """
 
-    def __init__(self, scenes, batch, crop, margin, degraded=0.0, seed=0, rank=0, kind="rgbd", dimmed=0.0):
-        if degraded and scenes.ldi_layers > 1:
-            raise ValueError("degraded depth is for rgbd inputs: layered depth images are rendered, not measured")
+    def __init__(self, scenes, batch, crop, margin, sensor_depth=0.0, seed=0, rank=0, kind="rgbd", dimmed=0.0):
+        if sensor_depth and scenes.ldi_layers > 1:
+            raise ValueError("simulated sensor depth is for rgbd inputs: layered depth images are rendered, not measured")
         height, width = scenes.shape
-        self.scenes, self.batch, self.degraded, self.dimmed = scenes, batch, degraded, dimmed
+        self.scenes, self.batch, self.sensor_depth, self.dimmed = scenes, batch, sensor_depth, dimmed
         self.crop = (min(crop, height), min(crop, width))
         if self.crop[0] != self.crop[1]:
             raise ValueError(f"scenes of {width}x{height} hold no square crop of {crop}")
@@ -335,14 +335,14 @@ class Sampler:
             margin if y > 0 else 0 : h - margin if y + h < height else h,
             margin if x > 0 else 0 : w - margin if x + w < width else w,
         ] = 1
-        degraded = rng.random() < self.degraded
+        from_sensor = rng.random() < self.sensor_depth
         field = None
         if scenes.seeded:
-            v = int(rng.integers(1, scenes.variant_depth.shape[1])) if degraded else 0
+            v = int(rng.integers(1, scenes.variant_depth.shape[1])) if from_sensor else 0
             measured = scenes.variant_depth[i, v][window][None].float()
             field = scenes.variant_seed[i, v][window].float() * gains.repeat(2, 1, 1)
         else:
-            measured = degrade_depth(colour, depth[0], rng)[None] if degraded else depth
+            measured = simulate_sensor_depth(colour, depth[0], rng)[None] if from_sensor else depth
         # Measured in its own volume, whose depth the sensor's errors are a share of.
         measured, depth = (stretched(each, scenes.stretch(i)) for each in (measured, depth))
         if self.place is None:

@@ -2,8 +2,8 @@
 
 Amplitude PSNR and SSIM (peak 1) of the midpoint hologram, and the same as the mean over a focal stack of five planes
 inside the volume; means over scenes. Beside the network stand 'RGB as the field', the front layer's image with phase 0,
-and 'SM-LBM of what is visible', exact waves from the front layer alone. Depth is clean, or degraded as a phone's, fixed by the scene's number
-so that figures compare; or, where there are seeds on such depth, a sensor's that the core has refined.
+and 'SM-LBM of what is visible', exact waves from the front layer alone. Depth is clean, or simulated sensor depth that
+the scene's number fixes, so that figures compare; or, where there are seeds on such depth, refined by the core.
 """
 
 import json
@@ -16,15 +16,16 @@ from tqdm import tqdm
 
 from .checkpoint import load_network
 from .data import network_input
-from .degrade import degrade_depth
 from .files import replacing
 from .metrics import psnr, ssim
 from .networks import Architecture, head_field
 from .optics import padded_shape, propagate, stretched, transfer
+from .sensor_depth import simulate_sensor_depth
 
 STACK = (0.4, 0.2, 0.0, -0.2, -0.4)  # planes, in volume depths from the midpoint
 RANGE_TOLERANCE = 0.02  # over the range that was trained, as in the core
 COLOUR_TOLERANCE = 0.05  # of a colour's own range beside their mean, as in the core
+SENSOR = "simulated sensor"  # a kind of depth
 FIGURES = ("amplitude_psnr", "amplitude_ssim", "focal_psnr", "focal_ssim")
 
 
@@ -158,8 +159,8 @@ def compare(field, truth, display, full=True):
     return figures
 
 
-def degradation(number, variant=0):
-    """The generator of a scene's degraded depths; variant 0 is the one that scenes are judged on."""
+def sensor_generator(number, variant=0):
+    """The generator of a scene's simulated sensor depths; variant 0 is the one that scenes are judged on."""
     return np.random.default_rng([7, number] if variant == 0 else [8, number, variant])
 
 
@@ -167,7 +168,7 @@ def depths(scenes):
     """The kinds of depth that scenes can be judged on."""
     if scenes.ldi_layers > 1:
         return ("clean",)
-    return ("clean", "degraded", "refined") if scenes.refined else ("clean", "degraded")
+    return ("clean", SENSOR, "refined") if scenes.refined else ("clean", SENSOR)
 
 
 def scene_as_seen(scenes, i, kind):
@@ -175,9 +176,9 @@ def scene_as_seen(scenes, i, kind):
     colour, depth, truth = scenes.scene(i)
     seed = None
     if scenes.seeded:
-        depth, seed = scenes.variant(i, {"clean": 0, "degraded": 1, "refined": -scenes.refined}[kind])
-    elif kind == "degraded":
-        depth = torch.cat([degrade_depth(colour[:3], depth[0], degradation(scenes.numbers[i]))[None], depth[1:]])
+        depth, seed = scenes.variant(i, {"clean": 0, SENSOR: 1, "refined": -scenes.refined}[kind])
+    elif kind == SENSOR:
+        depth = torch.cat([simulate_sensor_depth(colour[:3], depth[0], sensor_generator(scenes.numbers[i]))[None], depth[1:]])
     return colour, stretched(depth, scenes.stretch(i)), seed, truth
 
 

@@ -36,7 +36,7 @@ class LossNotFinite(Exception):
 
 
 class Task:
-    """What a stage trains. `networks` is {name: Chain}; `modules` are the trained modules (usually the same)."""
+    """What a stage trains. `networks` is {name: Chain}; `modules` are the trained modules (often the same)."""
 
     kind = ""
     networks = {}

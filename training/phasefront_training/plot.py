@@ -9,7 +9,7 @@ from matplotlib import pyplot  # noqa: E402  the backend comes first
 
 from .loop import read_curve  # noqa: E402
 
-FIGURES = {"validation_psnr": "-", "validation_degraded_psnr": "--"}
+FIGURES = {"validation_psnr": "-", "validation_sensor_depth_psnr": "--"}
 
 
 def plot(folders, output):
@@ -24,7 +24,7 @@ def plot(folders, output):
         for key, style in FIGURES.items():
             points = [(line["elapsed_s"] / 60, line[key]) for line in curve if key in line]
             if points:
-                label = f"{name}, degraded depth" if "degraded" in key else name
+                label = f"{name}, simulated sensor depth" if "sensor" in key else name
                 right.plot(*zip(*points), style, color=colour, label=label)
     left.set(xlabel="minutes", ylabel="loss", yscale="log")
     right.set(xlabel="minutes", ylabel="amplitude PSNR (dB), validation")

@@ -5,7 +5,7 @@ A shard is made under another name and renamed when it is whole, so whoever read
 Shard k has the seed FIRST_SEED + k and the kind that the shares are most short of, so that a pool of any length holds the
 kinds in their shares, and one that is made again has the same bytes.
 
-Networks train on the shards' training scenes; those that come later are taken in as they come. The first shards' validation
+Networks train on the shards' training scenes; those that are added later join at once. The first shards' validation
 scenes judge the training. What is drawn at a step depends on how many scenes there are at that step: a training on a pool
 that grows does not repeat itself bit by bit; on one that is complete it does.
 """

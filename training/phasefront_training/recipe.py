@@ -101,7 +101,7 @@ def _of_network(settings, name, network):
     minutes = 60 * settings.hours * network.share / sum(NETWORKS[each].share for each in settings.networks)
     begins = ("--init", folder / network.after / "checkpoint.pt") if network.after else ("--dimmed", 0.25)
     training = ("stage2" if network.after else "stage1", *sets, "-o", folder / name, *network.flags, *begins)
-    training += ("--degraded", 0.5, "--minutes", round(minutes, 3), *settings.training)
+    training += ("--sensor-depth", 0.5, "--minutes", round(minutes, 3), *settings.training)
     yield _step(f"train {name}", *training, resumed=checkpoint)
     for part in ("hologram", "prefilter") if network.after else ("hologram",):
         stem = name if part == "hologram" else f"{name}-prefilter"

@@ -1,11 +1,11 @@
-"""Seeds: the plane sweep's field of each scene, on clean and on degraded depth, as seeded networks see it in use.
+"""Seeds: the plane sweep's field of each scene, on clean and on simulated sensor depth, as seeded networks see it in use.
 
 A folder beside a data set, made by `python -m phasefront_training seeds`. This package writes the depths,
-`depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are degraded
-(degrade.py), the first of them as `evaluate` degrades that scene. The lab's `phasefront-lab seeds` may add R more, read by a
-sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W); and adds to all of them the fields that the SDK
-computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale that `seeds.json`
-says.
+`depth_000123.npy`, uint16 (V, H, W), d·65535: variant 0 is the clean depth of the visible layer, the others are simulated
+sensor depth (sensor_depth.py); `evaluate` judges that scene on the first of them. `phasefront-lab seeds` may add R more,
+read by a sensor and refined by the core, `refined_000123.npy`, uint16 (R, H, W). It adds to all of them the fields that
+the SDK computes, `seed_000123.npy`, int16 (V + R, 6, H, W), real parts, then imaginary parts, times the scale that
+`seeds.json` says.
 """
 
 import json
@@ -17,9 +17,9 @@ import numpy as np
 import torch
 
 from .data import DataError, read_pair
-from .degrade import degrade_depth
-from .evaluate import degradation
+from .evaluate import sensor_generator
 from .files import replacing
+from .sensor_depth import simulate_sensor_depth
 
 FORMAT = "phasefront-seeds-1"
 
@@ -45,7 +45,7 @@ def make(manifest, output, variants, arguments, command="phasefront-lab"):
 def _depths(pair, number, variants):
     colour, depth, _ = read_pair(pair, 1)
     colour, depth = torch.from_numpy(colour).float() / 255, torch.from_numpy(depth[0]).float()
-    depths = [depth] + [degrade_depth(colour, depth, degradation(number, v)) for v in range(variants - 1)]
+    depths = [depth] + [simulate_sensor_depth(colour, depth, sensor_generator(number, v)) for v in range(variants - 1)]
     return (torch.stack(depths).numpy() * 65535).round().astype(np.uint16)
 
 

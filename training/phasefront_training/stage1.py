@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from .data import Sampler
-from .evaluate import evaluate, torch_predictor
+from .evaluate import SENSOR, evaluate, torch_predictor
 from .loop import Task
 from .losses import field_terms, fill_invalid, focal_stack_terms
 from .networks import head_field
@@ -38,20 +38,20 @@ class Stage1(Task):
 
     kind = "stage1"
 
-    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, degraded=0.0, bf16=True, seed=0, dimmed=0.0):
+    def __init__(self, network, scenes, validation, workers, batch=1, crop=192, planes=None, sensor_depth=0.0, bf16=True, seed=0, dimmed=0.0):
         self.network = network.to(workers.device, memory_format=torch.channels_last)
         self.networks = {"hologram": network}
         self.display = scenes.display
         self.validation = validation
         self.device = workers.device
         self.bf16 = bf16
-        self.degraded = degraded
+        self.sensor_depth = sensor_depth
         self.seed, self.rank = seed, workers.rank
         self.planes = planes if planes is not None else (PLANES_ON_GPU if workers.device.type == "cuda" else PLANES_ON_CPU)
         self.scenes, self.looked = scenes, 0
         cut, kind = margin(network.architecture), network.architecture.input
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, kind, dimmed)
-        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, degraded, seed, 0, kind, dimmed)
+        self.sampler = Sampler(scenes, batch, crop, cut, sensor_depth, seed, workers.rank, kind, dimmed)
+        self.revival = Sampler(scenes, REVIVAL_SCENES, crop, cut, sensor_depth, seed, 0, kind, dimmed)
 
     def module(self):
         return self.network
@@ -94,6 +94,6 @@ class Stage1(Task):
     def validate(self):
         predict = torch_predictor(self.network, self.bf16)
         line = {"validation_psnr": evaluate(predict, self.validation, full=False)["amplitude_psnr"]}
-        if self.degraded:
-            line["validation_degraded_psnr"] = evaluate(predict, self.validation, "degraded", full=False)["amplitude_psnr"]
+        if self.sensor_depth:
+            line["validation_sensor_depth_psnr"] = evaluate(predict, self.validation, SENSOR, full=False)["amplitude_psnr"]
         return line

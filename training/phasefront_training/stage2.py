@@ -33,14 +33,14 @@ def prefilter_network(layers=8, filters=8):
 class _OnHolograms(Task):
     """What both parts share: samples whose cut sides are farther in than light comes from beyond them."""
 
-    def __init__(self, model, scenes, validation, workers, batch=1, crop=384, degraded=0.0, seed=0):
+    def __init__(self, model, scenes, validation, workers, batch=1, crop=384, sensor_depth=0.0, seed=0):
         self.model = model.to(workers.device, memory_format=torch.channels_last)
         self.display, self.validation, self.device = scenes.display, validation, workers.device
         self.networks = {"hologram": model.hologram, "prefilter": model.prefilter}
         self.seed, self.rank = seed, workers.rank
         cut = margin(model.hologram.architecture) + self.display.reach_px(model.offset_m)
         self.facts = scenes.facts
-        self.sampler = Sampler(scenes, batch, crop, cut, degraded, seed, workers.rank, model.hologram.architecture.input)
+        self.sampler = Sampler(scenes, batch, crop, cut, sensor_depth, seed, workers.rank, model.hologram.architecture.input)
 
     def sample(self, step):
         return self.sampler.draw(step)

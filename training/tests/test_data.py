@@ -8,7 +8,7 @@ import torch
 
 from phasefront_training import data
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes, network_input, read_pair
-from phasefront_training.degrade import degrade_depth, fill_nearest
+from phasefront_training.sensor_depth import fill_nearest, simulate_sensor_depth
 from phasefront_training.evaluate import scene_as_seen, served, visible_layers
 from phasefront_training.metrics import psnr
 
@@ -84,17 +84,17 @@ def test_valid_marks_cut_sides_only(data_folder):
         assert rows.sum() in (32, 40) and columns.sum() in (32, 40)
 
 
-def test_degradations_keep_shape_and_range_and_change_depth(data_folder):
+def test_sensor_depths_keep_shape_and_range_and_change_depth(data_folder):
     scenes = Scenes(Manifest.read(data_folder), "train")
     colour, depth, _ = scenes.scene(0)
     changed = 0
     for seed in range(60):
-        bad = degrade_depth(colour[:, :, :51], depth[0, :, :51], np.random.default_rng(seed))
+        bad = simulate_sensor_depth(colour[:, :, :51], depth[0, :, :51], np.random.default_rng(seed))
         assert bad.shape == (64, 51) and torch.isfinite(bad).all() and 0 <= bad.min() and bad.max() <= 1
         changed += not torch.equal(bad, depth[0, :, :51])
         assert (bad - depth[0, :, :51]).abs().median() < 0.05
     assert changed > 50
-    again = [degrade_depth(colour, depth[0], np.random.default_rng(9)) for _ in range(2)]
+    again = [simulate_sensor_depth(colour, depth[0], np.random.default_rng(9)) for _ in range(2)]
     assert torch.equal(*again)
 
 
@@ -153,7 +153,7 @@ def test_depths_of_a_shallower_volume_are_stretched_to_the_deeper_one(data_folde
     whole = Scenes.joined(sets)
     assert whole.display == Manifest.read(data_folder).display
     assert [each["volume_depth_mm"] for each in whole.facts["sets"]] == [3.0, 6.0]
-    for kind in ("clean", "degraded"):
+    for kind in ("clean", "simulated sensor"):
         own, deep = (scene_as_seen(whole, i, kind)[1] for i in (0, 5))
         assert torch.allclose(own, 0.25 + 0.5 * deep, atol=1e-3)
     samples = Sampler(whole, 1, 64, 0)
@@ -203,9 +203,9 @@ def test_holes_take_the_nearest_valid_depth():
     assert torch.equal(fill_nearest(depth, holes)[0, 0, 2], torch.tensor([0.0, 0, 0, 5, 5, 5, 6]))
 
 
-def test_degraded_layered_inputs_are_refused(data_folder):
+def test_sensor_depth_of_layered_inputs_is_refused(data_folder):
     with pytest.raises(ValueError, match="rgbd"):
-        Sampler(Scenes(Manifest.read(data_folder), "train", 2), 1, 48, 8, degraded=0.5)
+        Sampler(Scenes(Manifest.read(data_folder), "train", 2), 1, 48, 8, sensor_depth=0.5)
 
 
 def test_coordinates_say_where_a_crop_lies_and_nothing_is_flipped(data_folder):

@@ -146,7 +146,7 @@ def test_stage2_trains_resumes_and_exports_both_networks(data_folder, tmp_path, 
     assert pyplot.imread(picture).std() > 0
     exact = capsys.readouterr().out
     assert "deep double phase" in exact and "anti-aliased" in exact and "worst_scene" in exact
-    assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder), "--degraded"]) == 0
+    assert main(["evaluate-encoding", str(second / "checkpoint.pt"), "--data", str(data_folder), "--sensor-depth"]) == 0
     assert deep(capsys.readouterr().out) != deep(exact)
     int8 = tmp_path / "pre-int8.onnx"
     before = last.networks["hologram"][1]

@@ -14,8 +14,8 @@ COMMAND = Path(os.environ.get("CARGO_TARGET_DIR", CACHE / "target")) / "release"
 
 
 def settings(folder, **changes):
-    usual = {"networks": tuple(recipe.NETWORKS), "hours": 2.0, "scenes": 40, "size": 48, "planes": 4, "training": ("--f32",)}
-    return recipe.Settings(folder, str(COMMAND), **usual | changes)
+    common = {"networks": tuple(recipe.NETWORKS), "hours": 2.0, "scenes": 40, "size": 48, "planes": 4, "training": ("--f32",)}
+    return recipe.Settings(folder, str(COMMAND), **common | changes)
 
 
 def test_every_network_is_trained_rounded_judged_and_described(tmp_path):

@@ -6,8 +6,8 @@ import torch
 
 from phasefront_training.__main__ import main
 from phasefront_training.data import DataError, Manifest, Sampler, Scenes
-from phasefront_training.degrade import degrade_depth
-from phasefront_training.evaluate import degradation, depths, evaluate, scene_as_seen, seed_as_field, torch_predictor
+from phasefront_training.sensor_depth import simulate_sensor_depth
+from phasefront_training.evaluate import depths, evaluate, scene_as_seen, seed_as_field, sensor_generator, torch_predictor
 from phasefront_training.export import read_description
 from phasefront_training.networks import Architecture, Chain
 from phasefront_training.seeds import Seeds
@@ -21,7 +21,7 @@ def stored(field):
 
 @pytest.fixture
 def seeds_folder(data_folder, tmp_path):
-    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on degraded depth half of it; the one
+    """Seeds made by the command, with a stand-in for the lab: the seed is the truth, on simulated sensor depth half of it; the one
     refined depth is 0.25 throughout."""
     folder = tmp_path / "seeds"
     main(["seeds", "--data", str(data_folder), "-o", str(folder), "--variants", "3", "--phasefront", "true"])
@@ -43,8 +43,8 @@ def test_depths_are_the_clean_one_and_those_that_scenes_are_judged_on(data_folde
     for i in range(len(found)):
         colour, depth, _ = found.scene(i)
         assert torch.allclose(found.variant(i, 0)[0], depth, atol=1e-3)
-        degraded = degrade_depth(colour[:3], depth[0], degradation(found.numbers[i]))
-        assert torch.allclose(found.variant(i, 1)[0][0], degraded, atol=1e-3)
+        measured = simulate_sensor_depth(colour[:3], depth[0], sensor_generator(found.numbers[i]))
+        assert torch.allclose(found.variant(i, 1)[0][0], measured, atol=1e-3)
         assert not torch.equal(found.variant(i, 1)[0], found.variant(i, 2)[0])
         assert torch.allclose(scene_as_seen(found, i, "refined")[1], torch.tensor(0.25), atol=1e-3)
 
@@ -61,8 +61,8 @@ def test_a_network_that_adds_nothing_gives_the_seed(data_folder, seeds_folder):
 
 def test_samples_hold_the_seed_of_their_depth(data_folder, seeds_folder):
     found = scenes(data_folder, seeds_folder)
-    for degraded, factor in ((0.0, 1.0), (1.0, 0.5)):
-        batch = Sampler(found, 4, 48, 4, degraded, kind="seeded").draw(0)
+    for share, factor in ((0.0, 1.0), (1.0, 0.5)):
+        batch = Sampler(found, 4, 48, 4, share, kind="seeded").draw(0)
         real, imaginary = 2 * batch.input[:, 4:7] + 0.5, 2 * batch.input[:, 7:]
         assert torch.allclose(real, factor * batch.target.real, atol=2e-3)
         assert torch.allclose(imaginary, factor * batch.target.imag, atol=2e-3)
@@ -80,7 +80,7 @@ def test_other_networks_take_depth_from_the_seeds_folder(data_folder, seeds_fold
 def test_a_seeded_network_is_trained_quantized_and_judged(data_folder, seeds_folder, tmp_path, capsys):
     common = ["--data", str(data_folder), "--seeds", str(seeds_folder)]
     train = ["stage1", *common, "-o", str(tmp_path / "out"), "--input", "seeded", "--layers", "4", "--filters", "8"]
-    assert main([*train, "--steps", "3", "--crop", "48", "--degraded", "0.5", "--f32"]) == 0
+    assert main([*train, "--steps", "3", "--crop", "48", "--sensor-depth", "0.5", "--f32"]) == 0
     checkpoint, onnx = str(tmp_path / "out" / "checkpoint.pt"), str(tmp_path / "small.onnx")
     assert main(["quantize", checkpoint, *common, "-o", onnx, "--steps", "2", "--crop", "48"]) == 0
     assert main(["evaluate", checkpoint, onnx, *common]) == 0

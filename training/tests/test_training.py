@@ -35,14 +35,14 @@ def test_a_budget_is_one_and_more_than_nothing(budget):
         Budget(**budget)
 
 
-@pytest.mark.parametrize("degraded", [0.0, 0.5])
-def test_a_resumed_training_gives_the_same_curve_and_weights(data_folder, tmp_path, degraded):
+@pytest.mark.parametrize("sensor_depth", [0.0, 0.5])
+def test_a_resumed_training_gives_the_same_curve_and_weights(data_folder, tmp_path, sensor_depth):
     budget = Budget(steps=12)
-    whole = fit(task(data_folder, degraded=degraded), budget, 2e-3, tmp_path / "whole", HERE)
-    fit(task(data_folder, degraded=degraded), budget, 2e-3, tmp_path / "parts", HERE, stop_at=5)
+    whole = fit(task(data_folder, sensor_depth=sensor_depth), budget, 2e-3, tmp_path / "whole", HERE)
+    fit(task(data_folder, sensor_depth=sensor_depth), budget, 2e-3, tmp_path / "parts", HERE, stop_at=5)
     half = Checkpoint.load(tmp_path / "parts" / "checkpoint.pt")
     assert half.step == 5
-    second = task(data_folder, degraded=degraded)
+    second = task(data_folder, sensor_depth=sensor_depth)
     second.network.load_state_dict(half.network().state_dict())
     resumed = fit(second, budget, 2e-3, tmp_path / "parts", HERE, resume=half)
     curves = [read_curve(tmp_path / name / "curve.jsonl") for name in ("whole", "parts")]
@@ -95,10 +95,10 @@ def test_losses_vanish_at_the_truth_and_only_there(data_folder):
 def test_commands_train_resume_export_and_evaluate(data_folder, tmp_path, capsys):
     out = tmp_path / "run"
     base = ["stage1", "--data", str(data_folder), "-o", str(out)]
-    assert main([*base, "--layers", "4", "--filters", "8", "--crop", "48", "--steps", "4", "--degraded", "0.5"]) == 0
+    assert main([*base, "--layers", "4", "--filters", "8", "--crop", "48", "--steps", "4", "--sensor-depth", "0.5"]) == 0
     assert main([*base, "--resume", "--steps", "8"]) == 0
     last = Checkpoint.load(out / "checkpoint.pt")
-    assert last.step == 8 and last.options["crop"] == 48 and last.options["degraded"] == 0.5
+    assert last.step == 8 and last.options["crop"] == 48 and last.options["sensor_depth"] == 0.5
     onnx = tmp_path / "n.onnx"
     assert main(["export", str(out / "checkpoint.pt"), "-o", str(onnx)]) == 0
     grown = ["stage1", "--data", str(data_folder), "-o", str(tmp_path / "grown"), "--layers", "6", "--filters", "8"]
@@ -112,7 +112,7 @@ def test_commands_train_resume_export_and_evaluate(data_folder, tmp_path, capsys
     text = tmp_path / "small.md"
     assert main(["card", str(out / "checkpoint.pt"), str(figures), "-o", str(text)]) == 0
     told = text.read_text()
-    assert "4 layers of 8 filters" in told and "| n.onnx | degraded |" in told and "--layers 4" in told and "50%" in told
+    assert "4 layers of 8 filters" in told and "| n.onnx | simulated sensor |" in told and "--layers 4" in told and "50%" in told
     assert main(["plot", str(out), "-o", str(tmp_path / "curves.png")]) == 0 and (tmp_path / "curves.png").stat().st_size > 5000
 
 

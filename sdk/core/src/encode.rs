@@ -28,7 +28,7 @@ pub struct EncoderOptions {
     /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase,
     /// which shows noise there as coloured speckle. 0 leaves phases as they are.
     pub dark_threshold: f32,
-    /// Steps of local correction: each draws what is shown behind the display's aperture toward the field that is
+    /// Steps of local correction: each draws the image behind the display's aperture toward the field that is
     /// wanted. The first brings most; 8 at most.
     pub local_steps: usize,
     /// Steps of correction at the midpoint after them, for stills: sharper there, at four transforms a colour and step.

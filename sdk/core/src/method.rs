@@ -90,8 +90,8 @@ enum Scratch {
     Auto {
         sweep: SweepScratch,
         trained: Box<MethodScratch>,
-        /// Whether the frame before was sharp.
-        was_sharp: Option<bool>,
+        /// Whether the depth of the frame before was clean.
+        was_clean: Option<bool>,
     },
 }
 
@@ -171,7 +171,7 @@ impl MethodPlan {
             Plan::Auto(sweep, trained) => Scratch::Auto {
                 sweep: sweep.scratch(),
                 trained: Box::new(trained.scratch()),
-                was_sharp: None,
+                was_clean: None,
             },
         })
     }
@@ -206,16 +206,16 @@ impl MethodPlan {
                 Scratch::Auto {
                     sweep: of_sweep,
                     trained: of_trained,
-                    was_sharp,
+                    was_clean,
                 },
             ) => {
                 let measured = sharpness::measure(frame);
-                let is_sharp = match was_sharp.filter(|_| follows) {
-                    Some(was) => measured.stays_sharp(was),
-                    None => measured.is_sharp(),
+                let is_clean = match was_clean.filter(|_| follows) {
+                    Some(was) => measured.stays_clean(was),
+                    None => measured.is_clean(),
                 };
-                *was_sharp = Some(is_sharp);
-                match is_sharp {
+                *was_clean = Some(is_clean);
+                match is_clean {
                     true => sweep.field(frame, field, of_sweep),
                     false => trained.field(frame, field, of_trained),
                 }

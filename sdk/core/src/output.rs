@@ -158,7 +158,7 @@ pub struct Output {
     around: Dark,
 }
 
-/// What is shown around the hologram: double phase of amplitude 0.
+/// The border around the hologram: double phase of amplitude 0.
 #[derive(Debug, Clone)]
 enum Dark {
     /// The levels where x + y of the hologram is even and where it is odd.

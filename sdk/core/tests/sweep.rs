@@ -175,15 +175,15 @@ fn what_cannot_be_swept_is_named() {
         let plan = SweepPlan::new(8, 8, &Display::default(), sweep, z_m);
         plan.err().unwrap().to_string()
     };
-    let usual = Sweep::for_display(&Display::default());
+    let default = Sweep::for_display(&Display::default());
     for (sweep, z_m, message) in [
-        (Sweep { planes: 0, ..usual }, 0.0, "0 planes; 1 to 1024 are right"),
-        (Sweep { taps: 8, ..usual }, 0.0, "an odd number from 3 to 63"),
+        (Sweep { planes: 0, ..default }, 0.0, "0 planes; 1 to 1024 are right"),
+        (Sweep { taps: 8, ..default }, 0.0, "an odd number from 3 to 63"),
         (
             Sweep {
                 taps: 3,
                 planes: 8,
-                ..usual
+                ..default
             },
             0.0,
             "9 taps or 30 planes are right",
@@ -191,14 +191,14 @@ fn what_cannot_be_swept_is_named() {
         (
             Sweep {
                 hidden_layers: 3,
-                ..usual
+                ..default
             },
             0.0,
             "3 hidden layers; 0 to 2",
         ),
-        (Sweep { tile: 20, ..usual }, 0.0, "a multiple of 16"),
-        (usual, 0.1, "end at the midpoint and propagate from there"),
-        (usual, f64::NAN, "must be finite"),
+        (Sweep { tile: 20, ..default }, 0.0, "a multiple of 16"),
+        (default, 0.1, "end at the midpoint and propagate from there"),
+        (default, f64::NAN, "must be finite"),
     ] {
         let is = refused(sweep, z_m);
         assert!(is.contains(message), "{is}");
@@ -256,7 +256,7 @@ fn auto_gives_each_frame_what_suits_its_depth() {
     // A modulator that a sweep alone would go on to.
     let display = Display::default().with_offset_m(2e-3).unwrap();
     let network = Arc::new(Network::from_onnx(&Model::new(4, 8).bytes()).unwrap());
-    let usual = Sweep::for_display(&display);
+    let default = Sweep::for_display(&display);
     let square = |y: usize, x: usize| (10..30).contains(&y) && (15..40).contains(&x);
     let frame = |ramp: usize| {
         let rgb = Array3::from_shape_fn((3, height, width), |(_, y, x)| 0.2 + 0.6 * f32::from(square(y, x)));
@@ -272,12 +272,12 @@ fn auto_gives_each_frame_what_suits_its_depth() {
         field
     };
     let plan = |method| MethodPlan::new(height, width, method, &display).unwrap();
-    let either = plan(Method::Auto(usual, network.clone()));
+    let either = plan(Method::Auto(default, network.clone()));
     assert!(either.z_m() == 0.0 && either.engine().is_some());
-    let midpoint = SweepPlan::new(height, width, &display, usual, 0.0).unwrap();
-    let (sharp, ragged) = (frame(1), frame(5));
-    assert!(made(&either, &sharp) == run(&midpoint, &sharp));
-    assert!(made(&either, &ragged) == made(&plan(Method::trained(network)), &ragged));
+    let midpoint = SweepPlan::new(height, width, &display, default, 0.0).unwrap();
+    let (clean, noisy) = (frame(1), frame(5));
+    assert!(made(&either, &clean) == run(&midpoint, &clean));
+    assert!(made(&either, &noisy) == made(&plan(Method::trained(network)), &noisy));
 }
 
 #[test]
@@ -314,8 +314,8 @@ fn instruction_sets_give_the_same_bits() {
 #[test]
 fn hidden_surfaces_are_their_oracle() {
     for (height, width, reach) in [(70, 45, 7), (33, 64, 30), (1, 9, 3), (9, 1, 40)] {
-        let ragged = Array2::from_shape_fn((height, width), |(y, x)| ((x * 7 + y * 13 + x * y) % 17) as f32 / 16.0);
-        for depth in [ragged, frame(height, width).depth().to_owned()] {
+        let noise = Array2::from_shape_fn((height, width), |(y, x)| ((x * 7 + y * 13 + x * y) % 17) as f32 / 16.0);
+        for depth in [noise, frame(height, width).depth().to_owned()] {
             let depth = depth.as_slice().unwrap();
             let plan = hidden::Hidden::new(height, width, reach);
             let mut sources = vec![0; 2 * depth.len()];

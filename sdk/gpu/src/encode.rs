@@ -139,7 +139,7 @@ impl Encoder {
 
     /// Encodes into the buffers of that index.
     pub(super) fn run(&self, pass: &mut wgpu::ComputePass<'_>, buffers: usize) {
-        // Of the field as it comes, as on the CPU.
+        // Brightness is that of the unfiltered field, as on the CPU.
         if let Some(smoother) = &self.smoother {
             smoother.run(pass);
         }

@@ -1,4 +1,4 @@
-//! From a frame as it comes to what a chain reads: groups of four channels in the chain's numbers. The twins are
+//! Converts a captured frame to what a chain reads: groups of four channels in the chain's numbers. The twins are
 //! [`phasefront_core::frame`] and the kernels' quantiser.
 
 mod camera;

@@ -1,4 +1,4 @@
-//! From a frame as it comes to the hologram's field, on the GPU: the twin of [`phasefront_core::method`].
+//! Makes the hologram's field of a captured frame on the GPU: the twin of [`phasefront_core::method`].
 
 pub(crate) mod chain;
 mod hidden;

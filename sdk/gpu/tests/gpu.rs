@@ -362,13 +362,13 @@ fn whole_frames_are_those_of_the_cpu() {
 fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     let device = device();
     let display = Display::from_toml("volume_depth_mm = 5").unwrap();
-    let usual = Sweep::for_display(&display);
+    let default = Sweep::for_display(&display);
     let plain = Sweep {
         planes: 24,
         taps: 11,
         hidden_layers: 0,
         between_planes: false,
-        ..usual
+        ..default
     };
     let model = Model {
         inputs: 10,
@@ -383,8 +383,8 @@ fn sweeps_and_seeded_networks_are_those_of_the_cpu() {
     };
     let f32 = Float::F32;
     for (method, (h, w), offset_m, encoding, float, tolerance) in [
-        (Method::Sweep(usual), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.002),
-        (Method::Sweep(usual), (47, 61), 3e-3, Encoding::BAND_LIMIT, f32, 0.002),
+        (Method::Sweep(default), (61, 47), 0.0, Encoding::ANTI_ALIAS, f32, 0.002),
+        (Method::Sweep(default), (47, 61), 3e-3, Encoding::BAND_LIMIT, f32, 0.002),
         (Method::Sweep(plain), (61, 47), 20e-3, Encoding::DoublePhase, f32, 0.002),
         (seeded(&float), (61, 47), 2e-3, Encoding::ANTI_ALIAS, f32, 0.002),
         (seeded(&float), (61, 47), 0.0, Encoding::ANTI_ALIAS, half, 0.05),

@@ -1,4 +1,4 @@
-//! A camera for tests: frames of a synthetic scene in every format, with strides and gaps as they come.
+//! A camera for tests: frames of a synthetic scene in every format, with strides and gaps.
 #![allow(dead_code)]
 
 use phasefront::input::{

@@ -224,7 +224,7 @@ fn time_frames(case: &Case<'_>, target: &Target, pipeline: &Pipeline, budget: Du
     Ok(times)
 }
 
-/// A frame with colour everywhere, and with the depths of a usual scene: a floor up to a wall, and balls before it.
+/// A frame with colour everywhere, and with the depths of a typical scene: a floor up to a wall, and balls before it.
 /// What is in it does not change what a network costs; a sweep costs more the more depths are near each other.
 fn test_frame(height: usize, width: usize) -> Result<RgbdFrame> {
     let value = |c: usize, y: usize, x: usize| ((c * 7 + x * 3 + y * 5) % 256) as f32 / 255.0;

@@ -2,7 +2,7 @@
 //! relative inverse depth, on any scale, run by tract.
 //!
 //! The file's own input says what it takes: its numbers' type, the place of its three colours (NCHW or NHWC), its size.
-//! Where the size is left open, the picture nearly keeps its proportions at about [`USUAL_SIDE`], in multiples of
+//! Where the size is left open, the picture nearly keeps its proportions at about [`DEFAULT_SIDE`], in multiples of
 //! [`MULTIPLE`].
 
 mod bounds;
@@ -20,8 +20,8 @@ use tract_onnx::tract_hir::infer::Factoid;
 use tract_onnx::tract_hir::internal::DimLike;
 
 /// The shorter side of a picture for a network that leaves it open, pixels.
-pub const USUAL_SIDE: usize = 448;
-/// What its sides are multiples of: of 14 and 32, the patches and strides of usual networks.
+pub const DEFAULT_SIDE: usize = 448;
+/// What its sides are multiples of: of 14 and 32, the patches and strides of common networks.
 pub const MULTIPLE: usize = 224;
 /// The most pixels that a network takes.
 const MOST_PIXELS: usize = 1 << 24;
@@ -156,7 +156,7 @@ impl Input {
 
 /// (H, W) for a network that takes any.
 fn open_sides((height, width): (usize, usize)) -> [usize; 2] {
-    let scale = USUAL_SIDE as f64 / height.min(width) as f64;
+    let scale = DEFAULT_SIDE as f64 / height.min(width) as f64;
     [height, width].map(|side| {
         let steps = (side as f64 * scale / MULTIPLE as f64).round() as usize;
         steps.clamp(1, 16) * MULTIPLE

@@ -141,7 +141,7 @@ const SIZE: (usize, usize) = (45, 67);
 /// Tests what the CPU computes.
 ///
 /// # Errors
-/// A network that does not come along, or what cannot be planned.
+/// A network that is not bundled, or what cannot be planned.
 pub fn self_test() -> Result<Vec<Check>> {
     Ok(vec![int8()?, f32()?, sweep()?, propagation()?, frame()?])
 }

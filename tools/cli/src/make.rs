@@ -44,7 +44,7 @@ impl HologramRequest {
                     CoreMethod::Auto => self.automatic(frame, &display.target.display)?,
                     method => method,
                 };
-                // Where depth is sharp, auto leaves its network alone.
+                // If depth is clean, auto does not use its network.
                 let trained = method == chosen || chosen == CoreMethod::Network;
                 let method = chosen;
                 let (core, encoder) = method.of(&Parts {
@@ -68,10 +68,10 @@ impl HologramRequest {
         }
     }
 
-    /// What suits the frame: the sweep where depth is sharp, or no network is for the display.
+    /// Chooses what suits the frame: the sweep if depth is clean, or if no network is for the display.
     fn automatic(&self, frame: &RgbdFrame, display: &phasefront::Display) -> Result<CoreMethod> {
         let trained = self.network.is_some() || default_network(display).is_some();
-        Ok(match trained && !sharpness::measure(frame).is_sharp() {
+        Ok(match trained && !sharpness::measure(frame).is_clean() {
             true => CoreMethod::Network,
             false => CoreMethod::Sweep,
         })

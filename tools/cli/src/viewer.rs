@@ -1,5 +1,5 @@
-//! One HTML file to look at holograms in: a stack of views, the wanted field beside what is shown, phases, figures.
-//! It needs no server, no network and no other file.
+//! One HTML file to look at holograms in: a stack of views, the wanted field beside the displayed image, phases,
+//! figures. It needs no server, no network and no other file.
 //!
 //! A page carries its [`Scene`]s as JSON, pictures in it as WebP, so that pages can be read again and joined to one.
 
@@ -58,7 +58,7 @@ pub struct Scene {
     pub z_mm: Vec<f64>,
     /// Frames of a video; 1 for a still.
     pub frames: usize,
-    /// What is shown: of each frame all views, as data URLs.
+    /// All displayed views of each frame, as data URLs.
     pub shown: Vec<String>,
     /// The wanted field in the same order, or none.
     pub field: Vec<String>,

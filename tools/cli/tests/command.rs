@@ -224,7 +224,7 @@ fn an_image_is_fitted_to_the_modulator() {
         folder.succeeds(&["refocus", "h.png", "--z-mm", "0", "-o", "v.png"]);
         let view = picture::read_rgb(&folder.path("v.png")).unwrap();
         let light = |y: usize, x: usize| view.slice(s![.., y..y + 6, x..x + 6]).mean().unwrap();
-        // Black above what is shown, or the image.
+        // Black above the picture, or the picture.
         assert_eq!(light(2, 46) > 0.1, fit == "cover", "{fit}");
         assert!(light(46, 46) > 0.15, "{fit}");
         assert_eq!(light(46, 4) > 0.1, fit != "centre", "{fit}");
@@ -240,7 +240,7 @@ fn a_hologram_of_another_size_than_its_modulator_is_told_of() {
         let depth = image::GrayImage::from_fn(width, height, |x, _| image::Luma([(x % 256) as u8]));
         depth.save(folder.path(&format!("{name}-depth.png"))).unwrap();
     }
-    fs::write(folder.path("usual.toml"), "pitch_um = 8").unwrap();
+    fs::write(folder.path("pitch.toml"), "pitch_um = 8").unwrap();
     fs::write(folder.path("same.toml"), "width = 96\nheight = 8").unwrap();
     let told = |name: &str, more: &[&str]| {
         let (rgb, depth) = (format!("{name}.png"), format!("{name}-depth.png"));
@@ -256,7 +256,7 @@ fn a_hologram_of_another_size_than_its_modulator_is_told_of() {
         larger.contains("1921×8") && larger.contains("default modulator 1920×1080"),
         "{larger}"
     );
-    let smaller = told("whole", &["--display", "usual.toml"]);
+    let smaller = told("whole", &["--display", "pitch.toml"]);
     assert!(
         smaller.contains("96×8") && smaller.contains("the modulator 1920×1080: --fit"),
         "{smaller}"
@@ -394,7 +394,7 @@ fn hologram<'a>(rgb: &'a str, depth: &'a str) -> Vec<&'a str> {
     vec!["hologram", "--rgb", rgb, "--depth", depth, "-o", "h.png"]
 }
 
-/// Arguments that make a hologram of the usual frame, and `more`.
+/// Arguments that make a hologram of the default frame, and `more`.
 fn made<'a>(more: &[&'a str]) -> Vec<&'a str> {
     with(&[more, &["-o", "h.png"]].concat())
 }
@@ -860,9 +860,9 @@ fn assert_nearly_equal(folder: &Folder, a: &str, b: &str) {
 #[test]
 fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
     let folder = Folder::new().with_frame();
-    let usual = ["--scale", "1", "--offset-mm", "3"];
-    let swept = [&["--method", "sweep"], &usual[..]].concat();
-    for more in [&usual[..], &swept] {
+    let common = ["--scale", "1", "--offset-mm", "3"];
+    let swept = [&["--method", "sweep"], &common[..]].concat();
+    for more in [&common[..], &swept] {
         folder.succeeds(&with(&[more, &["-o", "cpu.png"]].concat()));
         let arguments = with(&[more, &["-o", "gpu.png"]].concat());
         let report = report_on_gpu(&folder, &arguments);
@@ -880,8 +880,8 @@ fn a_gpu_makes_the_hologram_that_the_cpu_makes() {
 fn a_gpu_is_measured() {
     let folder = Folder::new();
     let bench = |more: &[&str]| {
-        let usual = ["bench", "--seconds", "0", "--size", "48x32"];
-        report_on_gpu(&folder, &[&usual, more].concat())
+        let common = ["bench", "--seconds", "0", "--size", "48x32"];
+        report_on_gpu(&folder, &[&common, more].concat())
     };
     let network = ["--layers", "8", "--precision", "int8", "--fusion", "pairs"];
     let report = bench(&network);
@@ -922,7 +922,7 @@ fn a_gpu_that_is_not_there_or_not_meant_is_named() {
 }
 
 #[test]
-fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
+fn auto_sweeps_clean_depth_and_leaves_noisy_depth_to_a_network() {
     let folder = Folder::new();
     let square = |y: usize, x: usize| (20..60).contains(&y) && (24..70).contains(&x);
     let rgb = Array3::from_shape_fn((3, 80, 96), |(c, y, x)| match square(y, x) {
@@ -930,7 +930,7 @@ fn auto_sweeps_sharp_depth_and_leaves_ragged_depth_to_a_network() {
         false => 0.2,
     });
     picture::write_amplitude(&folder.path("rgb.png"), rgb.view()).unwrap();
-    for (name, ramp, stage) in [("sharp.npy", 1, "sweep"), ("ragged.npy", 5, "network")] {
+    for (name, ramp, stage) in [("clean.npy", 1, "sweep"), ("noisy.npy", 5, "network")] {
         let depth = Array2::from_shape_fn((80, 96), |(y, x)| {
             let inside = (0..ramp).filter(|i| square(y, x + i)).count();
             0.8 - 0.5 * inside as f32 / ramp as f32

@@ -50,13 +50,13 @@ fn every_fact_is_a_line_and_the_self_test_passes() {
 fn what_is_chosen_is_for_the_display_that_is_asked_for() {
     let folder = Folder::new();
     let told = |arguments: &[&str]| -> Value { serde_json::from_str(&folder.succeeds(arguments)).unwrap() };
-    let usual = told(&["doctor", "--json"]);
-    assert_eq!(usual["version"], env!("CARGO_PKG_VERSION"));
-    let kernels = usual["machine"]["int8_kernels"].as_array().unwrap();
+    let default = told(&["doctor", "--json"]);
+    assert_eq!(default["version"], env!("CARGO_PKG_VERSION"));
+    let kernels = default["machine"]["int8_kernels"].as_array().unwrap();
     assert_eq!(kernels.last().unwrap(), "portable");
-    let chosen = usual["chosen"]["kernels"].as_str().unwrap();
+    let chosen = default["chosen"]["kernels"].as_str().unwrap();
     assert!(chosen.contains("fused chain"), "{chosen}");
-    let tested = usual["self_test"].as_array().unwrap();
+    let tested = default["self_test"].as_array().unwrap();
     assert!(tested.iter().all(|check| check["passed"] != false), "{tested:?}");
 
     // No network was trained for such a volume.

@@ -380,8 +380,8 @@ fn any_photo_becomes_a_hologram_by_a_network() {
     fs::write(folder.path("photo.jpg"), short_gdepth()).unwrap();
     fs::write(folder.path("depth.onnx"), network(Some((16, 24)), false)).unwrap();
     let by = |from: &[&str], more: &[&str]| {
-        let usual = ["--depth-network", "depth.onnx", "--method", "sweep", "-o", "h.png"];
-        folder.succeeds(&[&["hologram"], from, &usual[..], more].concat());
+        let common = ["--depth-network", "depth.onnx", "--method", "sweep", "-o", "h.png"];
+        folder.succeeds(&[&["hologram"], from, &common[..], more].concat());
         hologram::read_hologram(&folder.path("h.png")).unwrap()
     };
     let near_left = by(&["--rgb", "rgb.png"], &[]);

@@ -61,7 +61,7 @@ fn folder(frames: u32) -> (tempfile::TempDir, PathBuf) {
     (dir, input)
 }
 
-/// Every frame is told of once.
+/// Every frame is reported exactly once.
 fn sums_agree(report: &Value) {
     let count = |v: &Value| v.as_u64().unwrap();
     let dropped: u64 = report["dropped"].as_object().unwrap().values().map(count).sum();

@@ -222,12 +222,12 @@ impl PrecisionName {
 
 /// The sweep that suits `display`, with these planes and taps where given.
 pub fn sweep_for(display: &Display, planes: Option<usize>, taps: Option<usize>) -> Sweep {
-    let usual = match planes {
+    let default = match planes {
         Some(planes) => Sweep::of_planes(display, planes),
         None => Sweep::for_display(display),
     };
     Sweep {
-        taps: taps.unwrap_or(usual.taps),
-        ..usual
+        taps: taps.unwrap_or(default.taps),
+        ..default
     }
 }

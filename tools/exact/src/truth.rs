@@ -70,7 +70,7 @@ pub struct Figures {
     pub focal_ssim: f64,
     /// Mean amplitude at the midpoint over the truth's.
     pub brightness: f64,
-    /// Share of the modulator's light that passes the aperture; 1 for what is shown as the complex field it is.
+    /// Share of the modulator's light that passes the aperture; 1 for a complex field.
     pub light: f64,
 }
 

@@ -76,7 +76,7 @@ impl DisplayFile {
     }
 }
 
-/// The display of a file, or the device of that name: one that comes along, or one of the user's, a file in
+/// The display of a file, or the device of that name: a bundled one, or one of the user's, a file in
 /// `phasefront/devices` of the folder for configurations.
 ///
 /// # Errors

@@ -278,7 +278,7 @@ pub fn write(path: &Path, folder: &Path, pattern: &str, rate_hz: f64, quality: Q
             .args(["-framerate", &rate_hz.to_string(), "-start_number", "0", "-i"])
             .arg(url(Path::new(pattern)));
         match quality {
-            // Sides must be even for the colours of usual players.
+            // Sides must be even for the colours of common players.
             Quality::Seen => command
                 .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18"])
                 .args(["-pix_fmt", "yuv420p", "-movflags", "+faststart"]),

@@ -164,8 +164,8 @@ pub fn relative(depth: ArrayView2<'_, f32>, near: Option<f32>, far: Option<f32>)
     Ok(depth::normalize(shifted.view(), DepthUnit::Metres, near, far)?.depth)
 }
 
-/// The frame of `rgb`, (3, H, W), and ragged `depth`, (h, w), normalized, placed on a modulator: refined along the
-/// colour's edges.
+/// The frame of `rgb`, (3, H, W), and of noisy or incomplete `depth`, (h, w), normalized, placed on a modulator:
+/// refined along the colour's edges.
 ///
 /// # Errors
 /// Shapes that are empty or too large.

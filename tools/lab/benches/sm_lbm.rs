@@ -1,5 +1,5 @@
-//! How fast SM-LBM is beside what it stands on: two bare 2D transforms of rustfft a plane, of the same padded size,
-//! on the same threads, in the same run. `cargo bench --bench sm_lbm`
+//! How fast SM-LBM is beside what its speed depends on: two bare 2D transforms of rustfft a plane, of the same
+//! padded size, on the same threads, in the same run. `cargo bench --bench sm_lbm`
 //!
 //! The scenes are as dense as can be: every plane has points in every row, so that no row is left out. A 2D transform
 //! by rustfft, which is 1D, is its rows, a transposition (the crate that rustfft itself uses) and its columns, and

@@ -1,5 +1,5 @@
 //! How fast the plane sweep is on a frame, for several planes, tiles and hidden layers: medians of frames after one
-//! that is not counted. Then the usual sweep of frames of that size that are all of one depth, and as bad as can be:
+//! that is not counted. Then the default sweep of frames of that size that are all of one depth, and as bad as can be:
 //! another depth at each pixel, and near and far in turn.
 //!
 //!     cargo bench --bench sweep -- $PWD/samples/scene_rgb.jpg $PWD/samples/scene_depth.png \
@@ -33,7 +33,7 @@ fn main() -> Result<()> {
     let frame = frame::read(Path::new(rgb), Path::new(depth), options)?;
     let (height, width) = frame.shape();
     let display = Display::default();
-    let usual = Sweep::for_display(&display);
+    let default = Sweep::for_display(&display);
     let cases = sweeps(&display, &numbers);
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(numbers.first().copied().unwrap_or(0))
@@ -55,13 +55,13 @@ fn main() -> Result<()> {
     let mut cases: Vec<_> = (cases.into_iter())
         .map(|sweep| ("the files'", &frame, sweep, true))
         .collect();
-    cases.push(("the files', unmerged", &frame, usual, false));
+    cases.push(("the files', unmerged", &frame, default, false));
     let on_planes = Sweep {
         between_planes: false,
-        ..usual
+        ..default
     };
     cases.push(("the files', points on planes", &frame, on_planes, true));
-    cases.extend(made.iter().map(|(name, frame)| (*name, frame, usual, true)));
+    cases.extend(made.iter().map(|(name, frame)| (*name, frame, default, true)));
     println!("| frame | planes | taps | hidden layers | tile | plan ms | frame ms (least–most) |");
     println!("|---|---|---|---|---|---|---|");
     pool.install(|| -> Result<()> {
@@ -99,19 +99,22 @@ fn main() -> Result<()> {
 
 /// The sweep that is asked for by its four numbers, or all that are of interest.
 fn sweeps(display: &Display, numbers: &[usize]) -> Vec<Sweep> {
-    let usual = Sweep::for_display(display);
+    let default = Sweep::for_display(display);
     if let [_, planes, taps, hidden_layers, tile] = *numbers {
         return vec![Sweep {
             planes,
             taps,
             hidden_layers,
             tile,
-            ..usual
+            ..default
         }];
     }
-    let mut all = vec![usual];
+    let mut all = vec![default];
     all.extend([16, 24, 32, 64, 80, 96, 128].map(|planes| Sweep::of_planes(display, planes)));
-    all.extend([0, 1].map(|hidden_layers| Sweep { hidden_layers, ..usual }));
-    all.extend([64, 128, 192, 384].map(|tile| Sweep { tile, ..usual }));
+    all.extend([0, 1].map(|hidden_layers| Sweep {
+        hidden_layers,
+        ..default
+    }));
+    all.extend([64, 128, 192, 384].map(|tile| Sweep { tile, ..default }));
     all
 }

@@ -10,7 +10,7 @@ mod ceiling;
 
 use crate::dataset::{self, Manifest};
 use crate::evaluate::ceiling::Ceiling;
-use crate::study::refined_depth::{self, DEGRADATIONS};
+use crate::study::refined_depth::{self, SENSOR_FAULTS};
 use ndarray::{Array2, Array3, Axis, concatenate};
 use num_complex::Complex32;
 use phasefront::{Display, EncoderOptions, Encoding, Network, Sweep, Target};
@@ -422,15 +422,15 @@ pub struct Seen {
     pub light: f64,
 }
 
-/// What methods are told of the depth of what is visible. Ragged and refined are those of a phone's sensor with all
-/// faults of [`DEGRADATIONS`]; hidden layers are then none.
+/// What methods are told of the depth of what is visible. Sensor and refined depth come from a simulated sensor
+/// with all faults of [`SENSOR_FAULTS`], and have no hidden layers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Depth {
     /// As it was rendered
     Rendered,
-    /// A sensor's readings, enlarged
-    Ragged,
-    /// A sensor's readings, refined by the core
+    /// Simulated sensor depth, enlarged
+    Sensor,
+    /// Simulated sensor depth, refined by the core
     Refined,
 }
 
@@ -441,7 +441,7 @@ impl Depth {
             return Ok(Cow::Borrowed(ldi));
         }
         let (rgb, rendered) = refined_depth::front(ldi);
-        let readings = refined_depth::degrade(rendered.view(), &DEGRADATIONS[DEGRADATIONS.len() - 1], seed);
+        let readings = refined_depth::simulate_sensor(rendered.view(), &SENSOR_FAULTS[SENSOR_FAULTS.len() - 1], seed);
         let depth = match self {
             Depth::Refined => refined_depth::refine(&readings, &rgb)?,
             _ => refined_depth::enlarge(&readings)?,

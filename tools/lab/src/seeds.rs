@@ -7,7 +7,7 @@
 //! ones, times [`SCALE`], on all of them; and to the folder, `seeds.json`, which says by which sweep and what R is.
 
 use crate::dataset::{self, Manifest};
-use crate::study::refined_depth::{Degradation, RATIO, degrade, refine};
+use crate::study::refined_depth::{RATIO, SensorFaults, refine, simulate_sensor};
 use ndarray::{Array2, Array3, Array4, ArrayView2, ArrayView3, Axis, Ix3, concatenate, s};
 use ndarray_npy::WriteNpyExt;
 use num_complex::Complex32;
@@ -115,13 +115,13 @@ fn refined_depths(depth: ArrayView2<'_, u16>, colour: &Array3<f32>, index: usize
     for (variant, mut to) in all.outer_iter_mut().enumerate() {
         let seed = ((index as u64) << 32) + variant as u64;
         let mut dice = Dice::new(seed);
-        let how = Degradation {
+        let how = SensorFaults {
             name: "drawn",
             noise: dice.range(0.0, MOST_NOISE) as f32,
             shift: dice.integer(0, MOST_SHIFT),
             holes: dice.chance(0.5),
         };
-        let refined = refine(&degrade(depth.view(), &how, seed), colour)?;
+        let refined = refine(&simulate_sensor(depth.view(), &how, seed), colour)?;
         to.zip_mut_with(&refined, |to, d| *to = (d * 65535.0).round() as u16);
     }
     Ok(all)

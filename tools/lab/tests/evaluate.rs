@@ -283,10 +283,10 @@ fn what_is_shown_depends_on_the_aperture() {
 }
 
 #[test]
-fn ragged_depth_costs_and_refined_depth_gives_it_back() {
+fn sensor_depth_costs_quality_and_refinement_restores_it() {
     let data = Data::new();
     let methods = [Method::visible(&data.manifest.display, PLANES)];
-    let [rendered, ragged, refined] = [Depth::Rendered, Depth::Ragged, Depth::Refined].map(|depth| {
+    let [rendered, sensor, refined] = [Depth::Rendered, Depth::Sensor, Depth::Refined].map(|depth| {
         let sample = Sample {
             scenes: vec![78, 79],
             seed: 5,
@@ -297,8 +297,8 @@ fn ragged_depth_costs_and_refined_depth_gives_it_back() {
         let rows = evaluate::evaluate(&data.manifest, data.path(), &sample, &methods, &shown, &|| {}).unwrap();
         rows[0].mean.focal_psnr
     });
-    assert!(ragged < rendered && refined < rendered, "{rendered} {ragged} {refined}");
-    assert!(refined > ragged, "{ragged} {refined}");
+    assert!(sensor < rendered && refined < rendered, "{rendered} {sensor} {refined}");
+    assert!(refined > sensor, "{sensor} {refined}");
 }
 
 #[test]

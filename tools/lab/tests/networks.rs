@@ -1,4 +1,4 @@
-//! The networks that come along: they load, and the fast path gives what tract gives.
+//! The bundled networks load, and the fast path gives what tract gives.
 #![allow(clippy::unwrap_used)]
 
 use ndarray::Array3;

@@ -114,7 +114,7 @@ fn the_command_studies_the_sweep() {
     let rows = result["rows"].as_array().unwrap();
     let count = |part: &str| rows.iter().filter(|row| row["part"] == part).count();
     let svg = std::fs::read_to_string(folder.path().join("sweep.svg")).unwrap();
-    // The usual sweep stands on all four curves, and planes have two.
+    // The default sweep is a point of all four curves, and planes have two.
     let points = 4 + 2 * count("planes") + count("taps") + count("hidden");
     assert_eq!(svg.matches("<circle").count(), points);
     let result = run("displays", "24", folder.path());
@@ -159,17 +159,17 @@ fn the_sweep_is_studied_beside_exact_waves() {
         let found = rows.iter().find(|r| r.part == part && r.value == value);
         found.unwrap_or_else(|| panic!("no {part} {value}: {rows:?}"))
     };
-    let usual = of("usual", 40);
+    let default = of("default", 40);
     // Merged steps and tiles change nothing but the time.
     for same in [of("merge", 0), of("tile", 128)] {
-        assert!((same.clean.psnr - usual.clean.psnr).abs() < 0.02, "{same:?}");
+        assert!((same.clean.psnr - default.clean.psnr).abs() < 0.02, "{same:?}");
         assert!(same.ns_per_pixel.unwrap() > 0.0);
     }
-    assert!(usual.clean.psnr > of("hidden", 0).clean.psnr + 0.5, "{rows:?}");
-    assert!(usual.clean.psnr > of("between", 0).clean.psnr + 0.05);
+    assert!(default.clean.psnr > of("hidden", 0).clean.psnr + 0.5, "{rows:?}");
+    assert!(default.clean.psnr > of("between", 0).clean.psnr + 0.05);
     assert!(of("planes", 64).clean.psnr > of("planes", 16).clean.psnr + 1.0);
-    assert!(usual.clean.psnr > usual.degraded.psnr, "{usual:?}");
-    assert!(of("exact", 2).clean.psnr > usual.clean.psnr, "{rows:?}");
+    assert!(default.clean.psnr > default.refined.psnr, "{default:?}");
+    assert!(of("exact", 2).clean.psnr > default.clean.psnr, "{rows:?}");
 
     // What is measured is what it says: one row by hand.
     let display = &scenes.display;

@@ -145,10 +145,10 @@ fn a_captured_frame_has_no_seams_between_tiles() {
     let frame = captured(&folder);
     let (height, width) = frame.shape();
     let display = Display::default();
-    let usual = Sweep::for_display(&display);
+    let default = Sweep::for_display(&display);
     // One tile of 1920 pixels is the whole frame.
-    let [tiles, whole] = [usual.tile, 1920].map(|tile| {
-        let sweep = Sweep { tile, ..usual };
+    let [tiles, whole] = [default.tile, 1920].map(|tile| {
+        let sweep = Sweep { tile, ..default };
         let plan = SweepPlan::new(height, width, &display, sweep, 0.0).unwrap();
         let mut field = vec![Complex32::ZERO; 3 * height * width];
         plan.field(&frame, &mut field, &mut plan.scratch()).unwrap();
@@ -171,9 +171,9 @@ fn a_captured_frame_has_no_seams_between_tiles() {
             let steps: f32 = rows.map(|row| (row[x] - row[x - 1]).abs()).sum();
             f64::from(steps) / (3 * height) as f64
         };
-        let seams = (1..width / usual.tile + 1).map(|i| i * usual.tile);
+        let seams = (1..width / default.tile + 1).map(|i| i * default.tile);
         let seams: Vec<f64> = seams.filter(|x| *x < width).map(step).collect();
-        let others: Vec<f64> = (1..width).filter(|x| x % usual.tile != 0).map(step).collect();
+        let others: Vec<f64> = (1..width).filter(|x| x % default.tile != 0).map(step).collect();
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         println!(
             "z {z_m}: steps {:.5} over edges, {:.5} elsewhere",

@@ -9,7 +9,7 @@
 //! a mean across an edge would.
 //!
 //! The cost, for a depth image of n pixels and a display of N of which a share e lies at edges: some 25·n + 40·e·n
-//! weights at the sensor's resolution, 4·N + 9·e·N at the display's; a tenth of the pixels of usual scenes lies at
+//! weights at the sensor's resolution, 4·N + 9·e·N at the display's; a tenth of the pixels of typical scenes lies at
 //! edges.
 
 use super::fill_from_nearest;

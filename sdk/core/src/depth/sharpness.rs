@@ -1,5 +1,5 @@
-//! How sharp a frame's depth is: what tells whether the plane sweep, which takes every depth at its word, or a network
-//! makes the better hologram of it.
+//! Measures whether a frame's depth is clean. The plane sweep, which trusts every depth, makes the better hologram of
+//! clean depth, and a network that of noisy or incomplete depth.
 //!
 //! Rendered depth changes from surface to surface within one pixel, and where the colour does; and on surfaces it is
 //! smooth. Depth that was enlarged ramps over several pixels, that of a camera beside the colour's changes elsewhere,
@@ -15,9 +15,9 @@ const EDGE: f32 = 0.06;
 const WINDOW: usize = 5;
 /// The part of the window's change that a sharp edge makes in one step.
 const ONE_STEP: f32 = 0.75;
-/// The least share of sharp edges of sharp depth.
+/// The least share of sharp edges in clean depth.
 pub const SHARP_EDGES: f32 = 0.6;
-/// The most noise of sharp depth, of the volume.
+/// The most noise of clean depth, of the volume.
 pub const SMOOTH: f32 = 1.5e-3;
 /// How far over a bound, relative, a frame of a video must be to be taken for other than the one before.
 pub const HYSTERESIS: f32 = 0.15;
@@ -33,15 +33,15 @@ pub struct Sharpness {
 }
 
 impl Sharpness {
-    /// Whether the depth is so sharp that the plane sweep makes the better hologram: at least [`SHARP_EDGES`], at most
+    /// Whether the depth is so clean that the plane sweep makes the better hologram: at least [`SHARP_EDGES`], at most
     /// [`SMOOTH`].
-    pub fn is_sharp(&self) -> bool {
+    pub fn is_clean(&self) -> bool {
         self.edges >= SHARP_EDGES && self.noise <= SMOOTH
     }
 
-    /// [`Self::is_sharp`] of a frame that follows one which `was` sharp or not: what lies within [`HYSTERESIS`] of the
+    /// [`Self::is_clean`] of a frame that follows one which `was` clean or not: what lies within [`HYSTERESIS`] of the
     /// bounds stays what it was, so that video does not go to and fro between two methods.
-    pub fn stays_sharp(&self, was: bool) -> bool {
+    pub fn stays_clean(&self, was: bool) -> bool {
         let slack = match was {
             true => 1.0 + HYSTERESIS,
             false => 1.0 / (1.0 + HYSTERESIS),
@@ -168,28 +168,28 @@ mod tests {
     }
 
     #[test]
-    fn sharp_depth_is_told_from_ragged_depth() {
-        let sharp = square(0, 1, 0.0);
-        assert!(sharp.edges > 0.9 && sharp.noise == 0.0, "{sharp:?}");
-        assert!(sharp.is_sharp());
+    fn clean_depth_is_told_from_noisy_depth() {
+        let clean = square(0, 1, 0.0);
+        assert!(clean.edges > 0.9 && clean.noise == 0.0, "{clean:?}");
+        assert!(clean.is_clean());
         let [shifted, ramps, noisy] = [square(2, 1, 0.0), square(0, 4, 0.0), square(0, 1, 0.01)];
         assert!(shifted.edges < 0.6, "{shifted:?}");
         assert!(ramps.edges < 0.1, "{ramps:?}");
         // Uniform noise of ±0.01.
         assert!((0.003..0.01).contains(&noisy.noise), "{noisy:?}");
-        for ragged in [shifted, ramps, noisy] {
-            assert!(!ragged.is_sharp(), "{ragged:?}");
+        for bad in [shifted, ramps, noisy] {
+            assert!(!bad.is_clean(), "{bad:?}");
         }
     }
 
     #[test]
-    fn frames_without_edges_are_sharp() {
+    fn frames_without_edges_are_clean() {
         for (height, width) in [(1, 1), (2, 9), (40, 40)] {
             let depth = Array2::from_elem((height, width), 0.4);
             let rgb = Array3::from_elem((3, height, width), 0.5);
             let flat = measure(&RgbdFrame::new(rgb, depth).unwrap());
             assert_eq!((flat.edges, flat.noise), (1.0, 0.0));
-            assert!(flat.is_sharp());
+            assert!(flat.is_clean());
         }
     }
 
@@ -197,11 +197,11 @@ mod tests {
     fn what_lies_near_the_bounds_stays_what_it_was() {
         let of = |edges, noise| Sharpness { edges, noise };
         let near = of(SHARP_EDGES * 1.05, SMOOTH * 1.1);
-        assert!(near.stays_sharp(true) && !near.stays_sharp(false));
+        assert!(near.stays_clean(true) && !near.stays_clean(false));
         for was in [true, false] {
-            assert!(of(SHARP_EDGES * 1.2, SMOOTH * 0.8).stays_sharp(was));
-            assert!(!of(SHARP_EDGES * 0.8, SMOOTH * 0.8).stays_sharp(was));
-            assert!(!of(1.0, SMOOTH * 1.2).stays_sharp(was));
+            assert!(of(SHARP_EDGES * 1.2, SMOOTH * 0.8).stays_clean(was));
+            assert!(!of(SHARP_EDGES * 0.8, SMOOTH * 0.8).stays_clean(was));
+            assert!(!of(1.0, SMOOTH * 1.2).stays_clean(was));
         }
     }
 }

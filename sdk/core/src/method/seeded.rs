@@ -1,7 +1,7 @@
 //! Seeded networks: the plane sweep's field, corrected by a small network that sees it beside the frame.
 //!
-//! The sweep is all but exact where depth is sharp, and wrong at edges where it is ragged; the network has learned on
-//! both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½) of the three
+//! The sweep is nearly exact on clean depth, and wrong at edges of noisy or incomplete depth; the network has
+//! learned on both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½) of the three
 //! colours, then ½ Im u, so that one range of 8 bits holds all. Its head adds the output to u.
 
 use crate::display::Display;

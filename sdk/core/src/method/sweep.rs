@@ -71,11 +71,11 @@ pub struct Sweep {
 
 impl Sweep {
     /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far
-    /// as [`Sweep::USUAL_PLANES`] allow, and as many taps as such a step needs.
+    /// as [`Sweep::DEFAULT_PLANES`] allow, and as many taps as such a step needs.
     pub fn for_display(display: &Display) -> Self {
         let reach = reach_px(display, display.volume_depth_m());
         let planes = (reach * 4.0 / 3.0).ceil() as usize;
-        let planes = planes.clamp(*Self::USUAL_PLANES.start(), *Self::USUAL_PLANES.end());
+        let planes = planes.clamp(*Self::DEFAULT_PLANES.start(), *Self::DEFAULT_PLANES.end());
         Self::of_planes(display, planes)
     }
 
@@ -90,11 +90,11 @@ impl Sweep {
         }
     }
 
-    /// Pixels along each side of the usual tile.
+    /// Pixels along each side of a tile by default.
     pub const TILE: usize = 256;
 
     /// Planes that [`Sweep::for_display`] chooses from.
-    pub const USUAL_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
+    pub const DEFAULT_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
 
     /// The taps that a step between `planes` planes needs: light's reach and four more on each side.
     pub fn taps_for(display: &Display, planes: usize) -> usize {

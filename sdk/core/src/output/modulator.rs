@@ -1,5 +1,5 @@
 //! Modulators that can be bought: their size, pitch and bits, the phases of their levels, and how their input takes a
-//! frame. Each is a TOML file, those in `sdk/core/devices` come along, and users have their own beside them.
+//! frame. Each is a TOML file; those in `sdk/core/devices` are bundled, and users add their own.
 //!
 //! ```
 //! use phasefront::output::ModulatorSpec;
@@ -94,7 +94,7 @@ const NAMED: [(&str, Layout); 3] = [
     ("grey-16", Layout::Grey16),
 ];
 
-/// The files that come along, by name.
+/// The bundled files, by name.
 const SHIPPED: [(&str, &str); 9] = [
     ("hamamatsu-x15213", include_str!("../../devices/hamamatsu-x15213.toml")),
     ("holoeye-gaea-2", include_str!("../../devices/holoeye-gaea-2.toml")),
@@ -112,12 +112,12 @@ fn refuse(what: impl std::fmt::Display) -> Error {
 }
 
 impl ModulatorSpec {
-    /// The names of the devices that come along.
+    /// The names of the bundled devices.
     pub fn names() -> impl Iterator<Item = &'static str> {
         SHIPPED.iter().map(|(name, _)| *name)
     }
 
-    /// The device called `name` that comes along.
+    /// The bundled device called `name`.
     ///
     /// # Errors
     /// A name that none has.
@@ -158,7 +158,7 @@ impl ModulatorSpec {
         })?;
         let levels_turns = levels(&own, &display)?;
         let packing = match &own.packing {
-            None => Packing::usual(&display),
+            None => Packing::default_for(&display),
             Some(packing) => packing.packing()?,
         };
         packing.check(&display)?;
@@ -249,7 +249,7 @@ impl From<Display> for ModulatorSpec {
     fn from(display: Display) -> Self {
         ModulatorSpec {
             name: String::new(),
-            packing: Packing::usual(&display),
+            packing: Packing::default_for(&display),
             display,
             flip_x: false,
             flip_y: false,
@@ -262,8 +262,8 @@ impl From<Display> for ModulatorSpec {
 }
 
 impl Packing {
-    /// Where a file says nothing of it.
-    fn usual(display: &Display) -> Self {
+    /// The packing if a file names none.
+    fn default_for(display: &Display) -> Self {
         Packing::Images(match (display.bits(), display.colours()) {
             (0..=8, 1) => Layout::Grey,
             (0..=8, _) => Layout::Rgb,

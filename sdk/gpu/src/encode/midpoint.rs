@@ -15,7 +15,7 @@ pub(super) struct Midpoint {
     steps: usize,
     bound: Constants,
     depart: Dispatch,
-    /// To the midpoint: what is wanted, and what is shown, through the aperture.
+    /// To the midpoint: the wanted and the displayed wave, through the aperture.
     aim: Convolution,
     back: Convolution,
     ask: Dispatch,
@@ -38,7 +38,10 @@ impl Midpoint {
         let (height, width) = job.size;
         let room = |what| device.buffer(what, 24 * height * width);
         let aim = room("the wave at the midpoint")?;
-        let (phasors, kept) = (room("what is shown")?, room("the wanted field of the frame before")?);
+        let (phasors, kept) = (
+            room("the displayed wave")?,
+            room("the wanted field of the frame before")?,
+        );
         let bound = device.constants("what stands still", bytemuck::cast_slice(&[-1.0f32; 4]))?;
         let source = format!(
             "const WAVE: f32 = {WAVE:?};\nconst GAIN: f32 = {GAIN:?};\n{source}{}",

@@ -1,4 +1,4 @@
-//! A frame as it comes: borrowed, in the formats of cameras or as planes.
+//! A captured frame: borrowed, in the formats of cameras or as planes.
 
 use ndarray::{Array2, Array3};
 use phasefront_core::frame::{ColourFormat, ColourImage, ColourPlan, Orientation, RgbdFrame};

@@ -1,4 +1,4 @@
-// A frame as it comes to what the chain reads: groups of four channels in the chain's numbers. The header that input.rs
+// Converts a captured frame to what the chain reads: groups of four channels in the chain's numbers. The header that input.rs
 // writes before this text gives `Value` and the constants in capitals; behind it stand `channels`, which knows where
 // values come from, and `store`, which knows the numbers. Where the chain's layers take squares of two by two pixels as
 // one, SIDE is 2, and the groups of a square's pixels lie behind one another.

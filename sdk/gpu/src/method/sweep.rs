@@ -436,19 +436,19 @@ mod tests {
         }
     }
 
-    /// Against the CPU, at the usual volume and on other displays.
+    /// Against the CPU, at the default volume and on other displays.
     #[test]
     fn whole_frames_are_those_of_the_cpu() {
-        let usual = Display::default();
+        let default = Display::default();
         let fine = Display::from_toml("pitch_um = 3.74\nvolume_depth_mm = 2").unwrap();
         for (size, depth, display, z_m) in [
-            ((61, 47), scene as fn(usize, usize) -> f32, &usual, 0.0),
-            ((61, 47), noise, &usual, 0.0),
-            ((90, 7), scene, &usual, 0.0),
-            ((61, 47), scene, &usual, 3e-3),
-            ((61, 47), scene, &usual, -3e-3),
+            ((61, 47), scene as fn(usize, usize) -> f32, &default, 0.0),
+            ((61, 47), noise, &default, 0.0),
+            ((90, 7), scene, &default, 0.0),
+            ((61, 47), scene, &default, 3e-3),
+            ((61, 47), scene, &default, -3e-3),
             ((61, 47), scene, &fine, 0.0),
-            ((384, 384), scene, &usual, 0.0),
+            ((384, 384), scene, &default, 0.0),
         ] {
             let frame = frame(size, depth);
             let sweep = Sweep::for_display(display);

@@ -39,7 +39,7 @@ pub struct Search {
     pub best: Coefficients,
     /// Rounds done.
     pub round: usize,
-    /// What was shown so far, and how sharp it was.
+    /// The spots that were displayed so far, and how sharp each was.
     pub seen: Vec<Spot>,
     /// The root mean square of what the best leaves unexplained of that, as a part of it.
     pub residual: f64,

@@ -1,4 +1,4 @@
-//! Networks with random weights, for numbers of layers of which none comes along: what a network costs does not depend
+//! Networks with random weights, for numbers of layers of which none is bundled: what a network costs does not depend
 //! on its weights. Written as ONNX, so that they come the way of all others.
 
 use phasefront::Network;

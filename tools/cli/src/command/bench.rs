@@ -24,13 +24,13 @@ use std::time::Duration;
 /// With a --display that has a per-pixel table, also what reading it adds to a frame.
 #[derive(Args)]
 pub(crate) struct Bench {
-    /// Layers of the network; 0 is the plane sweep. Where none of so many comes along, one with random weights in f32
+    /// Layers of the network; 0 is the plane sweep. If none of so many is bundled, one with random weights in f32
     #[arg(long, value_name = "L")]
     layers: Option<usize>,
     /// Its numbers
     #[arg(long, value_enum)]
     precision: Option<PrecisionName>,
-    /// An ONNX file instead of the networks that come along
+    /// An ONNX file instead of the bundled networks
     #[arg(long, value_name = "FILE", conflicts_with_all = ["layers", "precision"])]
     network: Option<String>,
     /// Width and height [default: 384x384, 960x540 and 1920x1080]
@@ -96,17 +96,17 @@ impl Bench {
         }
     }
 
-    /// What is asked for, or all that comes along.
+    /// What is asked for, or all bundled networks.
     fn methods(&self, target: &Target, on_gpu: bool) -> Result<Vec<Method>> {
         if let Some(file) = &self.network {
             let network = networks::network(file, None)?;
             return Ok(vec![Method::trained(network)]);
         }
-        let mut methods: Vec<_> = (self.come_along().into_iter()).map(Method::trained).collect();
+        let mut methods: Vec<_> = (self.bundled().into_iter()).map(Method::trained).collect();
         if self.layers.is_none_or(|layers| layers == 0) {
             methods.push(Method::Sweep(Sweep::for_display(&target.display)));
         }
-        // What a GPU is judged by, unless it comes along.
+        // What a GPU is judged by, unless it is bundled.
         let random = match self.layers {
             Some(layers) => Some(layers).filter(|&layers| layers > 0),
             None => on_gpu.then_some(DEEPEST),
@@ -119,7 +119,7 @@ impl Bench {
         }
         if methods.is_empty() {
             return Err(Error::Input(
-                "no int8 network of that many layers comes along; `phasefront bench` without --layers shows which do"
+                "no int8 network of that many layers is bundled; `phasefront bench` without --layers shows which do"
                     .into(),
             ));
         }
@@ -170,8 +170,8 @@ impl Bench {
         Ok(())
     }
 
-    /// The networks that come along, of the layers and numbers that are asked for.
-    fn come_along(&self) -> Vec<Arc<Network>> {
+    /// The bundled networks, of the layers and numbers that are asked for.
+    fn bundled(&self) -> Vec<Arc<Network>> {
         let precisions = [Precision::Float32, Precision::Int8];
         let wanted = |precision: &Precision| (self.precision).is_none_or(|asked| asked.precision() == *precision);
         let networks = phasefront_models::NETWORKS.iter().flat_map(|model| {

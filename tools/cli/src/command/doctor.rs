@@ -60,12 +60,12 @@ impl Chosen {
         let network = default_network(display);
         let method = match &network {
             Some(network) => format!(
-                "auto: the plane sweep where depth is sharp, the network of {} layers where it is ragged",
+                "auto: the plane sweep if depth is clean, the network of {} layers if it is noisy or incomplete",
                 network.layers()
             ),
             None => {
                 let why = networks::network("8", None)?.check_display(display);
-                let why = why.map_or_else(|why| why.to_string(), |()| "none comes along".into());
+                let why = why.map_or_else(|why| why.to_string(), |()| "none is bundled".into());
                 format!("auto: the plane sweep, for no network suits the display ({why})")
             }
         };

@@ -88,7 +88,7 @@ impl Hologram {
         if let (Some(path), Some(values)) = (&self.complex, &made.field) {
             if matches!(made.encoder.options.encoding, Encoding::Deep(_)) {
                 log::warn!(
-                    "{}: a field of --encoder deep is what its pre-filter was trained to take, not the wave that is shown; for that one take another --network",
+                    "{}: a field of --encoder deep is what its pre-filter was trained to take, not the displayed wave; for that one take another --network",
                     path.display()
                 );
             }

@@ -22,9 +22,9 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Judge methods and encoders on an image and a display: what is shown, and what it takes
+/// Judge methods and encoders on an image and a display: quality of the displayed image, and time
 ///
-/// With a layered depth image the truth is its exact wave. With an RGB-D image there is none: where depth is sharp, the
+/// With a layered depth image the truth is its exact wave. With an RGB-D image there is none: if depth is clean, the
 /// exact wave of what is visible and of the hidden surfaces that the sweep finds takes its place, else the largest
 /// network's. The answer says which.
 #[derive(Args)]
@@ -37,7 +37,7 @@ pub(crate) struct Judge {
     /// Methods [default: sweep and, where one was trained for the display, network]
     #[arg(long, value_enum, value_delimiter = ',')]
     method: Vec<CoreMethod>,
-    /// Encoders, each as published, corrected as is usual, and corrected for a still
+    /// Encoders, each as published, corrected by default, and corrected for a still
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["anti-alias"])]
     encoder: Vec<EncoderName>,
     /// Planes of the exact wave
@@ -97,10 +97,10 @@ impl Judge {
                 self.margin
             )));
         }
-        let sharp = sharpness::measure(&frame).is_sharp();
+        let clean = sharpness::measure(&frame).is_clean();
         let image = Image::Rgbd(frame);
         let mut request = HologramRequest::of(self.display.clone());
-        let (truth, what) = self.truth(&file, &image, layers.as_ref(), sharp, &mut request)?;
+        let (truth, what) = self.truth(&file, &image, layers.as_ref(), clean, &mut request)?;
         let z_m = truth::judged_z_m(display);
         let wanted = truth.views_on(&file, &z_m)?;
         let combinations = self.combinations(display);
@@ -148,7 +148,7 @@ impl Judge {
         file: &DisplayFile,
         image: &Image,
         layers: Option<&Ldi>,
-        sharp: bool,
+        clean: bool,
         request: &mut HologramRequest,
     ) -> Result<(Hologram, String)> {
         let display = &file.target.display;
@@ -162,7 +162,7 @@ impl Judge {
                 let what = format!("the exact wave of its {} layers: the truth", ldi.layers.len());
                 (self.exact(request, file, ldi)?, what)
             }
-            (None, Image::Rgbd(frame)) if sharp || !trained => {
+            (None, Image::Rgbd(frame)) if clean || !trained => {
                 let filled = truth::filled(frame, display)?;
                 let what = "the exact wave of what is visible and of hidden surfaces as the sweep finds them, for there is no truth";
                 (self.exact(request, file, &filled)?, what.to_owned())
@@ -175,7 +175,8 @@ impl Judge {
                 );
                 request.in_float32();
                 let made = request.make(file, image)?;
-                let what = "the wave of the network of 15 layers, for depth is ragged and there is no truth";
+                let what =
+                    "the wave of the network of 15 layers, for depth is noisy or incomplete and there is no truth";
                 (made, what.to_owned())
             }
         };
@@ -193,12 +194,12 @@ impl Judge {
 
     fn combinations(&self, display: &phasefront::Display) -> Vec<Combination> {
         let trained = phasefront_models::default_network(display).is_some();
-        let usual = match trained {
+        let default = match trained {
             true => vec![CoreMethod::Sweep, CoreMethod::Network],
             false => vec![CoreMethod::Sweep],
         };
         let methods = if self.method.is_empty() {
-            usual
+            default
         } else {
             self.method.clone()
         };

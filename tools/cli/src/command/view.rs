@@ -51,7 +51,7 @@ const FRAME_VIEWS: u8 = 5;
 /// Frames of a video.
 const VIDEO_FRAMES: u16 = 24;
 /// Size of a page that joins none, MB.
-const USUAL_MB: f64 = 5.0;
+const DEFAULT_MB: f64 = 5.0;
 /// Bytes of a page besides its views: itself, phases, depths.
 const BESIDE_VIEWS: usize = 400_000;
 /// Views that are computed at a time.
@@ -60,7 +60,7 @@ const CHUNK: usize = 5;
 /// What a scene is made of.
 struct Parts {
     title: String,
-    /// Of each frame, what is shown.
+    /// The displayed views of each frame.
     shown: Vec<Vec<RgbImage>>,
     field: Vec<RgbImage>,
     phase: Option<Phase>,
@@ -77,7 +77,7 @@ impl View {
             output::reading(path)?;
         }
         self.check_flags()?;
-        let max_mb = self.max_mb.unwrap_or(USUAL_MB);
+        let max_mb = self.max_mb.unwrap_or(DEFAULT_MB);
         let budget = max_mb * 1e6 / self.inputs.len().max(1) as f64;
         if !(budget.is_finite() && budget > BESIDE_VIEWS as f64) {
             return Err(Error::Input(format!(
@@ -146,8 +146,8 @@ impl View {
         ])
     }
 
-    fn z_m(&self, display: &Display, usual: u8) -> Vec<f64> {
-        let count = self.views.unwrap_or(usual);
+    fn z_m(&self, display: &Display, default: u8) -> Vec<f64> {
+        let count = self.views.unwrap_or(default);
         let at = |i: u8| display.z_of_depth(f64::from(i) / f64::from(count - 1));
         (0..count).map(at).collect()
     }

@@ -22,7 +22,7 @@ pub(crate) struct EncoderFlags {
     /// with --encoder deep]
     #[arg(long, value_name = "D")]
     dark_threshold: Option<f32>,
-    /// Steps that draw what is shown toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
+    /// Steps that draw the displayed image toward the field that is wanted, 0 to 8 [default: 1; 0 with --encoder deep]
     #[arg(long, value_name = "N")]
     local_steps: Option<usize>,
     /// Steps of correction at the midpoint after them, for stills; 1 brings most at the midpoint, 10 all
@@ -86,23 +86,23 @@ impl EncoderFlags {
             Some(file) => Some(networks::network(file, None)?),
             None => None,
         };
-        let usual = if prefilter.is_some() {
+        let default = if prefilter.is_some() {
             EncoderName::DEEP
         } else {
             EncoderName::ANTI_ALIAS
         };
-        let name = self.encoder.unwrap_or(usual);
+        let name = self.encoder.unwrap_or(default);
         Ok(self.encoder(name.encoding(prefilter)?, name))
     }
 
     fn encoder(&self, encoding: Encoding, name: EncoderName) -> Encoder {
-        let usual = EncoderOptions::from(encoding);
+        let default = EncoderOptions::from(encoding);
         Encoder {
             options: EncoderOptions {
-                dark_threshold: self.dark_threshold.unwrap_or(usual.dark_threshold),
-                local_steps: self.local_steps.unwrap_or(usual.local_steps),
+                dark_threshold: self.dark_threshold.unwrap_or(default.dark_threshold),
+                local_steps: self.local_steps.unwrap_or(default.local_steps),
                 midpoint_steps: self.midpoint_steps,
-                ..usual
+                ..default
             },
             name: name.name(),
         }

@@ -271,8 +271,8 @@ impl FrameFlags {
     }
 
     fn placement(&self, picture: (usize, usize), display: &Display) -> Placement {
-        let usual = self.photo.is_some().then_some(Fit::Contain);
-        match self.fit.map(FitName::fit).or(usual) {
+        let default = self.photo.is_some().then_some(Fit::Contain);
+        match self.fit.map(FitName::fit).or(default) {
             Some(fit) => Placement::new(picture, (display.height(), display.width()), fit),
             None => Placement::as_is(picture),
         }

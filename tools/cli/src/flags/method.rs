@@ -14,7 +14,7 @@ pub(crate) enum CoreMethod {
     Network,
     /// The plane sweep on the RGB-D image: waves by short filters, any display
     Sweep,
-    /// The plane sweep where depth is sharp, a network where it is ragged
+    /// The plane sweep if depth is clean, a network if it is noisy or incomplete
     Auto,
 }
 

@@ -285,10 +285,10 @@ impl HologramRequest {
         }
     }
 
-    pub(super) fn encoder_options(&self, usual: &EncoderOptions) -> EncoderOptions {
+    pub(super) fn encoder_options(&self, default: &EncoderOptions) -> EncoderOptions {
         EncoderOptions {
             brightness: self.scale.map_or(Brightness::FrameMax, Brightness::Fixed),
-            ..usual.clone()
+            ..default.clone()
         }
     }
 }

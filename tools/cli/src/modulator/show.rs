@@ -148,7 +148,7 @@ impl ApplicationHandler for List {
 }
 
 /// Rates of a screen that says nothing of it.
-const USUAL_RATE_HZ: f64 = 60.0;
+const DEFAULT_RATE_HZ: f64 = 60.0;
 
 struct Player {
     frames: Vec<Vec<u32>>,
@@ -204,7 +204,7 @@ impl Player {
         });
         self.start = Instant::now();
         self.shown = Some(Shown {
-            rate_hz: self.showing.rate_hz.or(screen.rate_hz).unwrap_or(USUAL_RATE_HZ),
+            rate_hz: self.showing.rate_hz.or(screen.rate_hz).unwrap_or(DEFAULT_RATE_HZ),
             screen,
             frames: 0,
             late: 0,
@@ -296,7 +296,7 @@ impl ApplicationHandler for Player {
         }
         let drawn = self.draw(false);
         self.fail(event_loop, drawn);
-        let rate = self.shown.as_ref().map_or(USUAL_RATE_HZ, |shown| shown.rate_hz);
+        let rate = self.shown.as_ref().map_or(DEFAULT_RATE_HZ, |shown| shown.rate_hz);
         let next = ((passed.as_secs_f64() * rate).floor() + 1.0) / rate;
         event_loop.set_control_flow(ControlFlow::WaitUntil(self.start + Duration::from_secs_f64(next)));
     }

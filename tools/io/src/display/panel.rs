@@ -202,7 +202,7 @@ mod tests {
             .unwrap();
         for (name, text) in [
             ("high.csv", "y,0\n0,1024\n"),
-            ("ragged.csv", "y,0,1\n0,1,2\n1,3\n"),
+            ("uneven.csv", "y,0,1\n0,1,2\n1,3\n"),
             ("empty.csv", "y,0\n"),
         ] {
             std::fs::write(path(name), text).unwrap();
@@ -213,7 +213,7 @@ mod tests {
             ("colour.png", "grey"),
             ("none.bmp", "read"),
             ("high.csv", "1023"),
-            ("ragged.csv", "line 3"),
+            ("uneven.csv", "line 3"),
             ("empty.csv", "no levels"),
         ] {
             let error = read_flatness(&path(name), (2, 4)).unwrap_err().to_string();

@@ -118,7 +118,7 @@ fn moving_webp<'a>(frames: impl Iterator<Item = &'a RgbImage>) -> Result<Vec<u8>
     let first = frames
         .first()
         .ok_or_else(|| Error::Input("no picture to write".into()))?;
-    let mut config = webp::WebPConfig::new().map_err(|()| Error::Input("libwebp has no usual settings".into()))?;
+    let mut config = webp::WebPConfig::new().map_err(|()| Error::Input("libwebp gave no default settings".into()))?;
     config.quality = f32::from(QUALITY);
     let (width, height) = first.dimensions();
     let mut encoder = webp::AnimEncoder::new(width, height, &config);

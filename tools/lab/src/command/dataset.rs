@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Make a data set: random scenes as layered depth images and their holograms
 ///
-/// Made again into the same folder it goes on where it was stopped. Where the display's file names an aberration, the
+/// Called again with the same folder, it resumes. Where the display's file names an aberration, the
 /// holograms correct it.
 #[derive(Args)]
 pub(crate) struct Dataset {

@@ -31,7 +31,7 @@ pub(crate) struct Evaluate {
         required_unless_present_any = ["network", "pair"]
     )]
     method: Vec<MethodName>,
-    /// Networks to judge, separated by commas: one that comes along, or an ONNX file
+    /// Networks to judge, separated by commas: a bundled one, or an ONNX file
     #[arg(long, value_name = "8|15|FILE,…", value_delimiter = ',')]
     network: Vec<String>,
     /// Numbers that bundled networks compute in [default: int8]
@@ -229,7 +229,7 @@ impl Evaluate {
         for encoder in &self.encoder {
             let encoding = encoder.encoding(None).map_err(|_| {
                 Error::Input(format!(
-                    "--encoder {} needs the network that its pre-filter was trained with: --pair judges those that come along, `python -m phasefront_training evaluate-encoding` others",
+                    "--encoder {} needs the network that its pre-filter was trained with: --pair judges the bundled ones, `python -m phasefront_training evaluate-encoding` others",
                     encoder.name()
                 ))
             })?;

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Sweep the scenes of a data set on the depths that the training package has put into a folder
 ///
-/// `python -m phasefront_training seeds` makes the depths and calls this. Made again it goes on where it was stopped.
+/// `python -m phasefront_training seeds` makes the depths and calls this. Called again, it resumes.
 #[derive(Args)]
 pub(crate) struct Seeds {
     /// Folder of the data set

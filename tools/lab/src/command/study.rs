@@ -160,26 +160,26 @@ impl Study {
         self.write_json("sweep", &result)?;
         self.plot_sweep(&Sweep::for_display(&scenes.display), &rows)?;
         let mut text = format!(
-            "{:8} {:48}  clean PSNR dB    SSIM  degraded PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
+            "{:8} {:48}  clean PSNR dB    SSIM   refined PSNR dB    SSIM  ns a pixel   (mean of {} scenes)",
             "part", "setting", scenes.scenes
         );
         for row in &rows {
             let time = row.ns_per_pixel.map_or("–".into(), |ns| format!("{ns:.1}"));
             text += &format!(
                 "\n{:8} {:48}  {:13.2}  {:.4}  {:16.2}  {:.4}  {time:>10}",
-                row.part, row.setting, row.clean.psnr, row.clean.ssim, row.degraded.psnr, row.degraded.ssim
+                row.part, row.setting, row.clean.psnr, row.clean.ssim, row.refined.psnr, row.refined.ssim
             );
         }
         terminal::print(json, &result, text);
         Ok(())
     }
 
-    fn plot_sweep(&self, usual: &Sweep, rows: &[sweep_parts::Row]) -> Result<()> {
+    fn plot_sweep(&self, default: &Sweep, rows: &[sweep_parts::Row]) -> Result<()> {
         type Figure = fn(&sweep_parts::Row) -> f64;
         let curve = |part: &str, here: usize, figure: Figure| {
             let mut points: Vec<_> = (rows.iter())
                 .filter_map(|row| match row.part {
-                    "usual" => Some((here as i32, figure(row))),
+                    "default" => Some((here as i32, figure(row))),
                     other if other == part => Some((row.value as i32, figure(row))),
                     _ => None,
                 })
@@ -196,25 +196,25 @@ impl Study {
                     "planes, clean depth",
                     "planes",
                     "PSNR (dB)",
-                    curve("planes", usual.planes, clean),
+                    curve("planes", default.planes, clean),
                 ),
                 panel(
                     "planes, refined phone depth",
                     "planes",
                     "PSNR (dB)",
-                    curve("planes", usual.planes, |row| row.degraded.psnr),
+                    curve("planes", default.planes, |row| row.refined.psnr),
                 ),
                 panel(
                     "taps, clean depth",
                     "taps",
                     "PSNR (dB)",
-                    curve("taps", usual.taps, clean),
+                    curve("taps", default.taps, clean),
                 ),
                 panel(
                     "hidden layers, clean depth",
                     "hidden layers",
                     "PSNR (dB)",
-                    curve("hidden", usual.hidden_layers, clean),
+                    curve("hidden", default.hidden_layers, clean),
                 ),
             ],
         )
@@ -239,7 +239,7 @@ impl Study {
             let DisplayRow {
                 display, planes, taps, ..
             } = row;
-            let name = if display.is_empty() { "usual" } else { display };
+            let name = if display.is_empty() { "default" } else { display };
             text += &format!(
                 "\n{name:34}  {:>13}  {:14.2}  {:13.2}  {:13.2} / {:.4}",
                 format!("{planes} × {taps}"),
@@ -281,7 +281,7 @@ impl Study {
         self.write_json("depth", &result)?;
         let mut text = "method            depth                PSNR dB    SSIM   wrong depth".to_owned();
         for row in &rows {
-            let depth = format!("{}, {}", row.degradation, row.depth);
+            let depth = format!("{}, {}", row.faults, row.depth);
             text += &format!(
                 "\n{:17} {depth:20} {:7.2}  {:.4}  {:9.2} %",
                 row.method,

@@ -2,7 +2,7 @@
 //! session; and how much the picture that is seen changes from each frame to the next.
 
 use crate::scene;
-use crate::study::refined_depth::{Degradation, SENSOR, degrade};
+use crate::study::refined_depth::{SENSOR, SensorFaults, simulate_sensor};
 use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
 use phasefront::{Brightness, Display, EncoderOptions, Hologram, ImageSession, Method, SessionOptions, VideoSession};
 use phasefront_io::ldi::Ldi;
@@ -10,7 +10,7 @@ use phasefront_io::{Error, Result};
 use serde::Serialize;
 
 /// Noise and missing readings, new in each frame.
-const SENSOR_FAULTS: Degradation = Degradation {
+const FAULTS: SensorFaults = SensorFaults {
     name: "noise and holes",
     noise: 0.01,
     shift: 0,
@@ -21,7 +21,7 @@ const RANGE_M: (f32, f32) = (0.5, 2.5);
 /// Frames of a second.
 const RATE_HZ: u64 = 30;
 
-/// What smooths a session's frames, and how what is shown is corrected.
+/// What smooths a session's frames, and how the displayed image is corrected.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Its name in tables.
@@ -38,7 +38,7 @@ pub struct Setting {
     pub midpoint_steps: usize,
 }
 
-/// All frames by themselves, as usual.
+/// Makes each frame by itself, as by default.
 const ALONE: Setting = Setting {
     name: "each frame by itself",
     video: false,
@@ -95,8 +95,8 @@ pub struct Row {
     pub pixel: f64,
 }
 
-/// `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`]. What is
-/// seen is what the modulator shows at full light, focused in the middle of the volume. `done` hears of each frame.
+/// `frames` frames of random scene `seed`, at (H, W) = 4 times [`SENSOR`], by `method` in each of [`SETTINGS`]. The
+/// displayed image is seen at full light, focused in the middle of the volume. `done` hears of each frame.
 ///
 /// # Errors
 /// Fewer than two frames, or what a session refuses.
@@ -113,7 +113,7 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
     let depth = ldi.layers[0].depth.mapv(|d| if d.is_nan() { 1.0 } else { d });
     let readings: Vec<Vec<u8>> = (0..frames)
         .map(|frame| {
-            let readings = degrade(depth.view(), &SENSOR_FAULTS, seed + 1 + frame as u64);
+            let readings = simulate_sensor(depth.view(), &FAULTS, seed + 1 + frame as u64);
             let metres = readings.mapv(|d| RANGE_M.0 + d * (RANGE_M.1 - RANGE_M.0));
             metres.iter().flat_map(|m| m.to_le_bytes()).collect()
         })

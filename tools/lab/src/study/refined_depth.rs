@@ -1,4 +1,4 @@
-//! What the refinement of depth is worth: rendered scenes whose depth is made as bad as a phone's, and the holograms
+//! What the refinement of depth is worth: rendered scenes with simulated sensor depth, and the holograms
 //! of the refined and of the plainly enlarged depth against the truth.
 
 use crate::scene;
@@ -20,9 +20,9 @@ pub const SENSOR: (usize, usize) = (192, 256);
 /// Display pixels along each side of a sensor's.
 pub const RATIO: usize = 4;
 
-/// What is done to depth.
+/// The faults of a simulated depth sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Degradation {
+pub struct SensorFaults {
     /// Its name in tables.
     pub name: &'static str,
     /// Standard deviation of each reading's noise, of the volume's depth.
@@ -33,33 +33,33 @@ pub struct Degradation {
     pub holes: bool,
 }
 
-/// Those that are studied: the sensor's resolution alone, with each fault, and with all.
-pub const DEGRADATIONS: [Degradation; 5] = [
-    Degradation {
+/// The faults that are studied: the sensor's resolution alone, with each fault, and with all.
+pub const SENSOR_FAULTS: [SensorFaults; 5] = [
+    SensorFaults {
         name: "256×192",
         noise: 0.0,
         shift: 0,
         holes: false,
     },
-    Degradation {
+    SensorFaults {
         name: "+ noise",
         noise: 0.005,
         shift: 0,
         holes: false,
     },
-    Degradation {
+    SensorFaults {
         name: "+ holes",
         noise: 0.0,
         shift: 0,
         holes: true,
     },
-    Degradation {
+    SensorFaults {
         name: "+ shift",
         noise: 0.0,
         shift: 3,
         holes: false,
     },
-    Degradation {
+    SensorFaults {
         name: "all",
         noise: 0.005,
         shift: 3,
@@ -75,8 +75,8 @@ const EDGE_HOLES: f64 = 0.4;
 const READINGS_A_BLOB: usize = 4096;
 const BLOB_RADIUS: f64 = 7.0;
 
-/// `depth`, (4h, 4w), as a sensor of (h, w) gives it: NaN where there is no reading.
-pub fn degrade(depth: ArrayView2<'_, f32>, how: &Degradation, seed: u64) -> Array2<f32> {
+/// Reads `depth`, (4h, 4w), with a simulated sensor of (h, w): NaN where there is no reading.
+pub fn simulate_sensor(depth: ArrayView2<'_, f32>, how: &SensorFaults, seed: u64) -> Array2<f32> {
     let (height, width) = depth.dim();
     let (h, w) = (height / RATIO, width / RATIO);
     let mut dice = Dice::new(seed);
@@ -162,8 +162,8 @@ pub fn refine(readings: &Array2<f32>, rgb: &Array3<f32>) -> Result<Array2<f32>> 
 pub struct Row {
     /// What made the hologram.
     pub method: String,
-    /// What was done to depth; "none" for the rendered depth itself.
-    pub degradation: &'static str,
+    /// The name of the sensor's faults; "none" for the rendered depth itself.
+    pub faults: &'static str,
     /// "rendered", "bilinear" or "refined".
     pub depth: &'static str,
     /// Of the midpoint hologram's amplitude, dB.
@@ -202,8 +202,8 @@ pub fn study(
         done();
         let (rgb, rendered) = front(&ldi);
         let mut kinds = vec![("none", "rendered", rendered.clone())];
-        for how in &DEGRADATIONS {
-            let readings = degrade(rendered.view(), how, seed);
+        for how in &SENSOR_FAULTS {
+            let readings = simulate_sensor(rendered.view(), how, seed);
             kinds.push((how.name, "bilinear", enlarge(&readings)?));
             kinds.push((how.name, "refined", refine(&readings, &rgb)?));
         }
@@ -211,7 +211,7 @@ pub fn study(
         for (name, plan) in &plans {
             let mut scratch = plan.scratch();
             let mut field = Array3::<Complex32>::zeros((3, shape.0, shape.1));
-            for (degradation, kind, depth) in &kinds {
+            for (faults, kind, depth) in &kinds {
                 let frame = RgbdFrame::new(rgb.clone(), depth.clone())?;
                 let values = field.as_slice_mut().expect("standard layout");
                 plan.field(&frame, values, &mut scratch)?;
@@ -219,7 +219,7 @@ pub fn study(
                 let wrong = (depth.iter().zip(&rendered)).filter(|(a, b)| (**a - **b).abs() > 0.05);
                 of_scene.push(Row {
                     method: (*name).clone(),
-                    degradation,
+                    faults,
                     depth: kind,
                     psnr: alike.psnr_overall / scenes as f64,
                     ssim: alike.ssim_overall / scenes as f64,
@@ -244,7 +244,7 @@ pub fn study(
 
 /// The holograms of [`study`].
 pub fn work(scenes: usize, methods: usize) -> usize {
-    scenes * (1 + methods * (1 + 2 * DEGRADATIONS.len()))
+    scenes * (1 + methods * (1 + 2 * SENSOR_FAULTS.len()))
 }
 
 /// Colour and depth of what is visible: black and farthest where nothing is.
@@ -277,26 +277,26 @@ mod tests {
     #[test]
     fn each_fault_is_what_it_says() {
         let (depth, _) = steps();
-        let plain = degrade(depth.view(), &DEGRADATIONS[0], 1);
+        let plain = simulate_sensor(depth.view(), &SENSOR_FAULTS[0], 1);
         assert!((plain[(5, 5)] - 0.7).abs() < 1e-6);
         assert!((plain[(20, 22)] - 0.3).abs() < 1e-6);
-        let noisy = degrade(depth.view(), &DEGRADATIONS[1], 1);
+        let noisy = simulate_sensor(depth.view(), &SENSOR_FAULTS[1], 1);
         let spread = (noisy.iter().zip(&plain)).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
         assert!(((spread / 2000.0).sqrt() - 0.005).abs() < 5e-4);
-        let holes = degrade(depth.view(), &DEGRADATIONS[2], 1);
+        let holes = simulate_sensor(depth.view(), &SENSOR_FAULTS[2], 1);
         let missing = holes.iter().filter(|d| d.is_nan()).count();
         assert!((80..400).contains(&missing), "{missing}");
-        let shifted = degrade(depth.view(), &DEGRADATIONS[3], 1);
+        let shifted = simulate_sensor(depth.view(), &SENSOR_FAULTS[3], 1);
         // The disc's left edge, at pixel 45, is a reading farther right.
         assert!(shifted[(20, 11)] > plain[(20, 11)]);
-        assert_eq!(degrade(depth.view(), &DEGRADATIONS[4], 2).len(), 2000);
+        assert_eq!(simulate_sensor(depth.view(), &SENSOR_FAULTS[4], 2).len(), 2000);
     }
 
     #[test]
     fn refined_depth_is_nearer_to_the_truth_than_enlarged_depth() {
         let (depth, rgb) = steps();
-        for how in &DEGRADATIONS {
-            let readings = degrade(depth.view(), how, 3);
+        for how in &SENSOR_FAULTS {
+            let readings = simulate_sensor(depth.view(), how, 3);
             let wrong = |made: Array2<f32>| {
                 made.iter()
                     .zip(&depth)

@@ -1,10 +1,10 @@
 //! What the plane sweep's planes, taps, hidden layers, tiles and merged steps are worth, one at a time, beside exact
-//! waves on the same surfaces; on rendered depth, and on depth as a phone gives it after the core has refined it. And
+//! waves on the same surfaces; on rendered depth, and on simulated sensor depth that the core has refined. And
 //! the sweep on displays that no network was trained for.
 
 use crate::scene;
 use crate::study::Scenes;
-use crate::study::refined_depth::{DEGRADATIONS, RATIO, degrade, front, refine};
+use crate::study::refined_depth::{RATIO, SENSOR_FAULTS, front, refine, simulate_sensor};
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};
@@ -57,7 +57,7 @@ pub struct Figures {
 /// One setting of the ablation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
-    /// What is changed: `exact`, `usual`, `planes`, `taps`, `hidden`, `between`, `tile` or `merge`.
+    /// What is changed: `exact`, `default`, `planes`, `taps`, `hidden`, `between`, `tile` or `merge`.
     pub part: &'static str,
     /// The setting in words.
     pub setting: String,
@@ -65,8 +65,8 @@ pub struct Row {
     pub value: usize,
     /// On rendered depth.
     pub clean: Figures,
-    /// On degraded depth that was refined.
-    pub degraded: Figures,
+    /// On refined depth.
+    pub refined: Figures,
     /// The first scene on one thread, the fastest of five frames, ns a pixel; none for exact waves.
     pub ns_per_pixel: Option<f64>,
 }
@@ -81,7 +81,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
     let size = scenes.size;
     if !size.is_multiple_of(RATIO) {
         return Err(Error::Input(format!(
-            "scenes of {size} pixels; the degraded depth needs a multiple of {RATIO}"
+            "scenes of {size} pixels; the simulated sensor needs a multiple of {RATIO}"
         )));
     }
     let display = &scenes.display;
@@ -96,14 +96,14 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             }
         });
     }
-    let degradation = DEGRADATIONS[DEGRADATIONS.len() - 1];
+    let faults = SENSOR_FAULTS[SENSOR_FAULTS.len() - 1];
     let of_scenes = (0..scenes.scenes as u64)
         .into_par_iter()
         .map(|i| {
             let ldi = render(scenes, i)?;
             let truth = sm_lbm::hologram(&ldi, display, planes, &|_, _| {})?;
             let (rgb, depth) = front(&ldi);
-            let refined = refine(&degrade(depth.view(), &degradation, scenes.seed + i), &rgb)?;
+            let refined = refine(&simulate_sensor(depth.view(), &faults, scenes.seed + i), &rgb)?;
             let frames = [depth, refined].map(|depth| RgbdFrame::new(rgb.clone(), depth));
             let mut figures = Vec::new();
             for ((.., how), plan) in settings.iter().zip(&plans) {
@@ -134,7 +134,7 @@ pub fn ablation(scenes: &Scenes, planes: usize, done: &(dyn Fn() + Sync)) -> Res
             setting,
             value,
             clean: mean(each(0)),
-            degraded: mean(each(1)),
+            refined: mean(each(1)),
             ns_per_pixel: match plan {
                 Some(plan) => Some(time(plan, &frame)?),
                 None => None,
@@ -151,47 +151,50 @@ pub fn ablation_work(scenes: &Scenes, planes: usize) -> usize {
 
 /// What is compared: the part that is changed, in words, as a number, and how.
 fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usize, Propagation)> {
-    let usual = Sweep::for_display(display);
+    let default = Sweep::for_display(display);
     let sweep = |sweep| Propagation::Sweep { sweep, merged: true };
     let mut settings = Vec::new();
     for hidden in 0..=sweep::MAX_HIDDEN_LAYERS {
-        for planes in [planes, usual.planes] {
+        for planes in [planes, default.planes] {
             let words = format!("exact waves, {planes} planes, {hidden} hidden layers");
             settings.push(("exact", words, hidden, Propagation::Exact { hidden, planes }));
         }
     }
     let words = format!(
         "{} planes of {} taps, {} hidden layers, tiles of {}",
-        usual.planes, usual.taps, usual.hidden_layers, usual.tile
+        default.planes, default.taps, default.hidden_layers, default.tile
     );
-    settings.push(("usual", words, usual.planes, sweep(usual)));
+    settings.push(("default", words, default.planes, sweep(default)));
     for tenths in [4, 6, 8, 12, 16, 24, 32] {
-        let planes = (usual.planes * tenths).div_ceil(10);
+        let planes = (default.planes * tenths).div_ceil(10);
         let swept = Sweep::of_planes(display, planes);
         let words = format!("{planes} planes of {} taps", swept.taps);
         settings.push(("planes", words, planes, sweep(swept)));
     }
     for more in [-4, -2, 2, 4, 8] {
-        let taps = usual.taps.saturating_add_signed(more);
+        let taps = default.taps.saturating_add_signed(more);
         let words = format!("{taps} taps");
-        settings.push(("taps", words, taps, sweep(Sweep { taps, ..usual })));
+        settings.push(("taps", words, taps, sweep(Sweep { taps, ..default })));
     }
     for hidden_layers in 0..sweep::MAX_HIDDEN_LAYERS {
         let words = format!("{hidden_layers} hidden layers");
-        let swept = Sweep { hidden_layers, ..usual };
+        let swept = Sweep {
+            hidden_layers,
+            ..default
+        };
         settings.push(("hidden", words, hidden_layers, sweep(swept)));
     }
     let swept = Sweep {
         between_planes: false,
-        ..usual
+        ..default
     };
     settings.push(("between", "points moved to planes".into(), 0, sweep(swept)));
     for tile in [64, 128, 512, 1024] {
         let words = format!("tiles of {tile}");
-        settings.push(("tile", words, tile, sweep(Sweep { tile, ..usual })));
+        settings.push(("tile", words, tile, sweep(Sweep { tile, ..default })));
     }
     let how = Propagation::Sweep {
-        sweep: usual,
+        sweep: default,
         merged: false,
     };
     settings.push(("merge", "each step by itself".into(), 0, how));
@@ -201,7 +204,7 @@ fn settings(display: &Display, planes: usize) -> Vec<(&'static str, String, usiz
 /// The sweep on one display, beside exact waves; all against the truth of that display, at its modulator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DisplayRow {
-    /// What differs from the usual display; empty for that one.
+    /// What differs from the default display; empty for that one.
     pub display: String,
     /// The sweep that suits it.
     pub planes: usize,

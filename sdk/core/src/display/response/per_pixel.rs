@@ -15,7 +15,7 @@
 //! | (C, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
 //! | (C, Gh, Gw) × u16 | `turn`/2π × 65535 |
 //!
-//! C, the colours, is 3 or 1, as the file's length says. Node (i, j) stands on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and
+//! C, the colours, is 3 or 1, as the file's length says. Node (i, j) lies on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and
 //! Gw alike, so nodes reach to the last pixel or beyond it.
 //!
 //! # The rule

@@ -1,4 +1,4 @@
-"""Depth as phones give it, made from clean depth; colour and target stay as they are.
+"""Simulated sensor depth, made from clean depth; colour and target do not change.
 
 Phone depth is coarse (a LiDAR frame is 256x192 beside a 1920x1440 image), its noise grows with distance, it has
 holes where nothing came back, its edges bleed, and it stands a few pixels beside the colour. Each of these is drawn
@@ -16,7 +16,7 @@ MAX_SHIFT_PX = 3.0
 MAX_HOLES = 0.04  # share of the coarse pixels that seed a hole
 
 
-def degrade_depth(colour, depth, rng):
+def simulate_sensor_depth(colour, depth, rng):
     """Normalized depth (H, W) as a phone would give it for the colour (3, H, W); values stay in [0, 1].
 
     `rng` is a numpy Generator; the same state gives the same depth.
@@ -29,7 +29,7 @@ def degrade_depth(colour, depth, rng):
         coarse = _bleed(coarse, int(rng.integers(1, 3)), toward_viewer=rng.random() < 0.7)
     factor = rng.uniform(1.5, MAX_FACTOR) if rng.random() < 0.8 else 1.0
     size = max(2, round(height / factor)), max(2, round(width / factor))
-    # Averaging mixes the two sides of an edge (flying pixels); a sensor that picks one keeps it sharp but ragged.
+    # Averaging mixes the two sides of an edge (flying pixels); a sensor that picks one keeps it abrupt but jagged.
     averaged = rng.random() < 0.5
     if factor > 1:
         coarse = F.interpolate(coarse, size, mode="area" if averaged else "nearest-exact")
