@@ -39,9 +39,9 @@ impl From<phasefront::Error> for PhasefrontError {
             Error::Display(_) => PhasefrontError::Display,
             Error::Frame(_) => PhasefrontError::Frame,
             Error::Timestamp { .. } => PhasefrontError::Timestamp,
-            Error::Plan(_) => PhasefrontError::Setting,
+            Error::Setting(_) => PhasefrontError::Setting,
             Error::Network(_) => PhasefrontError::Network,
-            Error::Session(_) | Error::Lost(_) => PhasefrontError::Session,
+            Error::Session(_) | Error::Threads(_) | Error::Lost(_) => PhasefrontError::Session,
             _ => PhasefrontError::Internal,
         };
         kind(error.to_string())
@@ -118,7 +118,7 @@ mod tests {
             PhasefrontError::from(late.clone()),
             PhasefrontError::Timestamp(late.to_string())
         );
-        let plan = phasefront::Error::Plan("no z".into());
+        let plan = phasefront::Error::Setting("no z".into());
         assert_eq!(PhasefrontError::from(plan), PhasefrontError::Setting("no z".into()));
     }
 }

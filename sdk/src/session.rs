@@ -160,7 +160,7 @@ impl VideoSession {
     /// As [`Self::process`]; a scale that no hologram has.
     pub fn replay(&self, frame: &CameraFrame<'_>, scale: f32) -> Result<()> {
         if !(scale.is_finite() && scale > 0.0) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a scale of {scale} is no hologram's; it must be positive and finite"
             )));
         }

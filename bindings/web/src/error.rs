@@ -26,9 +26,9 @@ pub(crate) fn of_core(core: phasefront::Error) -> JsValue {
         Error::Display(_) => "display",
         Error::Frame(_) => "frame",
         Error::Timestamp { .. } => "timestamp",
-        Error::Plan(_) => "setting",
+        Error::Setting(_) => "setting",
         Error::Network(_) => "network",
-        Error::Session(_) | Error::Lost(_) => "session",
+        Error::Session(_) | Error::Threads(_) | Error::Lost(_) => "session",
         _ => "internal",
     };
     error(kind, &core.to_string())

@@ -281,7 +281,7 @@ fn nm(wavelengths_m: &[f64]) -> String {
 pub(crate) fn check_colours(what: &str, colours: usize, right: usize) -> Result<()> {
     match colours == right {
         true => Ok(()),
-        false => Err(Error::Plan(format!(
+        false => Err(Error::Setting(format!(
             "{what} has {colours} {}, the display {right}; both must have as many",
             if colours == 1 { "colour" } else { "colours" }
         ))),

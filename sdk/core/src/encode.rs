@@ -55,20 +55,20 @@ impl EncoderOptions {
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
         if !(0.0..=1.0).contains(&self.dark_threshold) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "the dark threshold is {}; it must be a share of full light from 0 to 1",
                 self.dark_threshold
             )));
         }
         if self.local_steps > local::MAX_STEPS {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "{} local steps; there must be at most {}, and after the second they bring nothing",
                 self.local_steps,
                 local::MAX_STEPS
             )));
         }
         if self.midpoint_steps > midpoint::MAX_STEPS {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "{} steps at the midpoint; there must be at most {}, and 3 bring nearly all",
                 self.midpoint_steps,
                 midpoint::MAX_STEPS

@@ -179,7 +179,7 @@ impl Output {
         target.check()?;
         let (modulator, bits) = (target.modulator(), target.display.bits());
         if height > modulator.0 || width > modulator.1 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a hologram of {width}×{height} does not fit the modulator of {}×{}",
                 modulator.1, modulator.0
             )));
@@ -268,7 +268,7 @@ impl Output {
         self.check_image(image)?;
         let (place, bits) = (layout.place_bits(), self.bits.1);
         if place < bits {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "{layout:?} has {place} bits a level, the display has {bits}; what it leaves out cannot be read"
             )));
         }
@@ -294,7 +294,7 @@ impl Output {
     fn check_image(&self, image: usize) -> Result<()> {
         let layout = self.placement.layout;
         if image >= layout.images(self.colours) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "there is no image {image}; {layout:?} has {}",
                 layout.images(self.colours)
             )));

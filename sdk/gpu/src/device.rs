@@ -347,7 +347,7 @@ mod tests {
         assert!(matches!(wrong, Err(GpuError::Refused(_))), "{wrong:?}");
         // A lost device says so, and why, to all that comes.
         device.give_up("pulled out");
-        assert_eq!(device.check(), Err(GpuError::Lost("pulled out".into())));
+        assert!(matches!(device.check(), Err(GpuError::Lost(why)) if why == "pulled out"));
         assert!(matches!(device.guarded(|| Ok(())), Err(GpuError::Lost(_))));
     }
 
@@ -408,7 +408,7 @@ mod tests {
         let mut encoder = device.inner.create_command_encoder(&Default::default());
         step.run(&mut encoder.begin_compute_pass(&Default::default()));
         let waited = device.wait(&device.queue.submit([encoder.finish()]));
-        assert_eq!(waited, Err(GpuError::Lost("no answer for 1ms".into())));
+        assert!(matches!(waited, Err(GpuError::Lost(why)) if why == "no answer for 1ms"));
         assert!(device.check().is_err());
     }
 

@@ -64,7 +64,7 @@ pub use probe::probe;
 pub use renderer::{InFlight, Renderer};
 
 /// Why the GPU does not serve.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
     /// No GPU, or none that is wanted.

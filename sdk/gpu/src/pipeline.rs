@@ -262,7 +262,7 @@ impl GpuPipeline {
     /// As [`GpuPipeline::submit`].
     pub fn submit_after(&mut self, past: Option<Past>, frame: &Frame<'_>, deliver: Deliver) -> Result<Ticket> {
         let Some(slot) = self.slots.iter().position(|slot| slot.flight.is_none()) else {
-            return Err(phasefront_core::runtime::error::Error::Plan(format!(
+            return Err(phasefront_core::runtime::error::Error::Setting(format!(
                 "{FLIGHTS} frames are in flight; one must be collected first"
             ))
             .into());
@@ -376,10 +376,12 @@ impl GpuPipeline {
         let slot = &mut self.slots[ticket.slot];
         let flight = slot.flight.take_if(|flight| flight.serial == ticket.serial);
         let Some(flight) = flight else {
-            return Err(phasefront_core::runtime::error::Error::Plan("the frame was collected before".into()).into());
+            return Err(
+                phasefront_core::runtime::error::Error::Setting("the frame was collected before".into()).into(),
+            );
         };
         if wanted == Deliver::Levels && flight.deliver == Deliver::Shown {
-            return Err(phasefront_core::runtime::error::Error::Plan(
+            return Err(phasefront_core::runtime::error::Error::Setting(
                 "the frame was submitted to be shown; its levels were not copied".into(),
             )
             .into());

@@ -160,8 +160,8 @@ impl Hologram {
             .chunks_exact(size)
             .nth(colour)
             .ok_or_else(|| match self.colours() {
-                1 => Error::Plan(format!("there is no plane {colour}; one laser has plane 0 alone")),
-                _ => Error::Plan(format!("there is no plane {colour}; 0 is red, 1 green, 2 blue")),
+                1 => Error::Setting(format!("there is no plane {colour}; one laser has plane 0 alone")),
+                _ => Error::Setting(format!("there is no plane {colour}; 0 is red, 1 green, 2 blue")),
             })
     }
 
@@ -221,7 +221,7 @@ impl Hologram {
     /// away, a process that was forked from the session's, or a call by a handler of logs while a session computes.
     pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
         if rgba.len() != Self::preview_bytes(height, width)? {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a preview of {width}×{height} needs 4 bytes a pixel; the image has {}",
                 rgba.len()
             )));

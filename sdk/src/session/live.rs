@@ -117,7 +117,7 @@ impl<W: Work> Live<W> {
                 let shared = shared.clone();
                 move || run(&shared, work, listener)
             })
-            .map_err(|e| Error::Session(format!("its thread cannot be started: {e}")))?;
+            .map_err(|e| Error::Threads(std::sync::Arc::new(e)))?;
         Ok(Live {
             process: ProcessId::current(),
             shared,
@@ -406,7 +406,7 @@ mod tests {
                     assert_eq!((timestamp_ns, message.as_str()), (timestamp, "worse"));
                     internal += 1;
                 }
-                Report::Failed { error, .. } => assert_eq!(error, Error::Frame("bad".into())),
+                Report::Failed { error, .. } => assert!(matches!(error, Error::Frame(why) if why == "bad")),
                 other => panic!("{other:?}"),
             }
         }

@@ -79,7 +79,7 @@ impl SessionOptions {
         // Quality levels are no larger than the modulator.
         let (height, width) = self.target.modulator();
         if height.saturating_mul(width) > self.most_pixels {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a session for {width}×{height} pixels; most_pixels allows {}: set it higher where the memory is there",
                 self.most_pixels
             )));
@@ -87,7 +87,7 @@ impl SessionOptions {
         if let Some(threads) = self.threads
             && threads.get() > Self::MOST_THREADS
         {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "{threads} threads are too many; 1 to {} are right, or none for as many as the device has",
                 Self::MOST_THREADS
             )));
@@ -95,7 +95,7 @@ impl SessionOptions {
         if let Some(rate) = self.target_rate_hz
             && !(rate.is_finite() && (0.01..=1000.0).contains(&rate))
         {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a target rate of {rate} frames a second cannot be aimed at; it must lie in 0.01..=1000"
             )));
         }

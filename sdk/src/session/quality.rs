@@ -58,7 +58,7 @@ impl Quality {
     /// A fixed level that is not among `quality_levels`.
     pub(super) fn check(self, quality_levels: usize) -> Result<()> {
         match self {
-            Quality::Fixed(quality_level) if quality_level >= quality_levels => Err(Error::Plan(format!(
+            Quality::Fixed(quality_level) if quality_level >= quality_levels => Err(Error::Setting(format!(
                 "there is no quality level {quality_level} among {quality_levels}; the best is 0"
             ))),
             _ => Ok(()),
@@ -244,12 +244,12 @@ impl LevelControl {
 /// has.
 pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator: (usize, usize)) -> Result<()> {
     if quality_levels.is_empty() {
-        return Err(Error::Plan(
+        return Err(Error::Setting(
             "there are no quality levels; at least one is needed".into(),
         ));
     }
     if quality_levels.len() > SessionOptions::MOST_QUALITY_LEVELS {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "{} quality levels are too many; 1 to {} are right",
             quality_levels.len(),
             SessionOptions::MOST_QUALITY_LEVELS
@@ -259,7 +259,7 @@ pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator
     for (i, quality_level) in quality_levels.iter().enumerate() {
         let (height, width) = (quality_level.height, quality_level.width);
         if height == 0 || width == 0 || height > modulator.0 || width > modulator.1 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "quality level {i} is {width}×{height}; each side must be at least 1 and at most the modulator's {}×{}",
                 modulator.1, modulator.0
             )));

@@ -5,6 +5,7 @@ use super::computing::Computing;
 use phasefront_core::runtime::error::{Error, Result};
 use rayon::ThreadPool;
 use std::num::NonZeroUsize;
+use std::sync::Arc;
 
 /// A pool of threads; None where there are none to start, as in WebAssembly: then the caller's computes.
 pub(super) struct Threads(Option<ThreadPool>);
@@ -15,12 +16,11 @@ impl Threads {
     /// # Errors
     /// Threads that cannot be started.
     pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
-        let refused = |why: &dyn std::fmt::Display| Error::Session(format!("its threads cannot be started: {why}"));
         if cfg!(target_family = "wasm") {
             return match threads.map_or(1, NonZeroUsize::get) {
                 1 => Ok(Threads(None)),
-                many => Err(refused(&format!(
-                    "{many} are asked for, and WebAssembly has one; give 1, or none"
+                many => Err(Error::Session(format!(
+                    "{many} threads are asked for, and WebAssembly has one; give 1, or none"
                 ))),
             };
         }
@@ -34,8 +34,8 @@ impl Threads {
             None if device > SessionOptions::MOST_THREADS => pool.num_threads(SessionOptions::MOST_THREADS),
             None => pool,
         };
-        let started = pool.build();
-        Ok(Threads(Some(started.map_err(|e| refused(&e))?)))
+        let started = pool.build().map_err(|e| Error::Threads(Arc::new(e)))?;
+        Ok(Threads(Some(started)))
     }
 
     /// What `work` gives, computed on these threads.

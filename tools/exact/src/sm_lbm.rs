@@ -46,7 +46,7 @@ pub const MOST_PLANES: usize = 1_000_000;
 /// No planes, or more than [`MOST_PLANES`].
 pub(crate) fn check_planes(planes: usize) -> Result<()> {
     if !(1..=MOST_PLANES).contains(&planes) {
-        return Err(phasefront::Error::Plan(format!(
+        return Err(phasefront::Error::Setting(format!(
             "{planes} planes to cut the scene into; 1 to {MOST_PLANES} are right"
         ))
         .into());

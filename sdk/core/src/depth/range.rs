@@ -25,7 +25,7 @@ impl DepthRange {
     pub fn check(self) -> Result<()> {
         match self {
             DepthRange::Fixed { near_m, far_m } if !(near_m >= 0.0 && near_m < far_m && far_m.is_finite()) => {
-                Err(Error::Plan(format!(
+                Err(Error::Setting(format!(
                     "near {near_m} m and far {far_m} m are no range; near must lie before far"
                 )))
             }

@@ -167,7 +167,7 @@ impl Refiner {
     pub fn new(depth: (usize, usize), crop: Crop, out: (usize, usize)) -> Result<Self> {
         let sides = [depth.0, depth.1, out.0, out.1];
         if sides.contains(&0) || sides.iter().any(|n| *n > 1 << 16) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "depth of {}×{} for a frame of {}×{}: each side must lie in 1..=65536",
                 depth.1, depth.0, out.1, out.0
             )));

@@ -36,7 +36,7 @@ impl DepthOptions {
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         if !(0.0..=1.0).contains(&self.least_confidence) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a least confidence of {} means nothing; it must lie in 0..=1",
                 self.least_confidence
             )));

@@ -29,7 +29,7 @@ impl Illumination {
     /// Neither three colours nor one, fewer than 2 nodes along an axis, or a value that is not finite or negative, or a
     /// colour without light.
     pub fn new(amplitude: ArrayView3<'_, f32>) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Plan(format!("laser map: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("laser map: {what}")));
         let (colours, rows, columns) = amplitude.dim();
         if ![1, 3].contains(&colours) || rows < 2 || columns < 2 {
             return refuse(format!(

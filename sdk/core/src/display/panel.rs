@@ -42,7 +42,7 @@ impl Flatness {
     pub fn new(shape: (usize, usize), maps: Vec<u16>) -> Result<Self> {
         let area = shape.0 * shape.1;
         if area == 0 || (maps.len() != area && maps.len() != 3 * area) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a flatness map of {} values for {}×{} pixels; there must be one for each, or one for each colour",
                 maps.len(),
                 shape.1,
@@ -67,7 +67,7 @@ impl Flatness {
     pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
         let (rows, columns) = self.shape;
         if height > rows || width > columns {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "the flatness map is for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
             )));
         }
@@ -113,7 +113,7 @@ impl Panel {
         if let Some(flatness) = &self.flatness
             && flatness.shape != (height, width)
         {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "the flatness map is for {}×{} pixels, the display has {width}×{height}; both must be of one size",
                 flatness.shape.1, flatness.shape.0
             )));
@@ -124,7 +124,7 @@ impl Panel {
             check_colours("the flatness map", 3, display.colours())?;
         }
         if self.lens_m == Some(0.0) || self.lens_m.is_some_and(|f| !f.is_finite()) {
-            return Err(Error::Plan("a lens of no focal length; it must not be 0".into()));
+            return Err(Error::Setting("a lens of no focal length; it must not be 0".into()));
         }
         for (angle, pixels) in self.carrier_rad.into_iter().zip([width, height]) {
             let reach_m = pixels as f64 / 2.0 * display.pitch_m();
@@ -132,7 +132,7 @@ impl Panel {
             let shortest_m = display.wavelengths_m().iter().copied().fold(f64::INFINITY, f64::min);
             let turns = slope * display.pitch_m() / shortest_m;
             if turns.is_nan() || turns > 0.5 {
-                return Err(Error::Plan(format!(
+                return Err(Error::Setting(format!(
                     "carrier and lens turn the phase by {turns:.2} of 2π from pixel to pixel; 0.5 is the most that pixels can show"
                 )));
             }

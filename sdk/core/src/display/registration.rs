@@ -39,14 +39,14 @@ impl Registration {
         }
         for shift in self.shift_px.as_flattened() {
             if !(-1000.0..=1000.0).contains(shift) {
-                return Err(Error::Plan(format!(
+                return Err(Error::Setting(format!(
                     "a colour's shift is {shift} pixels; it must lie in -1000..=1000"
                 )));
             }
         }
         for scale in &self.scale {
             if !(0.8..=1.25).contains(scale) {
-                return Err(Error::Plan(format!(
+                return Err(Error::Setting(format!(
                     "a colour's scale is {scale}; it must lie in 0.8..=1.25"
                 )));
             }

@@ -37,7 +37,7 @@ impl Response {
     /// `bits` outside 1..=8.
     pub fn linear(bits: u32) -> Result<Self> {
         if !(1..=8).contains(&bits) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a modulator of {bits} bits has no 8-bit levels; bits must lie in 1..=8"
             )));
         }
@@ -78,7 +78,7 @@ impl Response {
     /// # Errors
     /// Fewer than 2 or more than 256 levels, or phases that do not rise from 0, up to 4 turns.
     pub fn of_turns(turns: &[f64]) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Plan(format!("a modulator's levels: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("a modulator's levels: {what}")));
         if !(2..=256).contains(&turns.len()) {
             return refuse(format!("{} of them; there must be 2 to 256", turns.len()));
         }

@@ -87,13 +87,13 @@ impl Target {
         if let Some(other) = self.response.shape()
             && other != shape
         {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "the per-pixel table is for {}×{} pixels, the display has {}×{}; both must be of one size",
                 other.1, other.0, shape.1, shape.0
             )));
         }
         if self.display.bits() > 8 && self.response != (Response::Linear { bits: 8 }) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a display of {} bits answers linearly; a table is for one of 8 bits",
                 self.display.bits()
             )));

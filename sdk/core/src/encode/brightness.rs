@@ -23,7 +23,7 @@ impl Brightness {
     #[doc(hidden)]
     pub fn check(self) -> Result<()> {
         match self {
-            Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Plan(format!(
+            Brightness::Fixed(scale) if !(scale > 0.0 && scale.is_finite()) => Err(Error::Setting(format!(
                 "a scale of {scale} cannot stand for full light; it must be above 0"
             ))),
             _ => Ok(()),

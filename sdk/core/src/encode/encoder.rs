@@ -85,7 +85,7 @@ impl Encoder {
     pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
         let (height, width) = shape;
         if height == 0 || width == 0 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a plane of {width}×{height} is empty; each side must be at least 1"
             )));
         }

@@ -65,7 +65,7 @@ impl ColourPlan {
     ) -> Result<Self> {
         check_size("colour", sensor.1, sensor.0)?;
         if height == 0 || width == 0 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a frame of {width}×{height} is empty; each side must be at least 1"
             )));
         }

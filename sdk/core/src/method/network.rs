@@ -256,7 +256,7 @@ impl Network {
     /// on the fastest path that runs it.
     ///
     /// # Errors
-    /// [`Error::Plan`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
+    /// [`Error::Setting`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
     #[doc(hidden)]
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         match FusedChain::new(&self.chain, None) {
@@ -277,14 +277,14 @@ impl Network {
     /// Prepares the network on the kernels of one instruction set.
     ///
     /// # Errors
-    /// As [`Network::plan`]; [`Error::Plan`] where this processor or those kernels cannot.
+    /// As [`Network::plan`]; [`Error::Setting`] where this processor or those kernels cannot.
     #[doc(hidden)]
     pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
         let chain = FusedChain::new(&self.chain, Some(isa));
         self.fused_plan(
             height,
             width,
-            chain.map_err(|why| Error::Plan(format!("network: {why}")))?,
+            chain.map_err(|why| Error::Setting(format!("network: {why}")))?,
         )
     }
 
@@ -307,7 +307,7 @@ impl Network {
     /// that it asks for ([`InputKind::is_blurred`]) is the caller's.
     ///
     /// # Errors
-    /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Plan`] for an
+    /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Setting`] for an
     /// empty field or one too large.
     #[doc(hidden)]
     pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
@@ -411,11 +411,11 @@ fn depth_scale(served: Served) -> f32 {
 /// Refuses an empty frame, and one of more than `most` pixels.
 pub fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
     match height.checked_mul(width) {
-        Some(0) => Err(Error::Plan(format!(
+        Some(0) => Err(Error::Setting(format!(
             "network: a frame of {width}×{height} pixels is empty"
         ))),
         Some(pixels) if pixels <= most => Ok(()),
-        _ => Err(Error::Plan(format!(
+        _ => Err(Error::Setting(format!(
             "network: a frame of {width}×{height} pixels is too large; {most} pixels are the most"
         ))),
     }

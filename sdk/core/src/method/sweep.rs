@@ -104,7 +104,7 @@ impl Sweep {
     }
 
     fn check(&self, display: &Display) -> Result<()> {
-        let refuse = |what: String| Err(Error::Plan(format!("sweep: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("sweep: {what}")));
         if !(1..=MAX_PLANES).contains(&self.planes) {
             return refuse(format!("{} planes; 1 to {MAX_PLANES} are right", self.planes));
         }
@@ -199,7 +199,7 @@ impl SweepPlan {
     pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
         sweep.check(display)?;
         if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "sweep: a frame of {width}×{height} pixels is empty or too large"
             )));
         }
@@ -362,7 +362,7 @@ pub fn reaches(display: &Display, z_m: f64) -> bool {
 /// The optics of each colour between the planes of `sweep` and to `z_m`.
 pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>> {
     if !z_m.is_finite() {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "sweep: the hologram cannot stand at z = {z_m} m; it must be finite"
         )));
     }
@@ -371,7 +371,7 @@ pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>>
     let reach = reach_px(display, home_m);
     // The volume itself may be wide; what ends at the midpoint is always served.
     if z_m != 0.0 && !reaches(display, z_m) {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "sweep: light spreads {reach:.0} pixels from the front of the volume to z = {:.3} mm, more than {MAX_HOME_REACH}; end at the midpoint and propagate from there",
             z_m * 1e3
         )));

@@ -48,7 +48,7 @@ impl Opening {
         if self.radius > 0.0 && self.radius.is_finite() && self.shift.is_finite() {
             return Ok(());
         }
-        Err(Error::Plan(format!(
+        Err(Error::Setting(format!(
             "an aperture of radius {} shifted by {} passes nothing; the radius must be above 0 (1 is the whole first order)",
             self.radius, self.shift
         )))
@@ -69,7 +69,7 @@ impl Aperture {
     pub fn new(height: usize, width: usize, opening: Opening) -> Result<Self> {
         opening.check()?;
         if height == 0 || width == 0 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a plane of {width}×{height} is empty; each side must be at least 1"
             )));
         }

@@ -62,12 +62,12 @@ pub fn padded_shape(
     padding: Padding,
 ) -> Result<(usize, usize)> {
     if height == 0 || width == 0 {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "a plane of {width}×{height} is empty; each side must be at least 1"
         )));
     }
     if !distance_m.is_finite() {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "a distance of {distance_m} m cannot be propagated; it must be finite"
         )));
     }
@@ -80,7 +80,7 @@ pub fn padded_shape(
     };
     let (h, w) = (padded(height), padded(width));
     if h * w > MAX_PADDED_VALUES as f64 {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "a distance of {:.3} mm needs a padded plane of {w:.0}×{h:.0}, over the {} Mi values that fit; \
              a shorter distance or a smaller frame is needed",
             distance_m * 1e3,
@@ -335,7 +335,7 @@ impl Propagator {
         modulator_pitch_m: f64,
     ) -> Result<Vec<Self>> {
         if aberration.coefficients().len() != wavelengths_m.len() {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a correction of {} colours for {}; both must have as many",
                 aberration.coefficients().len(),
                 wavelengths_m.len()

@@ -39,7 +39,7 @@ pub fn sub_hologram(
     let radius_m = sub_hologram_radius_m(distance_m, wavelength_m, pitch_m);
     let pixels = radius_m / pitch_m;
     if !(pixels >= 1.0 && 2.0 * pixels <= height.min(width) as f64) {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "a focus at {:.3} mm from the modulator needs a sub-hologram {:.0} pixels wide; the plane is {width}×{height}, and at least 2 are needed",
             distance_m * 1e3,
             2.0 * pixels

@@ -59,13 +59,13 @@ impl Aberration {
     pub fn new(coefficients: impl Into<Vec<[f64; 5]>>) -> Result<Self> {
         let coefficients = coefficients.into();
         if ![1, 3].contains(&coefficients.len()) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "an aberration of {} colours; three are right, or one",
                 coefficients.len()
             )));
         }
         match coefficients.iter().flatten().find(|a| a.is_nan() || a.abs() > MOST) {
-            Some(a) => Err(Error::Plan(format!(
+            Some(a) => Err(Error::Setting(format!(
                 "an aberration coefficient of {a} rad; it must lie in -10000..=10000"
             ))),
             None => Ok(Aberration { coefficients }),
@@ -126,19 +126,19 @@ impl Aberrations {
     /// None at all, z that are not finite or do not ascend, or corrections of different numbers of colours.
     pub fn new(at: Vec<(f64, Aberration)>) -> Result<Self> {
         if at.is_empty() {
-            return Err(Error::Plan(
+            return Err(Error::Setting(
                 "no distances at which aberrations are known; give at least one".into(),
             ));
         }
         if !at.iter().all(|(z, _)| z.is_finite()) || !at.is_sorted_by(|a, b| a.0 < b.0) {
             let z: Vec<_> = at.iter().map(|(z, _)| z * 1e3).collect();
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "aberrations at z = {z:?} mm; distances must ascend"
             )));
         }
         let colours = at[0].1.coefficients.len();
         if at.iter().any(|(_, a)| a.coefficients.len() != colours) {
-            return Err(Error::Plan(
+            return Err(Error::Setting(
                 "aberrations of one colour and of three; all distances must have the same".into(),
             ));
         }

@@ -24,7 +24,7 @@ impl Cells {
     /// # Errors
     /// Other than 2, 4, 8 or 16 levels, numbers that are not 0, 1, 2 … each once, or bits over 3 or twice.
     pub fn new(memory: &[u8], layout: [[u8; 2]; 2]) -> Result<Self> {
-        let refuse = |what: &str| Err(Error::Plan(format!("a modulator's cells: {what}")));
+        let refuse = |what: &str| Err(Error::Setting(format!("a modulator's cells: {what}")));
         let once = |values: &[u8]| {
             let mut sorted = values.to_vec();
             sorted.sort_unstable();
@@ -111,7 +111,7 @@ impl BitPlanes {
         let (height, width) = self.shape;
         let count = maps.len();
         if count == 0 || !PLANES.is_multiple_of(count) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "{count} maps; a frame of {PLANES} planes holds 1, 2, 3, 4, 6, 8, 12 or 24"
             )));
         }
@@ -167,7 +167,9 @@ impl BitPlanes {
         let (height, width) = self.shape;
         assert!(frame.len() == self.frame_bytes() && levels.len() == height * width);
         if plane >= PLANES {
-            return Err(Error::Plan(format!("there is no plane {plane}; a frame has {PLANES}")));
+            return Err(Error::Setting(format!(
+                "there is no plane {plane}; a frame has {PLANES}"
+            )));
         }
         let (colour, bit) = (plane / 8, plane % 8);
         for (at, level) in levels.iter_mut().enumerate() {
@@ -179,8 +181,9 @@ impl BitPlanes {
             };
             let bits = (0..4).fold(0, |all, n| all | cell(n));
             let found = (0..self.levels).find(|level| self.spread[*level] == bits);
-            *level =
-                found.ok_or_else(|| Error::Plan(format!("the cells of pixel {x}, {y} are those of no level")))? as u8;
+            *level = found
+                .ok_or_else(|| Error::Setting(format!("the cells of pixel {x}, {y} are those of no level")))?
+                as u8;
         }
         Ok(())
     }

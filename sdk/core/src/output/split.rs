@@ -19,7 +19,7 @@ impl Split {
     /// # Errors
     /// More than 8 in a byte, or bits that are not 0, 1, 2 … up to 15, each once.
     pub fn new(bytes: [&[u8]; 3]) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Plan(format!("a level's bits in red, green and blue: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("a level's bits in red, green and blue: {what}")));
         let mut bits = [[NOTHING; 8]; 3];
         for (places, byte) in bits.iter_mut().zip(bytes) {
             if byte.len() > 8 {

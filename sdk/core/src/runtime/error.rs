@@ -2,9 +2,10 @@
 //! most 600 characters and none that controls a terminal, whatever stands in the file that it quotes.
 
 use std::fmt::{Display, Formatter, Write};
+use std::sync::Arc;
 
 /// Why the core refused to go on.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A display whose physics is impossible or out of range.
@@ -13,15 +14,18 @@ pub enum Error {
     /// A frame, plane or stack of the wrong shape or with unusable values.
     #[error("frame: {}", Line(.0))]
     Frame(String),
-    /// A plan that cannot be made or used as asked: a distance, a size, a parameter.
+    /// A setting or an argument that cannot be meant or planned for: a distance, a size, a parameter.
     #[error("{}", Line(.0))]
-    Plan(String),
+    Setting(String),
     /// An ONNX file that is not a hologram network.
     #[error("network: {}", Line(.0))]
     Network(String),
     /// A call that a session cannot answer in its mode or state.
     #[error("session: {}", Line(.0))]
     Session(String),
+    /// Threads of a session that the system does not start.
+    #[error("session: its threads cannot be started: {}", Line(&.0.to_string()))]
+    Threads(#[source] Arc<dyn std::error::Error + Send + Sync>),
     /// A frame that is not later than the last one. It is refused; what follows is not harmed.
     #[error(
         "timestamp: {given_ns} ns is not after {last_ns} ns, the last one taken; timestamps must rise, or the session be reset"
@@ -50,7 +54,7 @@ impl Error {
         let named = |why: String| format!("{part}: {why}");
         match self {
             Error::Network(why) => Error::Network(named(why)),
-            Error::Plan(why) => Error::Plan(named(why)),
+            Error::Setting(why) => Error::Setting(named(why)),
             other => other,
         }
     }
@@ -98,7 +102,10 @@ mod tests {
             long.starts_with("network: node '") && long.ends_with("Conv is right"),
             "{long}"
         );
-        let short = Error::Plan("8 µm is right".into());
+        let threads = Error::Threads(Arc::new(std::io::Error::other("none\nleft")));
+        assert!(threads.to_string().ends_with("started: none\u{fffd}left"), "{threads}");
+        assert_eq!(std::error::Error::source(&threads).unwrap().to_string(), "none\nleft");
+        let short = Error::Setting("8 µm is right".into());
         assert_eq!(short.to_string(), "8 µm is right");
     }
 }

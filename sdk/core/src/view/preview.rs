@@ -46,7 +46,7 @@ pub struct Preview {
 /// One over [`MOST_PIXELS`], or over 2¹⁴ pixels a side.
 pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
     if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
-        return Err(Error::Plan(format!(
+        return Err(Error::Setting(format!(
             "a preview of {width}×{height} is too large; {MOST_SIDE} pixels a side and {MOST_PIXELS} in all are the most"
         )));
     }
@@ -68,7 +68,7 @@ impl Preview {
     /// another modulator.
     pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
         if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a preview of {}×{} of a hologram of {width}×{height}: the screen's sides must be at least 1, the hologram's 2",
                 screen.1, screen.0
             )));

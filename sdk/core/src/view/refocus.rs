@@ -41,10 +41,12 @@ impl Refocus {
     /// No z, or one that [`asm::padded_shape`] refuses.
     pub fn new(height: usize, width: usize, display: &Display, z_m: &[f64], aperture: Option<Opening>) -> Result<Self> {
         if z_m.is_empty() {
-            return Err(Error::Plan("no z to refocus at; give at least one".into()));
+            return Err(Error::Setting("no z to refocus at; give at least one".into()));
         }
         if let Some(z) = z_m.iter().find(|z| !z.is_finite()) {
-            return Err(Error::Plan(format!("cannot refocus at z = {z} m; it must be finite")));
+            return Err(Error::Setting(format!(
+                "cannot refocus at z = {z} m; it must be finite"
+            )));
         }
         if let Some(opening) = aperture {
             Aperture::new(1, 1, opening)?;
@@ -99,7 +101,7 @@ impl Refocus {
     pub fn field(&self, spectrum: &Spectrum, z_m: f64, plane: &mut [Complex32], scratch: &mut Scratch) -> Result<()> {
         let distance_m = z_m - self.display.offset_m();
         if distance_m.is_nan() || distance_m.abs() > self.reach_m * (1.0 + 1e-9) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "z = {} mm is {} mm from the hologram; the plan reaches {} mm",
                 z_m * 1e3,
                 distance_m.abs() * 1e3,

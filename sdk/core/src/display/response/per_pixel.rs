@@ -79,7 +79,7 @@ impl PerPixel {
         levels: &[f32],
         turn: &[f32],
     ) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Plan(format!("per-pixel table: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("per-pixel table: {what}")));
         let most = f32::from(u16::MAX) / FRACTIONS;
         if let Some(level) = levels.iter().find(|l| !(0.0..=most).contains(*l)) {
             return refuse(format!("a level of {level}; it must lie in 0..={most:.0}"));
@@ -102,7 +102,7 @@ impl PerPixel {
         levels: &[u16],
         turn: &[u16],
     ) -> Result<Self> {
-        let refuse = |what: String| Err(Error::Plan(format!("per-pixel table: {what}")));
+        let refuse = |what: String| Err(Error::Setting(format!("per-pixel table: {what}")));
         if height == 0 || width == 0 || spacing == 0 || height > 65536 || width > 65536 {
             return refuse(format!(
                 "{width}×{height} pixels, a node every {spacing}; sizes must lie in 1..=65536"
@@ -145,7 +145,7 @@ impl PerPixel {
     /// # Errors
     /// Bytes that are not such a table, or not all of it.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
-        let refuse = |what: String| Error::Plan(format!("per-pixel table: {what}"));
+        let refuse = |what: String| Error::Setting(format!("per-pixel table: {what}"));
         let rest = bytes
             .strip_prefix(MAGIC.as_slice())
             .ok_or_else(|| refuse("does not begin with PFPIXEL1".into()))?;
@@ -198,7 +198,7 @@ impl PerPixel {
     pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
         let (rows, columns) = self.window;
         if height > rows || width > columns {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "per-pixel table: for {columns}×{rows} pixels, the hologram has {width}×{height}; it must not be larger"
             )));
         }

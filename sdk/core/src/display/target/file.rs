@@ -52,7 +52,7 @@ struct Header {
 }
 
 fn refuse(what: impl std::fmt::Display) -> Error {
-    Error::Plan(format!("calibration file: {what}"))
+    Error::Setting(format!("calibration file: {what}"))
 }
 
 impl Target {

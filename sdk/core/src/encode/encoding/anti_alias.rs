@@ -17,12 +17,12 @@ impl AntiAlias {
     /// A `sigma` that is not positive, or a `width` that is even or over 63.
     pub fn new(sigma: f32, width: usize) -> Result<Self> {
         if !(sigma > 0.0 && sigma.is_finite()) {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "an anti-alias sigma of {sigma} px cannot blur; it must be above 0"
             )));
         }
         if width.is_multiple_of(2) || width > 63 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "an anti-alias width of {width} px has no centre or is too wide; it must be odd, up to 63"
             )));
         }

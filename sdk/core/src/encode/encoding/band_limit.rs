@@ -23,7 +23,7 @@ impl BandLimit {
     /// A `k` that is not positive.
     pub fn new(height: usize, width: usize, k: f32) -> Result<Self> {
         if k.is_nan() || k <= 0.0 {
-            return Err(Error::Plan(format!(
+            return Err(Error::Setting(format!(
                 "a band limit of {k} keeps only the axes; it must be above 0"
             )));
         }
