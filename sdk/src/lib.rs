@@ -71,7 +71,7 @@ pub mod input;
 pub mod output {
     //! Levels to the images that a modulator takes, and back; modulators that can be bought, as data.
     pub use phasefront_core::output::modulator::{ModulatorSpec, Packing};
-    pub use phasefront_core::output::{BitPlanes, Cells, Layout, Levels, Output, Placement, Split};
+    pub use phasefront_core::output::{BitPlanes, Cells, Layout, Levels, Output, Placement};
 }
 pub mod session;
 pub mod target {

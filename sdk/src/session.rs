@@ -16,7 +16,6 @@ mod handle;
 mod hologram;
 mod live;
 mod live_work;
-#[cfg(feature = "gpu")]
 mod options;
 mod owned_frame;
 mod process_id;

@@ -28,7 +28,19 @@ def exported(folder: Path) -> dict[str, str]:
             path.insert(0, module["name"])
             module = inside.get(str(module["id"]))
         found[use["source"]] = "::".join(path)
+        found[defined(folder, use["source"])] = "::".join(path)
     return found
+
+
+def defined(folder: Path, path: str) -> str:
+    """Where an item is defined that a crate's root hands on from one of its modules."""
+    crate, *rest = path.split("::")
+    if len(rest) == 1:
+        for item in json.loads((folder / f"{crate}.json").read_text())["index"].values():
+            use = item["inner"].get("use")
+            if use and use["name"] == rest[0]:
+                return f"{crate}::{use['source'].removeprefix('crate::').removeprefix('self::')}"
+    return path
 
 
 def main(folder: Path) -> int:
@@ -48,8 +60,8 @@ def main(folder: Path) -> int:
     lines = {any_of.sub(lambda found: paths[found.group()], line) for line in lines}
     lines = sorted(lines, key=lambda line: (re.findall(r"phasefront::[\w:]+", line), line))
     print("\n".join(lines))
-    kinds = r"(?:struct|enum|trait|type|fn|const) phasefront::(?:[a-z_]+::)?[A-Z]\w+$"
-    count = sum(bool(re.search(kinds, re.sub(r"[<(=:] .*|<.*", "", line))) for line in lines)
+    item = re.compile(r"\b(?:struct|enum|trait|type|fn|const|static) phasefront::(?:[a-z_]+::)*(\w+)(?![\w:])")
+    count = len({found.group(1) for line in lines if (found := item.search(line))})
     print(f"phasefront: {count} public items", file=sys.stderr)
     hidden = [line for line in lines if re.search(r"phasefront_(core|gpu|kernels)::", line)]
     for line in hidden:

@@ -40,6 +40,7 @@ pub enum Layout {
     /// An image for each colour, one after another: red, green, blue; a 16-bit little-endian word a pixel.
     Grey16,
     /// An image for each colour, one after another; bytes red, green, blue, over which a level's bits are spread.
+    #[doc(hidden)]
     Split(Split),
 }
 

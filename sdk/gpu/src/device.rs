@@ -91,6 +91,7 @@ impl Device {
     /// # Errors
     /// [`GpuError::None`] where there is none, or none of that name, with those that there are;
     /// [`GpuError::Refused`] where the driver does not open it.
+    #[doc(hidden)]
     pub fn open(options: &DeviceOptions) -> Result<Self> {
         Self::open_with(options, &Allowed::default())
     }
