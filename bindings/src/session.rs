@@ -5,7 +5,7 @@ use crate::frame::{FrameInfo, FrameMemory};
 use crate::hologram::RawHologram;
 use crate::options::{Quality, RunningMode, SessionOptions, Thermal};
 use crate::statistics::Statistics;
-use phasefront::session::{self, Event, SessionHandle, Submission};
+use phasefront::session::{self, Event, SessionHandle};
 use phasefront::{ImageSession, LiveSession, VideoSession};
 use std::ops::Deref;
 use std::sync::Arc;
@@ -212,10 +212,7 @@ impl RawSession {
                     "session: it is not live; process frames, or make a live session".into(),
                 ));
             };
-            Ok(match session.submit(&frame)? {
-                Submission::Queued => None,
-                Submission::Dropped(reason) => Some(reason.into()),
-            })
+            Ok(session.submit(&frame)?.map(DropReason::from))
         })
     }
 
@@ -321,8 +318,13 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerErro
             log::warn!("the frame of {timestamp_ns} ns failed: {error}");
             listener.on_failed(timestamp_ns, error.to_string())
         }
-        Event::QualityChanged { timestamp_ns, change } => {
-            let reason = match change.reason {
+        Event::QualityChanged {
+            timestamp_ns,
+            from,
+            to,
+            reason,
+        } => {
+            let reason = match reason {
                 session::QualityReason::TooSlow => QualityReason::TooSlow,
                 session::QualityReason::Room => QualityReason::Room,
                 session::QualityReason::Thermal => QualityReason::Thermal,
@@ -330,10 +332,10 @@ fn tell(listener: &dyn SessionListener, event: Event) -> Result<(), ListenerErro
                 session::QualityReason::Refused => QualityReason::Refused,
                 _ => QualityReason::Other,
             };
-            log::info!("from quality level {} to {}: {reason:?}", change.from, change.to);
+            log::info!("from quality level {from} to {to}: {reason:?}");
             let change = QualityChange {
-                from_quality_level: change.from as u32,
-                to_quality_level: change.to as u32,
+                from_quality_level: from as u32,
+                to_quality_level: to as u32,
                 reason,
             };
             listener.on_quality_changed(timestamp_ns, change)

@@ -90,6 +90,6 @@ pub use phasefront_core::frame::RgbdFrame;
 pub use phasefront_core::method::Method;
 pub use phasefront_core::method::network::Network;
 pub use phasefront_core::method::sweep::Sweep;
-pub use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch, StageTimes};
+pub use phasefront_core::pipeline::{FrameReport, Pipeline, PipelineScratch};
 pub use phasefront_core::runtime::error::{Error, Result};
 pub use session::{Hologram, ImageSession, LiveSession, SessionOptions, VideoSession};

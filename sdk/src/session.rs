@@ -34,10 +34,11 @@ pub use event::Event;
 pub use handle::SessionHandle;
 pub use hologram::Hologram;
 pub use options::SessionOptions;
+pub use phasefront_core::pipeline::FrameTimes;
 #[cfg(feature = "gpu")]
-pub use phasefront_gpu::{Device, DeviceOptions};
-pub use quality::{Backend, Quality, QualityChange, QualityLevel, QualityReason, Thermal};
-pub use statistics::{BackendReport, Drops, FrameTimes, Statistics};
+pub use phasefront_gpu::DeviceOptions;
+pub use quality::{Backend, Quality, QualityLevel, QualityReason, Thermal};
+pub use statistics::{BackendReport, Drops, Statistics};
 
 use handle::Frames;
 use live::{Live, guarded, lock};
@@ -103,15 +104,6 @@ pub struct VideoSession(Answering);
 pub struct LiveSession {
     handle: SessionHandle,
     live: Arc<Live<LiveWork>>,
-}
-
-/// What became of a submitted frame at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Submission {
-    /// It waits to be processed.
-    Queued,
-    /// It was dropped; the listener hears of it too.
-    Dropped(DropReason),
 }
 
 impl ImageSession {
@@ -191,16 +183,16 @@ impl LiveSession {
         Ok(LiveSession { handle, live })
     }
 
-    /// Hands `frame` to the session, which copies it and goes on by itself. Never waits for a frame to be processed.
+    /// Hands `frame` to the session, which copies it and returns at once. Gives the reason where the frame was dropped;
+    /// the listener hears of it too.
     ///
     /// # Errors
     /// Colour and depth that do not belong together, a late frame, or a session that is closed or forked. None of them
     /// harms the frames that follow.
-    pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Submission> {
+    pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Option<DropReason>> {
         self.shared.process.check()?;
         frame.check()?;
-        let dropped = (self.live).submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))?;
-        Ok(dropped.map_or(Submission::Queued, Submission::Dropped))
+        (self.live).submit(frame.timestamp_ns, |spare| OwnedFrame::copy(frame, spare))
     }
 }
 

@@ -31,21 +31,34 @@ pub struct PipelineScratch {
 
 /// How long each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct StageTimes {
-    /// From the camera's format to the method's input, on a GPU.
-    pub input: Duration,
-    /// From the frame to the hologram where the method ends.
+pub struct FrameTimes {
+    /// Colour: turned, converted, resized. On a GPU, depth too.
+    pub colour: Duration,
+    /// Depth: read, aligned, smoothed over time, refined.
+    pub depth: Duration,
+    /// From the frame to the midpoint hologram; on a GPU with the ways there and back.
     pub method: Duration,
-    /// From there to the modulator.
+    /// From the midpoint to the modulator.
     pub propagate: Duration,
     /// From the field to levels.
     pub encode: Duration,
 }
 
-impl StageTimes {
+impl FrameTimes {
     /// All stages together.
     pub fn total(&self) -> Duration {
-        self.input + self.method + self.propagate + self.encode
+        self.stages().into_iter().map(|(_, time)| time).sum()
+    }
+
+    /// Each stage and its name, in their order.
+    pub fn stages(&self) -> [(&'static str, Duration); 5] {
+        [
+            ("colour", self.colour),
+            ("depth", self.depth),
+            ("method", self.method),
+            ("propagate", self.propagate),
+            ("encode", self.encode),
+        ]
     }
 }
 
@@ -55,7 +68,7 @@ pub struct FrameReport {
     /// The amplitude that full light stands for.
     pub scale: f32,
     /// How long it took.
-    pub times: StageTimes,
+    pub times: FrameTimes,
 }
 
 impl PipelineScratch {
@@ -218,11 +231,11 @@ impl Pipeline {
         let modulation = self.modulate(field, levels, scratch);
         Ok(FrameReport {
             scale: modulation.scale,
-            times: StageTimes {
-                input: Duration::ZERO,
+            times: FrameTimes {
                 method,
                 propagate,
                 encode: modulation.encode,
+                ..FrameTimes::default()
             },
         })
     }

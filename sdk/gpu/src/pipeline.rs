@@ -12,7 +12,7 @@ use phasefront_core::display::target::Target;
 use phasefront_core::encode::brightness::Past;
 use phasefront_core::encode::{EncoderOptions, Encoding};
 use phasefront_core::method::Method;
-use phasefront_core::pipeline::StageTimes;
+use phasefront_core::pipeline::FrameTimes;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Duration;
@@ -89,7 +89,7 @@ pub struct GpuReport {
     /// The amplitude that full light stands for.
     pub scale: f32,
     /// How long it took, where the device has time stamps.
-    pub times: Option<StageTimes>,
+    pub times: Option<FrameTimes>,
 }
 
 /// A plan for one [`Job`] on one device: all buffers and programs are made with it.
@@ -409,11 +409,12 @@ impl GpuPipeline {
         };
         Ok(GpuReport {
             scale: self.encoder.scale(word(0)),
-            times: slot.stamps.is_some().then(|| StageTimes {
-                input: stage(0),
+            times: slot.stamps.is_some().then(|| FrameTimes {
+                colour: stage(0),
                 method: stage(1),
                 propagate: stage(2),
                 encode: stage(3),
+                ..FrameTimes::default()
             }),
         })
     }

@@ -2,7 +2,7 @@
 
 use super::drop_reason::DropReason;
 use super::hologram::Hologram;
-use super::quality::QualityChange;
+use super::quality::QualityReason;
 use phasefront_core::runtime::error::Error;
 
 /// One thing that happened in a live session. Events come one after another, on the session's own thread, in the
@@ -30,8 +30,12 @@ pub enum Event {
     QualityChanged {
         /// The timestamp of the frame.
         timestamp_ns: u64,
-        /// From which quality level to which, and why.
-        change: QualityChange,
+        /// The quality level before.
+        from: usize,
+        /// The quality level now; the one before where the step was [`QualityReason::Refused`].
+        to: usize,
+        /// Why.
+        reason: QualityReason,
     },
     /// The session is closed and its memory is given back. This is the last event, told exactly once, also where
     /// [`super::SessionHandle::close`] does not wait for it.

@@ -131,6 +131,7 @@ impl SessionHandle {
     /// a handler of logs while a session computes. Its [`phasefront_gpu::Device::programs`], kept for [`GpuOptions`] of the
     /// next start, save compiling.
     #[cfg(feature = "gpu")]
+    #[doc(hidden)]
     pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
         let gpu = self.with_stages(|stages| Ok(stages.as_ref().and_then(Stages::gpu)));
         gpu.ok().flatten()

@@ -3,11 +3,11 @@
 use super::computing::{self, Computing};
 use super::live::lock;
 use super::process_id::ProcessId;
-use super::statistics::FrameTimes;
 use super::threads::Threads;
 use num_complex::Complex32;
 use phasefront_core::display::target::Target;
 use phasefront_core::output::Levels;
+use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::error::{Error, Result};
 use phasefront_core::runtime::stage::stage;
 use phasefront_core::view::preview::{Preview, PreviewScratch, check_screen};

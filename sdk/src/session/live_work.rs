@@ -4,6 +4,7 @@ use super::computing::Computing;
 use super::event::Event;
 use super::live::{Report, Work, lock};
 use super::owned_frame::OwnedFrame;
+use super::quality::QualityChange;
 use super::queue;
 use super::shared::Shared;
 use super::stages::FrameResult;
@@ -49,7 +50,13 @@ pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Rep
         Report::Done { timestamp_ns, output } => {
             listener(Event::Processed(output.hologram));
             if let Some(change) = output.change {
-                listener(Event::QualityChanged { timestamp_ns, change });
+                let QualityChange { from, to, reason } = change;
+                listener(Event::QualityChanged {
+                    timestamp_ns,
+                    from,
+                    to,
+                    reason,
+                });
             }
         }
         Report::Dropped { timestamp_ns, reason } => listener(Event::Dropped { timestamp_ns, reason }),

@@ -111,13 +111,13 @@ pub enum QualityReason {
 
 /// A change of the quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct QualityChange {
+pub(super) struct QualityChange {
     /// The quality level before.
-    pub from: usize,
+    pub(super) from: usize,
     /// The quality level now; the one before where the step was [`QualityReason::Refused`].
-    pub to: usize,
+    pub(super) to: usize,
     /// Why.
-    pub reason: QualityReason,
+    pub(super) reason: QualityReason,
 }
 
 /// Frames over their time before a step down.

@@ -1,6 +1,7 @@
 //! What a session has done so far, and how fast.
 
 use super::drop_reason::DropReason;
+use phasefront_core::pipeline::FrameTimes;
 use phasefront_core::runtime::clock::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -54,39 +55,6 @@ impl Counts {
     /// Frames that were submitted and of which nothing is known yet.
     pub(super) fn pending(&self) -> u64 {
         self.submitted - self.processed - self.failed - self.refused - self.dropped.total()
-    }
-}
-
-/// How long each stage of a frame took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FrameTimes {
-    /// Colour: turned, converted, resized.
-    pub colour: Duration,
-    /// Depth: read, aligned, smoothed over time, refined.
-    pub depth: Duration,
-    /// From the frame to the midpoint hologram; on a GPU with the ways there and back.
-    pub method: Duration,
-    /// From the midpoint to the modulator.
-    pub propagate: Duration,
-    /// From the field to levels.
-    pub encode: Duration,
-}
-
-impl FrameTimes {
-    /// All stages together.
-    pub fn total(&self) -> Duration {
-        self.stages().into_iter().map(|(_, time)| time).sum()
-    }
-
-    /// Each stage and its name, in their order.
-    pub fn stages(&self) -> [(&'static str, Duration); 5] {
-        [
-            ("colour", self.colour),
-            ("depth", self.depth),
-            ("method", self.method),
-            ("propagate", self.propagate),
-            ("encode", self.encode),
-        ]
     }
 }
 

@@ -3,7 +3,8 @@
 
 use super::{full_light, median, named};
 use phasefront::input::{ColourFormat, ColourImage, Orientation, Plane, YuvEncoding};
-use phasefront::{EncoderOptions, Method, StageTimes, Target};
+use phasefront::session::FrameTimes;
+use phasefront::{EncoderOptions, Method, Target};
 use phasefront_gpu::{
     ChainOptions, Colour, ColourData, Deliver, Depth, DepthData, Device, FLIGHTS, Frame, GpuPipeline, Job, probe,
 };
@@ -182,15 +183,16 @@ impl Alone {
     }
 
     /// Takes a frame's times.
-    fn note(&mut self, name: &'static str, times: &StageTimes) {
-        let StageTimes {
-            input,
+    fn note(&mut self, name: &'static str, times: &FrameTimes) {
+        let FrameTimes {
+            colour,
             method,
             propagate,
             encode,
+            ..
         } = *times;
         for (stage, time) in [
-            ("input", input),
+            ("input", colour),
             (name, method),
             ("propagate", propagate),
             ("encode", encode),

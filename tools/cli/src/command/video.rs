@@ -365,10 +365,9 @@ impl Video {
                     let mut failure = failure.lock().unwrap_or_else(|e| e.into_inner());
                     failure.get_or_insert((timestamp_ns, error));
                 }
-                Event::QualityChanged { change, .. } => bar.println(format!(
-                    "quality level {} to {}: {:?}",
-                    change.from, change.to, change.reason
-                )),
+                Event::QualityChanged { from, to, reason, .. } => {
+                    bar.println(format!("quality level {from} to {to}: {reason:?}"));
+                }
                 _ => {}
             }
         };

@@ -45,7 +45,7 @@ impl HologramRequest {
             encoder,
             scale: report.scale,
             stages: vec![
-                ("input", times.input),
+                ("input", times.colour),
                 (stage, times.method),
                 ("propagate", times.propagate),
                 ("encode", times.encode),
