@@ -1,8 +1,5 @@
 //! The network against its naive oracle, and every file that is not such a network against its refusal.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/network_models.rs"]
-mod network_models;
+use crate::network_models;
 
 use network_models::{Model, frame, int, ints};
 use num_complex::Complex32;

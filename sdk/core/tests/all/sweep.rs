@@ -1,8 +1,5 @@
 //! The plane sweep against its naive oracle, on every instruction set, and its edge cases.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/network_models.rs"]
-mod network_models;
+use crate::network_models;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;

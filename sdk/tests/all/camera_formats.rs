@@ -1,7 +1,5 @@
 //! Each colour format, fast against naive: random strides, odd sizes, every orientation, crops both ways.
-#![allow(clippy::unwrap_used)]
-
-mod camera;
+use crate::camera;
 
 use camera::{Noise, colour_formats};
 use phasefront::input::{Orientation, Rotation};

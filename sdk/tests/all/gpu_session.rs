@@ -1,10 +1,7 @@
 //! Sessions on the GPU beside sessions on the CPU: the same frames, nearly the same levels; what the GPU does not do;
 //! and devices that go. Any device there is will do, Mesa's driver in software too.
-#![cfg(feature = "gpu")]
-#![allow(clippy::unwrap_used)]
-
-mod camera;
-mod on_gpu;
+use crate::camera;
+use crate::on_gpu;
 
 use camera::{Scene, colour_formats, depth, frame, options};
 use on_gpu::on_gpu;
@@ -84,7 +81,7 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
 #[test]
 fn images_of_an_f32_network_are_near_the_cpus() {
     let mut plain = options(W, H);
-    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
     plain.quality_levels[0].method = Method::Network(Arc::new(network));
     let gpu = on_gpu(plain.clone());
     let scene = Scene::new(H, W, 10);
@@ -110,7 +107,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
 #[test]
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(W, H);
-    let seeded = Network::from_onnx(include_bytes!("../../models/seeded-8-80.onnx")).unwrap();
+    let seeded = Network::from_onnx(include_bytes!("../../../models/seeded-8-80.onnx")).unwrap();
     let sweep = Method::Sweep(Sweep::for_display(&plain.target.display));
     for (method, word) in [(sweep, "the sweep"), (Method::Seeded(Arc::new(seeded)), "Layers")] {
         plain.quality_levels[0].method = method;
@@ -270,7 +267,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     });
     cases.push((sweep, "31 taps"));
     let mut either = gpu.clone();
-    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
     let sweep = Sweep::for_display(&either.target.display);
     either.quality_levels[0].method = Method::Auto(sweep, Arc::new(network));
     cases.push((either, "sharpness"));
@@ -289,7 +286,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     (long.quality_levels[0].height, long.quality_levels[0].width) = (4, 9000);
     cases.push((long, "workgroup"));
     let mut half = gpu.clone();
-    let network = Network::from_onnx(include_bytes!("../../models/rgbd-8.onnx")).unwrap();
+    let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8.onnx")).unwrap();
     half.quality_levels[0].method = Method::Network(Arc::new(network));
     half.gpu.chain.float = Float::F16;
     let device = phasefront_gpu::Device::open(&half.gpu.device).unwrap();

@@ -1,10 +1,6 @@
 //! The optics against the paper's equations in f64, and what physics demands of them.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/network_models.rs"]
-mod network_models;
-#[path = "../../../tests/reference.rs"]
-mod reference;
+use crate::network_models;
+use crate::reference;
 
 use ndarray::{Array2, Array3};
 use network_models::Model;

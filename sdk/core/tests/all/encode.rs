@@ -1,8 +1,5 @@
 //! The dark and the local steps of encoders against sums over whole planes in f64, and what they are there for.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/reference.rs"]
-mod reference;
+use crate::reference;
 
 use ndarray::{Array2, Array3};
 use phasefront_core::display::Display;

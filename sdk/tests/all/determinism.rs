@@ -1,9 +1,6 @@
 //! The same frames give the same levels, on every run and on any number of threads, by every method and encoding.
-#![allow(clippy::unwrap_used)]
-
-mod camera;
-#[path = "../../tests/network_models.rs"]
-mod network_models;
+use crate::camera;
+use crate::network_models;
 
 use camera::{Scene, frame};
 use network_models::Model;

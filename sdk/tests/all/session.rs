@@ -1,7 +1,5 @@
 //! Sessions end to end with the shipped network: formats, modes, bad frames, what is reported.
-#![allow(clippy::unwrap_used)]
-
-mod camera;
+use crate::camera;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
 use num_complex::Complex32;

@@ -1,10 +1,7 @@
 //! A display of one laser: what it gives is what that laser gives among three, to the bit where the laser among three
 //! is the longest, for which all that the three share is planned.
-#![allow(clippy::unwrap_used)]
-
-mod camera;
-#[path = "../../tests/network_models.rs"]
-mod network_models;
+use crate::camera;
+use crate::network_models;
 
 use camera::{Scene, frame};
 use ndarray::{Array2, Array3, s};

@@ -1,0 +1,17 @@
+//! The tests of this crate in one program, which links once. Those that count memory or threads, or install a handler for
+//! the whole process, are programs of their own beside it.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../camera/mod.rs"]
+mod camera;
+#[path = "../../../tests/network_models.rs"]
+mod network_models;
+#[path = "../on_gpu/mod.rs"]
+mod on_gpu;
+
+mod camera_formats;
+mod determinism;
+#[cfg(feature = "gpu")]
+mod gpu_session;
+mod one_colour;
+mod session;
