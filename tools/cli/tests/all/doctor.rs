@@ -1,10 +1,6 @@
 //! `phasefront doctor` says what a machine offers and tests it.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/driver.rs"]
-mod driver;
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::driver;
+use crate::folder;
 
 use folder::Folder;
 use serde_json::Value;

@@ -1,8 +1,5 @@
 //! SM-LBM against Eq. 1–4 in f64, and what it must do whatever the scene.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/reference.rs"]
-mod reference;
+use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};

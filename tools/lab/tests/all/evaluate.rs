@@ -1,6 +1,4 @@
 //! Evaluation on small data sets made on the fly, against the same figures computed apart.
-#![allow(clippy::unwrap_used)]
-
 use ndarray::{Array2, Array3, Axis};
 use num_complex::Complex32;
 use phasefront::target::Aberration;

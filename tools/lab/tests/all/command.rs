@@ -1,8 +1,5 @@
 //! The command `phasefront-lab`: what it makes, and what it refuses before any work.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use folder::Folder;
 use phasefront_io::picture;

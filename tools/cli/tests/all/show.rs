@@ -1,8 +1,5 @@
 //! `phasefront show` and `screens` on virtual X servers, whose pixels are read back.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use folder::Folder;
 use phasefront_io::hologram::packed::{Image, Kind};

@@ -1,8 +1,5 @@
 //! The point-based method against its definition, against waves, and what it must do whatever the scene.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/reference.rs"]
-mod reference;
+use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};

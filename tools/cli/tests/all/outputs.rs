@@ -1,9 +1,6 @@
 //! What a command writes: no input and no foreign file is lost, whatever the outputs are named.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
-mod ldi;
+use crate::folder;
+use crate::ldi;
 
 use folder::Folder;
 use std::collections::BTreeMap;

@@ -1,8 +1,5 @@
 //! Photos with depth inside, made byte by byte from the specifications, and depth by a network that the user brings.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -1,8 +1,5 @@
 //! `phasefront calibrate` as a user runs it, on photographs of a simulated display.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use folder::Folder;
 use ndarray::Array2;

@@ -1,8 +1,5 @@
 //! From an image to what each modulator takes, and back; one line for each thing that is wrong.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use folder::Folder;
 use phasefront::output::{ModulatorSpec, Packing};

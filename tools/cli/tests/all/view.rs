@@ -1,10 +1,7 @@
 //! `phasefront view` and `phasefront judge`: pages that keep their size, and a table. What a page does in a browser is
 //! `tests/browser`'s.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
-mod ldi;
+use crate::folder;
+use crate::ldi;
 
 use folder::Folder;
 use phasefront_cli::viewer;

@@ -1,8 +1,5 @@
 //! `phasefront video`: folders and pipes, one by one and live; every frame answered or reported dropped.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/skip.rs"]
-mod skip;
+use crate::skip;
 
 use phasefront_io::hologram::{self, Hologram};
 use serde_json::Value;

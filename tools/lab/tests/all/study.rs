@@ -1,6 +1,4 @@
 //! The studies of layers and planes: what they compare, and what the command writes.
-#![allow(clippy::unwrap_used)]
-
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, RgbdFrame, Sweep};

@@ -1,9 +1,6 @@
 //! The plane sweep on displays that no network was trained for: beside exact waves on the same surfaces, and both
 //! beside the truth. And on a frame that a camera took: no seams between tiles.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/skip.rs"]
-mod skip;
+use crate::skip;
 
 use ndarray::Array3;
 use num_complex::Complex32;

@@ -1,6 +1,4 @@
 //! The bundled networks load, and the fast path gives what tract gives.
-#![allow(clippy::unwrap_used)]
-
 use ndarray::Array3;
 use num_complex::Complex32;
 use phasefront::{Display, Method, Network, RgbdFrame};
@@ -158,7 +156,7 @@ fn other_displays_are_served_by_physics() {
     }
     // A network for twice the depth serves the paper's display too, and one of twice its λ·V/p² better than the
     // visible waves do.
-    let wide = Arc::new(Network::from_onnx(include_bytes!("../../../models/rgbd-15-wide.onnx")).unwrap());
+    let wide = Arc::new(Network::from_onnx(include_bytes!("../../../../models/rgbd-15-wide.onnx")).unwrap());
     assert!(psnr_of(&wide, "") > trained - 0.5);
     let twice = "pitch_um = 5.66";
     let display = Display::from_toml(twice).unwrap();
@@ -185,7 +183,7 @@ fn displays_beyond_what_was_trained_are_refused() {
         let why = network.check_display(&display).unwrap_err().to_string();
         assert!(why.contains(what) && !why.contains('\n'), "{why}");
     }
-    let cylinder = Network::from_onnx(include_bytes!("../../../models/rgbd-15-cylinder.onnx")).unwrap();
+    let cylinder = Network::from_onnx(include_bytes!("../../../../models/rgbd-15-cylinder.onnx")).unwrap();
     cylinder.check_display(&Display::default()).unwrap();
     let why = cylinder.check_display(&Display::from_toml("volume_depth_mm = 3").unwrap());
     assert!(why.unwrap_err().to_string().contains("of one display"));

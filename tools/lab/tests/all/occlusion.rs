@@ -1,6 +1,4 @@
 //! The occlusion study on the paper's scene: its order, and each artefact where Fig. 9 marks it.
-#![allow(clippy::unwrap_used)]
-
 use ndarray::Array2;
 use phasefront::Display;
 use phasefront_io::ldi::{Ldi, LdiLayer};

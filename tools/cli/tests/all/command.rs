@@ -1,13 +1,8 @@
 //! The command as a user runs it: what it makes, and one line for each thing that is wrong.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/driver.rs"]
-mod driver;
-#[path = "../../../tests/folder.rs"]
-mod folder;
-mod ldi;
-#[path = "../../../tests/skip.rs"]
-mod skip;
+use crate::driver;
+use crate::folder;
+use crate::ldi;
+use crate::skip;
 
 use folder::Folder;
 use ndarray::{Array2, Array3, s};

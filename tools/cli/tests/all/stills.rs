@@ -1,6 +1,4 @@
 //! `phasefront hologram` on folders of pictures: each by itself, under its own name.
-#![allow(clippy::unwrap_used)]
-
 use phasefront_io::hologram;
 use serde_json::Value;
 use std::path::{Path, PathBuf};

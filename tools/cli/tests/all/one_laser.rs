@@ -1,9 +1,6 @@
 //! The command on a display of one laser: from a picture to a hologram, to what is seen of it, to the modulator's input
 //! and back; and one line for what is not for it.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use folder::Folder;
 use ndarray::{Array3, s};

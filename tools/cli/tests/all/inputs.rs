@@ -1,8 +1,5 @@
 //! Pictures and depth maps that people have, in all formats that are read; and files that nobody should read.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/folder.rs"]
-mod folder;
+use crate::folder;
 
 use exr::prelude::WritableImage;
 use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec};
@@ -275,7 +272,7 @@ fn colours_are_no_depth_and_the_formats_are_listed() {
     // What --help and the guide say is what is read.
     let squeezed = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
     let help = squeezed(&folder.succeeds(&["hologram", "--help"]));
-    let guide = squeezed(include_str!("../../../docs/depth.md"));
+    let guide = squeezed(include_str!("../../../../docs/depth.md"));
     for formats in [COLOUR_FORMATS, DEPTH_FORMATS] {
         assert!(help.contains(formats), "{help}");
         assert!(guide.contains(formats), "docs/depth.md: {formats}");

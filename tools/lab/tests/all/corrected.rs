@@ -1,8 +1,5 @@
 //! SM-LBM with aberration correction against Eq. 5 in f64, plane by plane, and against what is known.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/reference.rs"]
-mod reference;
+use crate::reference;
 
 use ndarray::{Array2, Array3, Axis, s};
 use num_complex::{Complex32, Complex64};

@@ -1,6 +1,4 @@
 //! Models from glTF, GLB and OBJ files: what is seen of them, what is done without, what is refused.
-#![allow(clippy::unwrap_used)]
-
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene::shapes::Light;
 use phasefront_lab::scene::{MAX_MODEL_TRIANGLES, read_model, render_ldi_reference};

@@ -1,8 +1,5 @@
 //! Depth peeling on a GPU, or on a software driver, against the renderer on the CPU.
-#![allow(clippy::unwrap_used)]
-
-#[path = "../../../tests/driver.rs"]
-mod driver;
+use crate::driver;
 
 use phasefront_io::ldi::Ldi;
 use phasefront_lab::scene::{DepthPeeler, Mesh, Scene, Texture, random_scene, render_ldi_reference};

@@ -1,0 +1,25 @@
+//! The tests of this crate in one program, which links once. Those that count memory or threads, or install a handler for
+//! the whole process, are programs of their own beside it.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../../tests/driver.rs"]
+mod driver;
+#[path = "../../../../tests/folder.rs"]
+mod folder;
+#[path = "../ldi/mod.rs"]
+mod ldi;
+#[path = "../../../../tests/skip.rs"]
+mod skip;
+
+mod calibrate_command;
+mod command;
+mod devices;
+mod doctor;
+mod inputs;
+mod one_laser;
+mod outputs;
+mod photos;
+mod show;
+mod stills;
+mod video;
+mod view;

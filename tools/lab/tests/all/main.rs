@@ -1,0 +1,25 @@
+//! The tests of this crate in one program, which links once. Those that count memory or threads, or install a handler for
+//! the whole process, are programs of their own beside it.
+#![allow(clippy::unwrap_used)]
+
+#[path = "../../../../tests/driver.rs"]
+mod driver;
+#[path = "../../../../tests/folder.rs"]
+mod folder;
+#[path = "../../../../tests/reference.rs"]
+mod reference;
+#[path = "../../../../tests/skip.rs"]
+mod skip;
+
+mod command;
+mod corrected;
+mod evaluate;
+mod models;
+mod networks;
+mod occlusion;
+mod peel;
+mod point_based;
+mod seeds;
+mod sm_lbm;
+mod study;
+mod sweep;
