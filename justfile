@@ -7,7 +7,7 @@ _default:
 
 # Check formatting, names, documents and lints, and run the unit tests
 check:
-    tests/run skips formatting documents spelling lints 'unit tests'
+    tests/run skips names formatting documents spelling lints 'unit tests'
 
 # Run the quick tests, or the Rust tests whose names contain FILTER
 test FILTER="":
