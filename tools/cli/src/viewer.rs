@@ -25,7 +25,7 @@ const PICTURE: &str = "data:image/webp;base64,";
 /// The widest that a view is packed.
 const WIDEST: u32 = 1280;
 /// Widths and qualities of WebP that are tried, the best first.
-const LADDER: [(u32, f32); 9] = [
+const SIZES: [(u32, f32); 9] = [
     (WIDEST, 85.0),
     (WIDEST, 75.0),
     (960, 80.0),
@@ -189,7 +189,7 @@ pub fn pack(views: &[RgbImage], most: usize) -> Result<Vec<String>> {
         return Ok(Vec::new());
     };
     let bytes = |n: usize| n.div_ceil(3) * BASE64 + 32;
-    for (width, quality) in LADDER {
+    for (width, quality) in SIZES {
         let one = |view: &RgbImage| export::webp(&export::at_width(view.clone(), width), quality);
         if bytes(one(middle)?.len()) * views.len() > most + most / 10 {
             continue;
