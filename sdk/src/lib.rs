@@ -75,8 +75,8 @@ pub mod output {
 }
 pub mod session;
 pub mod target {
-    //! What a hologram is made for beside its [`Display`](crate::Display): the modulator's response, the lasers' light, the
-    //! correction of the optics.
+    //! What a hologram is made for beside its [`Display`](crate::Display): the modulator's response, the lasers' light,
+    //! the correction of the optics.
     pub use phasefront_core::display::illumination::Illumination;
     pub use phasefront_core::display::response::Response;
     pub use phasefront_core::optics::zernike::Aberration;

@@ -2,7 +2,8 @@
 //! before it so that the checkerboard does not alias.
 //!
 //! Encoders take the field as given: its phase, its offset, its scale. Phases lie in \[0, 2π).
-//! What level shows a phase is [`crate::display::response`]'s knowledge; an amplitude's scale is what full light stands for.
+//! What level shows a phase is [`crate::display::response`]'s knowledge; an amplitude's scale is what full light stands
+//! for.
 
 pub mod brightness;
 mod dark_threshold;

@@ -1,7 +1,8 @@
 //! The implementation of Phasefront on the CPU: everything between a camera's frame and a modulator's levels.
 //!
-//! Applications depend on the crate `phasefront`, which has the stable API. This crate is public for the other crates of
-//! the workspace (GPU, calibration, laboratory, command) and its tests: its items change without notice, in any release.
+//! Applications depend on the crate `phasefront`, which has the stable API. This crate is public for the other crates
+//! of the workspace (GPU, calibration, laboratory, command) and its tests: its items change without notice, in any
+//! release.
 //!
 //! # Map
 //!

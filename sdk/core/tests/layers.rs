@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The modules, lowest first. Where a group's own modules are listed one by one, they depend on each other in this order
-/// too.
+/// The modules, lowest first. Where a group's own modules are listed one by one, they depend on each other in this
+/// order too.
 const LAYERS: &[&str] = &[
     "runtime::error",
     "runtime::caught",

@@ -1,5 +1,5 @@
-// Which amplitude full light stands for where it is smoothed: a histogram of some of the field's amplitudes, and what it
-// says. The twin of ../brightness.rs, whose constants come in the header, in capitals.
+// Which amplitude full light stands for where it is smoothed: a histogram of some of the field's amplitudes, and what
+// it says. The twin of ../brightness.rs, whose constants come in the header, in capitals.
 
 struct Past { scale: f32, share: f32, unused_a: u32, unused_b: u32 }
 

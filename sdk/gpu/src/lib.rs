@@ -1,9 +1,9 @@
-//! Whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as compute passes of wgpu, for Vulkan, Metal and
-//! DirectX 12. A frame goes in, modulator levels come out, and nothing comes back to the CPU between.
+//! Whole frames on the GPU: the stages of [`phasefront_core::pipeline`] as compute passes of wgpu, for Vulkan, Metal
+//! and DirectX 12. A frame goes in, modulator levels come out, and nothing comes back to the CPU between.
 //!
-//! Each stage is a .wgsl file beside its Rust. A header that the Rust writes before the text holds the constants, so that
-//! loops have constant bounds. The CPU's stage is the oracle: f32 agrees with it to 1e-4, int8 networks agree to the
-//! bit. A device is used only after it has computed a small frame as the CPU does.
+//! Each stage is a .wgsl file beside its Rust. A header that the Rust writes before the text holds the constants, so
+//! that loops have constant bounds. The CPU's stage is the oracle: f32 agrees with it to 1e-4, int8 networks agree to
+//! the bit. A device is used only after it has computed a small frame as the CPU does.
 //!
 //! | module | what it does |
 //! |---|---|

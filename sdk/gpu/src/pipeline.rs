@@ -45,7 +45,8 @@ pub struct Job {
 }
 
 impl Job {
-    /// Frames as [`phasefront_core::frame::RgbdFrame`] by `method` to `target` as [`phasefront_core::pipeline::Pipeline`] makes them.
+    /// Frames as [`phasefront_core::frame::RgbdFrame`] by `method` to `target` as
+    /// [`phasefront_core::pipeline::Pipeline`] makes them.
     pub fn new(shape: (usize, usize), method: Method, target: impl Into<Target>) -> Self {
         Job {
             shape,
@@ -125,8 +126,8 @@ impl GpuPipeline {
     /// Plans `job` on `device`. Whether the device is to be trusted is [`super::probe`]'s question.
     ///
     /// # Errors
-    /// What [`phasefront_core::pipeline::Pipeline::new`] refuses, and [`GpuError::Refused`] or [`GpuError::OutOfMemory`] for what this
-    /// device cannot do.
+    /// What [`phasefront_core::pipeline::Pipeline::new`] refuses, and [`GpuError::Refused`] or
+    /// [`GpuError::OutOfMemory`] for what this device cannot do.
     pub fn new(device: &Arc<Device>, job: &Job) -> Result<Self> {
         let display = &job.target.display;
         job.method.check(display)?;

@@ -128,8 +128,8 @@ impl SessionHandle {
     }
 
     /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to
-    /// a handler of logs while a session computes. Its [`phasefront_gpu::Device::programs`], kept for [`GpuOptions`] of the
-    /// next start, save compiling.
+    /// a handler of logs while a session computes. Its [`phasefront_gpu::Device::programs`], kept for [`GpuOptions`] of
+    /// the next start, save compiling.
     #[cfg(feature = "gpu")]
     #[doc(hidden)]
     pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {

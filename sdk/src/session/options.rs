@@ -32,7 +32,8 @@ pub struct SessionOptions {
     /// Which GPU, and how.
     #[cfg(feature = "gpu")]
     pub gpu: GpuOptions,
-    /// Threads to compute with, [`Self::MOST_THREADS`] at most; None for as many as the device has, and no more than that.
+    /// Threads to compute with, [`Self::MOST_THREADS`] at most; None for as many as the device has, and no more than
+    /// that.
     pub threads: Option<NonZeroUsize>,
     /// Most pixels of a quality level and of the modulator: what a session allocates is a multiple of them.
     pub most_pixels: usize,

@@ -1,4 +1,5 @@
-//! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with what is needed to look at them again.
+//! Hologram files: modulator levels in a PNG, or a complex field in a `.npy`, with what is needed to look at them
+//! again.
 
 pub mod packed;
 mod views;

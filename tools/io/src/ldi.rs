@@ -54,8 +54,8 @@ impl PartialEq for LdiLayer {
     }
 }
 
-/// The planes of [`phasefront_core::method::network::InputKind::Ldi`]: red, green, blue and depth of each layer in turn,
-/// each minus ½; black and farthest where there is no hit, or no such layer.
+/// The planes of [`phasefront_core::method::network::InputKind::Ldi`]: red, green, blue and depth of each layer in
+/// turn, each minus ½; black and farthest where there is no hit, or no such layer.
 impl Source for Ldi {
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
         let Some(layer) = self.layers.get(plane / 4) else {

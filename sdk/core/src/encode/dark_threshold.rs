@@ -1,5 +1,5 @@
-//! The dark threshold. Where the amplitude is low, the phase of a field is noise, and double phase displays it under full
-//! light as coloured speckle. Below the threshold the field moves to the real axis on a straight line:
+//! The dark threshold. Where the amplitude is low, the phase of a field is noise, and double phase displays it under
+//! full light as coloured speckle. Below the threshold the field moves to the real axis on a straight line:
 //!
 //!   u' = w·u + (1 − w)·|u|,  w = min(1, |u| / (threshold · scale)).
 //!

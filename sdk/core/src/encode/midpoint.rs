@@ -1,6 +1,6 @@
 //! Correction of a phase map at the midpoint: the displayed wave is taken there, drawn toward the wanted field, and
-//! taken back. Four transforms a colour and step. In video a pixel whose field stands still goes on from the frame before, so
-//! that one step a frame comes to where many lead.
+//! taken back. Four transforms a colour and step. In video a pixel whose field stands still goes on from the frame
+//! before, so that one step a frame comes to where many lead.
 //!
 //! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture,
 //! and propagation back over the offset) and T the wanted field there over the scale, a step is

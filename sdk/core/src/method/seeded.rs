@@ -1,8 +1,8 @@
 //! Seeded networks: the plane sweep's field, corrected by a small network that sees it beside the frame.
 //!
 //! The sweep is nearly exact on clean depth, and wrong at edges of noisy or incomplete depth; the network has
-//! learned on both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½) of the three
-//! colours, then ½ Im u, so that one range of 8 bits holds all. Its head adds the output to u.
+//! learned on both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½)
+//! of the three colours, then ½ Im u, so that one range of 8 bits holds all. Its head adds the output to u.
 
 use crate::display::Display;
 use crate::frame::RgbdFrame;
@@ -45,8 +45,8 @@ impl SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for (`height`, `width`) frames, on the
-    /// field of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for (`height`, `width`) frames,
+    /// on the field of its [`seed`] at the midpoint.
     ///
     /// # Errors
     /// A network or a sweep that cannot be planned.

@@ -4,10 +4,10 @@
 //! The paper puts the terms on the sub-hologram φ⁰ that focuses a plane wave to the distance d (Eq. 19), takes it
 //! to its focus, and calls the Fourier transform of what it finds there Φ. The light that leaves the
 //! sub-hologram at (x, y) arrives with the frequency −(x, y)/(λd), so its pupil is ours, turned by π where
-//! d > 0. As its aperture grows Φ becomes exp(i·terms), [`Aberration::phase`](super::zernike::Aberration::phase): that is what is used,
-//! for every d, 0 included, where a sub-hologram has no size; and |Φ| is 1 where diffraction at the rim of
-//! a sub-hologram ripples it. [`sub_hologram`] and [`corrected_transfer_function`] are the paper's way: the
-//! one for captures of a focused spot, the other as the oracle.
+//! d > 0. As its aperture grows Φ becomes exp(i·terms), [`Aberration::phase`](super::zernike::Aberration::phase): that
+//! is what is used, for every d, 0 included, where a sub-hologram has no size; and |Φ| is 1 where diffraction at the
+//! rim of a sub-hologram ripples it. [`sub_hologram`] and [`corrected_transfer_function`] are the paper's way: the one
+//! for captures of a focused spot, the other as the oracle.
 
 use super::asm::{Padding, Propagator};
 use super::reference;

@@ -1,4 +1,5 @@
-//! The constant phase of a network's field, found on the GPU. The twin of [`phasefront_core::pipeline::display_plan::remove_mean_phase`].
+//! The constant phase of a network's field, found on the GPU. The twin of
+//! [`phasefront_core::pipeline::display_plan::remove_mean_phase`].
 
 use crate::Result;
 use crate::device::{Device, Dispatch};

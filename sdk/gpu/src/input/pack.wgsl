@@ -1,7 +1,7 @@
-// Converts a captured frame to what the chain reads: groups of four channels in the chain's numbers. The header that input.rs
-// writes before this text gives `Value` and the constants in capitals; behind it stand `channels`, which knows where
-// values come from, and `store`, which knows the numbers. Where the chain's layers take squares of two by two pixels as
-// one, SIDE is 2, and the groups of a square's pixels lie behind one another.
+// Converts a captured frame to what the chain reads: groups of four channels in the chain's numbers. The header that
+// input.rs writes before this text gives `Value` and the constants in capitals; behind it stand `channels`, which knows
+// where values come from, and `store`, which knows the numbers. Where the chain's layers take squares of two by two
+// pixels as one, SIDE is 2, and the groups of a square's pixels lie behind one another.
 
 struct Frame { width: u32, height: u32, plane: u32, unused: u32 }
 

@@ -1,5 +1,6 @@
 //! The convolution chain on the GPU: one dispatch a layer, or one for two layers and the skip around them where that
-//! is faster on this device. Its twins are [`phasefront_core::method::network::reference`] and the kernels' int8 module.
+//! is faster on this device. Its twins are [`phasefront_core::method::network::reference`] and the kernels' int8
+//! module.
 
 use crate::device::{Constants, Device, Dispatch};
 use crate::input::{ChainInput, Form, Packer, Source};
@@ -578,8 +579,8 @@ impl GpuNetworkPlan {
         )
     }
 
-    /// Runs the network on one frame: `input` planar (C, H, W) as [`phasefront_core::method::network::NetworkPlan::run`] takes it,
-    /// `output` (6, H, W).
+    /// Runs the network on one frame: `input` planar (C, H, W) as
+    /// [`phasefront_core::method::network::NetworkPlan::run`] takes it, `output` (6, H, W).
     ///
     /// # Errors
     /// A wrong length; [`GpuError::Lost`].

@@ -12,7 +12,8 @@ const LINES: usize = 64;
 /// A search for one frame size: a dispatch for each side.
 pub(crate) struct Search {
     sides: [Dispatch; 4],
-    /// (2, H, W): the pixels that hidden layers continue, as [`phasefront_core::method::sweep::hidden::Hidden::find`] gives them.
+    /// (2, H, W): the pixels that hidden layers continue, as [`phasefront_core::method::sweep::hidden::Hidden::find`]
+    /// gives them.
     pub(crate) sources: wgpu::Buffer,
 }
 

@@ -1,4 +1,5 @@
-//! The plane sweep on the GPU, several planes a dispatch: the twin of [`phasefront_core::method::sweep`], whose filters it has.
+//! The plane sweep on the GPU, several planes a dispatch: the twin of [`phasefront_core::method::sweep`], whose filters
+//! it has.
 //!
 //! What it reads and writes stays on the device: red, green, blue and depth of each pixel in, the hologram's field out.
 //! Every step is done by itself, in the whole frame and a black border. Of what the CPU spares by tiles and merged

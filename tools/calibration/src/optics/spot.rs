@@ -2,10 +2,10 @@
 //!
 //! A sub-hologram (Eq. 19) focuses light to a distance; the camera stands focused there. Each round shows the best
 //! coefficients so far, and steps to either side of them along five directions that are at right angles and turned from
-//! round to round. [`crate::optics::pupil`] finds the aberration that explains how sharp all spots of all rounds were; the next
-//! round begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is sharpest.
-//! Directions mix the terms because sharpness is the same for a pupil and its mirror images: steps of one term at a
-//! time hardly tell them apart.
+//! round to round. [`crate::optics::pupil`] finds the aberration that explains how sharp all spots of all rounds were;
+//! the next round begins there. Steps stay large: a spot tells most where its sharpness falls, and nothing where it is
+//! sharpest. Directions mix the terms because sharpness is the same for a pupil and its mirror images: steps of one
+//! term at a time hardly tell them apart.
 
 use crate::camera::photograph::{Photograph, SATURATED_SHARE};
 use crate::optics::pupil::{Pupil, Spot};

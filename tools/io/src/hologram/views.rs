@@ -63,8 +63,8 @@ impl Hologram {
         }
     }
 
-    /// Checks that the hologram was made for the display of `file`: for its lasers, pitch and offset, and levels for its
-    /// bits.
+    /// Checks that the hologram was made for the display of `file`: for its lasers, pitch and offset, and levels for
+    /// its bits.
     ///
     /// # Errors
     /// What differs, of both.

@@ -1,5 +1,6 @@
-//! `phasefront-lab study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and temporally
-//! smoothed video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other displays.
+//! `phasefront-lab study`: the paper's Fig. 2a and 2b, as a table, JSON and a plot; and what refined depth and
+//! temporally smoothed video are worth, as a table and JSON; the plane sweep's ablation, and the sweep on other
+//! displays.
 
 use clap::{Args, ValueEnum};
 use phasefront::{Method, Sweep};

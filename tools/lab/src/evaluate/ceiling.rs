@@ -2,9 +2,9 @@
 //! against; far too slow for anything else.
 //!
 //! It asks for the amplitudes of a wave at the midpoint, always, and at a few other planes of the volume, drawn anew
-//! for each step. With u the displayed wave at a plane and T the wanted amplitude, the loss is Σ(|u| − T)², its gradient
-//! by the modulator's phases −2·Im(conj(Kᴴ(u − T·u/|u|))·e), e being the phasors shown and K the way to the plane. Steps
-//! are Adam's (Kingma and Ba, 2015).
+//! for each step. With u the displayed wave at a plane and T the wanted amplitude, the loss is Σ(|u| − T)², its
+//! gradient by the modulator's phases −2·Im(conj(Kᴴ(u − T·u/|u|))·e), e being the phasors shown and K the way to the
+//! plane. Steps are Adam's (Kingma and Ba, 2015).
 
 use num_complex::Complex32;
 use phasefront::Display;

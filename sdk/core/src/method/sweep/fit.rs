@@ -1,9 +1,9 @@
 //! Short filters fitted to the transfer of free space.
 //!
 //! Along one axis a distance s multiplies the frequency f by exp(−i2πsλf²/(1 + √(1 − λ²f²))), the carrier left out as
-//! in [`crate::optics::asm`]; both axes together differ from the true transfer by a phase of πsλ³f²ₓf²ᵧ/2, which is small
-//! where the diffraction angles are. A symmetric filter is a polynomial in cos: H(f) = 1 + Σ cⱼ(2cos(2πjfp) − 2), whose
-//! gain at f = 0 is 1 whatever the cⱼ.
+//! in [`crate::optics::asm`]; both axes together differ from the true transfer by a phase of πsλ³f²ₓf²ᵧ/2, which is
+//! small where the diffraction angles are. A symmetric filter is a polynomial in cos: H(f) = 1 + Σ cⱼ(2cos(2πjfp) − 2),
+//! whose gain at f = 0 is 1 whatever the cⱼ.
 //!
 //! A step's filter is applied again and again, so it is not H that must be near its target T but the powers of H near
 //! those of T: Σ over f and several m of w(f)·|(H/T)ᵐ − 1|² is made least by Levenberg and Marquardt's method, for
