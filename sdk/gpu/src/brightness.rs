@@ -110,7 +110,7 @@ mod tests {
                     run(&device, |pass| smoother.run(pass));
                     let bytes = device.read(&found, 4).unwrap();
                     let square = f32::from_le_bytes(bytes.try_into().unwrap());
-                    let expected = Percentile::new().scale(&given, past);
+                    let expected = Percentile::default().scale(&given, past);
                     // A value on the bound between two bins may be counted in either.
                     let bin = MOST / BINS as f32 * past.map_or(1.0, |past| past.share);
                     let apart = (square.sqrt() - expected).abs();

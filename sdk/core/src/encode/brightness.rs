@@ -73,14 +73,15 @@ pub struct Percentile {
     histogram: Vec<u32>,
 }
 
-impl Percentile {
-    /// An empty histogram.
-    pub fn new() -> Self {
+impl Default for Percentile {
+    fn default() -> Self {
         Percentile {
             histogram: vec![0; BINS],
         }
     }
+}
 
+impl Percentile {
     /// That of `field`, moved to from `past`, where there is one. Allocates nothing.
     pub fn scale(&mut self, field: &[Complex32], past: Option<Past>) -> f32 {
         self.histogram.fill(0);

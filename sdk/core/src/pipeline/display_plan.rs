@@ -138,7 +138,7 @@ impl DisplayPlan {
                 true => vec![0.0; self.colours * self.height * self.width],
                 false => Vec::new(),
             },
-            percentile: Percentile::new(),
+            percentile: Percentile::default(),
             cancel: Cancel::default(),
         }
     }

@@ -46,7 +46,7 @@ mod tests {
 
     fn scale(tracker: &mut BrightnessTracker, field: &[Complex32], elapsed: Option<u64>) -> f32 {
         let past = tracker.past(elapsed.map(Duration::from_millis));
-        let scale = Brightness::Smoothed.scale(field, past, &mut Percentile::new());
+        let scale = Brightness::Smoothed.scale(field, past, &mut Percentile::default());
         tracker.set_scale(scale.unwrap_or(f32::NAN));
         scale.unwrap_or(f32::NAN)
     }
@@ -70,7 +70,7 @@ mod tests {
         assert!(next > start && next < start * 1.05);
         let later = scale(&mut tracker, &field(1.0, 0), Some(10_000));
         assert!((later - 1.0).abs() < 0.01);
-        let fixed = Brightness::Fixed(0.7).scale(&field(1.0, 0), None, &mut Percentile::new());
+        let fixed = Brightness::Fixed(0.7).scale(&field(1.0, 0), None, &mut Percentile::default());
         assert_eq!(fixed, Some(0.7));
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert!(Brightness::Fixed(bad).check().is_err());

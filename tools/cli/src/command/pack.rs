@@ -69,7 +69,7 @@ impl Pack {
         let mut maps = Vec::new();
         for path in &self.holograms {
             let hologram = hologram::read_hologram(path)?;
-            hologram.check_display(&display).map_err(|e| Error::file(path, e))?;
+            hologram.check_display(display).map_err(|e| Error::file(path, e))?;
             let Hologram::PhaseOnly(levels, _) = hologram else {
                 return Err(Error::file(path, "is no hologram of levels of up to 8 bits"));
             };

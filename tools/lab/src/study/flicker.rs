@@ -9,6 +9,9 @@ use phasefront_io::ldi::Ldi;
 use phasefront_io::{Error, Result};
 use serde::Serialize;
 
+/// Makes a hologram of a frame, in a session of either kind.
+type Process = dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>;
+
 /// Noise and missing readings, new in each frame.
 const FAULTS: SensorFaults = SensorFaults {
     name: "noise and holes",
@@ -131,7 +134,7 @@ pub fn study(seed: u64, frames: usize, display: &Display, method: &Method, done:
                 },
                 ..options.encoder
             };
-            let process: Box<dyn Fn(&CameraFrame<'_>) -> phasefront::Result<Hologram>> = if setting.video {
+            let process: Box<Process> = if setting.video {
                 let session = VideoSession::new(options)?;
                 Box::new(move |frame| session.process(frame))
             } else {
