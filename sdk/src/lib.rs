@@ -1,7 +1,7 @@
 //! RGB-D frames to phase-only 3D holograms, on the device, in real time: an implementation of *End-to-end learning of
 //! 3D phase-only holograms for holographic display* (Shi, Li, Matusik, Light: Science & Applications 11, 247, 2022).
 //!
-//! Each frame of a camera becomes a [`Hologram`] in a [session](session). A frame that is already amplitude and
+//! Each frame of a camera becomes a [`Hologram`] in a [session]. A frame that is already amplitude and
 //! normalized depth goes through a [`Pipeline`]:
 //!
 //! ```

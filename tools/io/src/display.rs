@@ -149,7 +149,7 @@ fn check_keys(path: &Path, table: &toml::Table) -> Result<()> {
 
 /// Reads a display's TOML. Keys `lut`, `per_pixel`, `laser` and `aberration` name files, relative to it: a text file of
 /// 256 levels, and those of [`crate::display::calibration`]. Others are those of [`ModulatorSpec`] and
-/// [`crate::display::panel`].
+/// `crate::display::panel`.
 ///
 /// # Errors
 /// A file that is missing or says what cannot be.

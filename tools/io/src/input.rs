@@ -31,7 +31,7 @@ pub(crate) fn open(path: &Path, most: u64) -> Result<BufReader<File>> {
 /// The bytes of a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// As [`open`].
+/// As `open`.
 pub fn bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
     output::reading(path)?;
     file::read(path, most).map_err(|e| unread(path, &e))
@@ -40,7 +40,7 @@ pub fn bytes(path: &Path, most: u64) -> Result<Vec<u8>> {
 /// The text of a regular file of at most 16 MiB.
 ///
 /// # Errors
-/// As [`open`]; bytes that are not UTF-8.
+/// As `open`; bytes that are not UTF-8.
 pub fn text(path: &Path) -> Result<String> {
     output::reading(path)?;
     file::read_text(path).map_err(|e| unread(path, &e))

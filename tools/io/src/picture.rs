@@ -20,7 +20,7 @@ pub(crate) fn open_image(path: &Path) -> Result<DynamicImage> {
 /// The amplitudes of an image, (3, H, W) in \[0, 1], upright. Grey images have three equal colours; alpha is left out.
 ///
 /// # Errors
-/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
 pub fn read_rgb(path: &Path) -> Result<Array3<f32>> {
     open_image(path).map(amplitudes)
 }
@@ -50,7 +50,7 @@ pub fn amplitudes(image: DynamicImage) -> Array3<f32> {
 /// left out.
 ///
 /// # Errors
-/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`].
+/// A file that is missing, cut short, or none of [`COLOUR_FORMATS`](crate::input::decode::COLOUR_FORMATS).
 pub fn read_rgb_bytes(path: &Path) -> Result<((usize, usize), Vec<u8>)> {
     let image = open_image(path)?.into_rgb8();
     let shape = (image.height() as usize, image.width() as usize);

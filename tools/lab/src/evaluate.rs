@@ -194,7 +194,7 @@ pub struct Shown {
     pub name: String,
     /// By what levels; `None`: it is shown as the complex field it is.
     pub levels: Option<(Target, EncoderOptions)>,
-    /// Steps of descent from there to the [`Ceiling`]; 0 shows the levels as they are.
+    /// Steps of descent from there to the `Ceiling`; 0 shows the levels as they are.
     pub ceiling: usize,
     /// The aperture that is looked through, where it is not the one that the levels are made for.
     pub through: Option<Opening>,

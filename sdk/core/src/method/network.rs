@@ -3,7 +3,7 @@
 //! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::field`] takes
 //! rows of a [`Source`] to rows of a complex field; [`NetworkPlan::run`] takes planes to planes, which [`Head::field`]
 //! turns into a field. What the chain is, stands
-//! in [`chain`]; [`reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
+//! in [`chain`]; [`mod@reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
 //! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
 
 pub mod bounds;

@@ -14,7 +14,7 @@ pub const DISPLAY: [&str; 8] = [
     "aperture_radius",
 ];
 
-/// The keys of a [`crate::output::modulator::Device`] beside [`DISPLAY`].
+/// The keys of a [`crate::output::modulator::ModulatorSpec`] beside [`DISPLAY`].
 pub const DEVICE: [&str; 9] = [
     "name",
     "packing",

@@ -1,4 +1,4 @@
-//! Pictures and depth maps, decoded: all that is read comes through [`decode`], which bounds their pixels,
+//! Pictures and depth maps, decoded: all that is read comes through `decode`, which bounds their pixels,
 //! turns them upright as their Exif data say, and makes an error of a decoder's panic.
 
 use crate::input::{self, MOST_PICTURE, quiet};
@@ -102,7 +102,7 @@ pub(crate) fn decode<R: BufRead + Seek>(mut from: R, how: Reading) -> Said<Decod
 /// The picture in `bytes`, in colour or grey.
 ///
 /// # Errors
-/// As [`decode`]; numbers that are no picture's.
+/// As `decode`; numbers that are no picture's.
 pub fn picture_of(bytes: &[u8], how: Reading) -> Said<(DynamicImage, Orientation)> {
     picture(decode(Cursor::new(bytes), how)?)
 }
@@ -110,7 +110,7 @@ pub fn picture_of(bytes: &[u8], how: Reading) -> Said<(DynamicImage, Orientation
 /// The picture in the file at `path`, in colour or grey, and how it was turned.
 ///
 /// # Errors
-/// As [`decode`]; a file that cannot be read, or numbers that are no picture's.
+/// As `decode`; a file that cannot be read, or numbers that are no picture's.
 pub fn open_picture(path: &Path, how: Reading) -> Result<(DynamicImage, Orientation)> {
     let file = input::open(path, MOST_PICTURE)?;
     decode(file, how).and_then(picture).map_err(|e| Error::file(path, e))
