@@ -12,8 +12,8 @@
 //!
 //! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance
 //! s from its point to the plane light u becomes u + i·λs/4π·∇²u to first order. Of that [`CARRIED`] is added: on a
-//! slope, what spreads to farther neighbours would be blocked by points nearer to the plane. [`mod@reference`] is the naive
-//! oracle.
+//! slope, what spreads to farther neighbours would be blocked by points nearer to the plane. [`mod@reference`] is the
+//! naive oracle.
 
 mod filters;
 mod fit;
