@@ -1,5 +1,5 @@
-//! One RGB-D frame through all stages: midpoint hologram, offset, phase encoding, levels, with the time
-//! of each. Many frames are a session's work.
+//! Runs one RGB-D frame through all stages: midpoint hologram, propagation, phase encoding, levels. Each stage is
+//! timed. A session processes sequences of frames.
 
 pub mod display_plan;
 
@@ -13,44 +13,45 @@ use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use crate::runtime::stage::stage;
 use num_complex::Complex32;
+use std::fmt::{Debug, Formatter};
 use std::time::Duration;
 
-/// A plan for one frame shape, method and target. Immutable; shared between threads.
+/// A plan for one frame shape, method and target. It is immutable and can be shared between threads.
 pub struct Pipeline {
     method: MethodPlan,
     display: DisplayPlan,
 }
 
-/// Working memory of a [`Pipeline`] for one frame at a time.
+/// The working memory of a [`Pipeline`] for one frame at a time.
 pub struct PipelineScratch {
     method: MethodScratch,
     display: DisplayScratch,
-    /// [`Pipeline::process`]'s own field; empty before its first call.
+    /// The field that [`Pipeline::process`] works in. Empty before its first call.
     field: Vec<Complex32>,
 }
 
-/// How long each stage of a frame took.
+/// The time that each stage of a frame took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameTimes {
-    /// Colour: turned, converted, resized. On a GPU, depth too.
+    /// Rotating, converting and resizing the colour image. On a GPU this includes the depth.
     pub colour: Duration,
-    /// Depth: read, aligned, smoothed over time, refined.
+    /// Reading, aligning, temporally smoothing and refining the depth.
     pub depth: Duration,
-    /// From the frame to the midpoint hologram; on a GPU with the ways there and back.
+    /// Computing the midpoint hologram from the frame. On a GPU this includes both transfers.
     pub method: Duration,
-    /// From the midpoint to the modulator.
+    /// Propagating from the midpoint to the modulator.
     pub propagate: Duration,
-    /// From the field to levels.
+    /// Encoding the field into levels.
     pub encode: Duration,
 }
 
 impl FrameTimes {
-    /// All stages together.
+    /// Returns the total time of all stages.
     pub fn total(&self) -> Duration {
         self.stages().into_iter().map(|(_, time)| time).sum()
     }
 
-    /// Each stage and its name, in their order.
+    /// Returns the name and time of each stage in processing order.
     pub fn stages(&self) -> [(&'static str, Duration); 5] {
         [
             ("colour", self.colour),
@@ -62,17 +63,17 @@ impl FrameTimes {
     }
 }
 
-/// What became of a frame.
+/// The result of processing a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameReport {
-    /// The amplitude that full light stands for.
+    /// The amplitude that maps to full light.
     pub scale: f32,
-    /// How long it took.
+    /// The time of each stage.
     pub times: FrameTimes,
 }
 
 impl PipelineScratch {
-    /// Has frames end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     #[doc(hidden)]
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.method.set_cancel(cancel);
@@ -81,35 +82,35 @@ impl PipelineScratch {
 }
 
 impl Pipeline {
-    /// Plans (H, W) = `shape` frames by `method` to `target`.
+    /// Plans `method` for frames of (H, W) = `shape` and for `target`.
     ///
     /// # Errors
-    /// What [`Method`] or the way to the target refuses: a network for another display, an offset or correction that
-    /// moves light farther than can be padded, a parameter out of its range.
+    /// Returns an error if [`Method`] or the propagation to the target cannot be planned: the network is for another
+    /// display, an offset or correction moves light farther than can be padded, or a parameter is out of its range.
     pub fn new(shape: (usize, usize), method: Method, target: &Target, options: &EncoderOptions) -> Result<Self> {
         let method = MethodPlan::new(shape.0, shape.1, method, &target.display)?;
-        // The modulator does the rest of the way.
+        // The display plan covers the remaining distance to the modulator.
         let display = DisplayPlan::from_z(shape, method.z_m(), target, options)?;
         Ok(Pipeline { method, display })
     }
 
-    /// How many colours its frames, fields and levels have, C: as many as the display has lasers.
+    /// Returns C, the number of colours in frames, fields and levels. It equals the number of the display's lasers.
     pub fn colours(&self) -> usize {
         self.display.colours()
     }
 
-    /// (H, W).
+    /// Returns the frame shape (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.method.shape()
     }
 
-    /// The plan of the method.
+    /// Returns the plan of the method.
     #[doc(hidden)]
     pub fn method(&self) -> &MethodPlan {
         &self.method
     }
 
-    /// Working memory for one frame at a time.
+    /// Returns working memory for one frame at a time.
     pub fn scratch(&self) -> PipelineScratch {
         PipelineScratch {
             method: self.method.scratch(),
@@ -118,11 +119,11 @@ impl Pipeline {
         }
     }
 
-    /// The field at the modulator, into `field`, (C, H, W): the method's hologram, mean phase taken out (but for an
-    /// encoding that was trained with it), the rest of the offset. Gives the times of the method and of the rest.
+    /// Writes the field at the modulator into `field`, (C, H, W), and returns the times of the method and of the
+    /// propagation. The mean phase is removed unless the encoding was trained with it.
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// Returns an error if the frame has another shape.
     #[doc(hidden)]
     pub fn field(
         &self,
@@ -133,7 +134,7 @@ impl Pipeline {
         self.field_after(false, frame, field, scratch)
     }
 
-    /// [`Self::field`] of a frame that `follows` the one before.
+    /// Works like [`Self::field`] for a frame that `follows` the previous one.
     #[doc(hidden)]
     pub fn field_after(
         &self,
@@ -154,16 +155,16 @@ impl Pipeline {
         Ok((method, stage.end()))
     }
 
-    /// Encodes a field at the modulator, (C, H, W), into `levels`, as [`DisplayPlan::modulate`].
+    /// Encodes a field at the modulator, (C, H, W), into `levels`, like [`DisplayPlan::modulate`].
     ///
     /// # Panics
-    /// If `field` or `levels` has not C·H·W values.
+    /// Panics if `field` or `levels` does not have C·H·W values.
     #[doc(hidden)]
     pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut PipelineScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`DisplayPlan::modulate_after`].
+    /// Calls [`DisplayPlan::modulate_after`].
     #[doc(hidden)]
     pub fn modulate_after(
         &self,
@@ -175,7 +176,7 @@ impl Pipeline {
         self.display.modulate_after(past, field, levels, &mut scratch.display)
     }
 
-    /// [`DisplayPlan::modulate_words_after`].
+    /// Calls [`DisplayPlan::modulate_words_after`].
     #[doc(hidden)]
     pub fn modulate_words_after(
         &self,
@@ -188,10 +189,10 @@ impl Pipeline {
         (self.display).modulate_words_after(past, field, phases, words, &mut scratch.display)
     }
 
-    /// [`DisplayPlan::modulate_words`].
+    /// Calls [`DisplayPlan::modulate_words`].
     ///
     /// # Panics
-    /// If `field`, `phases` or `words` has not C·H·W values.
+    /// Panics if `field`, `phases` or `words` does not have C·H·W values.
     #[doc(hidden)]
     pub fn modulate_words(
         &self,
@@ -203,14 +204,14 @@ impl Pipeline {
         (self.display).modulate_words(field, phases, words, &mut scratch.display)
     }
 
-    /// Writes the levels of `frame` into `levels`, (C, H, W). The first call with a scratch allocates the field in it,
-    /// later ones allocate nothing.
+    /// Writes the levels of `frame` into `levels`, (C, H, W). The first call with a scratch allocates its field; later
+    /// calls allocate nothing.
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// Returns an error if the frame has another shape.
     ///
     /// # Panics
-    /// If `levels` has not C·H·W values.
+    /// Panics if `levels` does not have C·H·W values.
     pub fn process(&self, frame: &RgbdFrame, levels: &mut [u8], scratch: &mut PipelineScratch) -> Result<FrameReport> {
         let mut field = std::mem::take(&mut scratch.field);
         let (height, width) = self.shape();
@@ -240,15 +241,29 @@ impl Pipeline {
         })
     }
 
-    /// The levels of `frame`, (C, H, W), in new memory. For frame after frame, [`Self::process`] is faster.
+    /// Returns the levels of `frame`, (C, H, W), in new memory. For many frames, [`Self::process`] is faster.
     ///
     /// # Errors
-    /// A frame of another shape.
+    /// Returns an error if the frame has another shape.
     pub fn levels(&self, frame: &RgbdFrame) -> Result<Vec<u8>> {
         let (height, width) = self.shape();
         let mut levels = vec![0; self.colours() * height * width];
         self.process(frame, &mut levels, &mut self.scratch())?;
         Ok(levels)
+    }
+}
+
+impl Debug for Pipeline {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        let mut all = f.debug_struct("Pipeline");
+        all.field("shape", &self.shape()).field("colours", &self.colours());
+        all.finish_non_exhaustive()
+    }
+}
+
+impl Debug for PipelineScratch {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PipelineScratch").finish_non_exhaustive()
     }
 }
 
@@ -266,7 +281,7 @@ mod tests {
         Arc::new(Network::from_onnx(bytes).unwrap())
     }
 
-    /// What has been given up is not computed, in any stage, and leaves nothing behind that the next frame would see.
+    /// Checks that no stage computes a cancelled frame and that the next frame sees nothing of it.
     #[test]
     fn a_frame_that_is_given_up_is_left_as_it_is() {
         let (height, width) = (19, 33);
@@ -309,10 +324,10 @@ mod tests {
             scratch.set_cancel(&cancel);
             cancel.request();
             let (field, levels) = run(&mut scratch);
-            // But for the mean phase, which every value is turned by.
+            // The field changes only by the mean phase, which rotates every value.
             assert!(field.iter().all(|u| (u.norm() - untouched.norm()).abs() < 1e-5));
             let changed = levels.iter().filter(|level| **level != 77).count();
-            // Where phases lie in memory first, those of nothing become levels.
+            // A plan that keeps phases in memory converts the unset ones to levels.
             assert!(
                 changed == 0 || levels.iter().all(|level| *level == levels[0]),
                 "{changed}"

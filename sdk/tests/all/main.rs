@@ -1,5 +1,5 @@
-//! The tests of this crate in one program, which links once. Those that count memory or threads, or install a handler
-//! for the whole process, are programs of their own beside it.
+//! Collects the tests of this crate in one program, which links only once. Tests that count memory or threads, or
+//! install a handler for the whole process, are separate programs.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../camera/mod.rs"]
@@ -10,6 +10,7 @@ mod network_models;
 mod on_gpu;
 
 mod camera_formats;
+mod debug;
 mod determinism;
 #[cfg(feature = "gpu")]
 mod gpu_session;
