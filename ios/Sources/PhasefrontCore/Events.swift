@@ -1,21 +1,21 @@
 import Foundation
 
-/// What becomes of the frames of a live stream, in the order in which it happened.
+/// An event of a live stream. Events come in the order in which they happen.
 public enum SessionEvent: Sendable {
     /// A frame became a hologram.
     case processed(Hologram)
     /// A frame was dropped.
     case dropped(timestampNs: UInt64, reason: DropReason)
-    /// A frame could not be processed. The session goes on.
+    /// A frame could not be processed. The session continues.
     case failed(timestampNs: UInt64, message: String)
-    /// The frames after this one are made at another quality level.
+    /// The session processes the frames after this one at another quality level.
     case qualityChanged(timestampNs: UInt64, change: QualityChange)
 }
 
-/// The events of a live stream, for one reader. Two holograms wait for it at most: the oldest gives way to a newer one
-/// and is told as dropped, as ``DropReason/unread``, so a slow reader falls behind by little and memory stays flat.
+/// The events of a live stream, for one reader. At most two holograms wait in the queue. A newer one replaces the
+/// oldest, which is reported as dropped with ``DropReason/unread``, so memory stays constant if the reader is slow.
 public final class SessionEvents: AsyncSequence, Sendable {
-    /// What is read: one event after another.
+    /// The element type: an event.
     public typealias Element = SessionEvent
 
     private static let mostHolograms = 2
@@ -45,7 +45,7 @@ public final class SessionEvents: AsyncSequence, Sendable {
         reader?.resume(returning: event)
     }
 
-    /// No more events come; those that wait can still be read.
+    /// Ends the events. Those in the queue can still be read.
     func finish() {
         let reader = state.withLock { state in
             state.isFinished = true
@@ -65,7 +65,7 @@ public final class SessionEvents: AsyncSequence, Sendable {
                     defer { state.reader = continuation }
                     return (nil, state.reader)
                 }
-                // A second reader takes the first one's place, which ends.
+                // A second reader replaces the first, whose iteration ends.
                 earlier?.resume(returning: nil)
                 if let answer { continuation.resume(returning: answer) }
             }
@@ -78,25 +78,25 @@ public final class SessionEvents: AsyncSequence, Sendable {
         }
     }
 
-    /// Reads the events.
+    /// An iterator over the events.
     public struct Iterator: AsyncIteratorProtocol {
         let events: SessionEvents
 
-        /// The next event, which is waited for; nil when the session is closed or the task cancelled.
+        /// Waits for the next event. Returns nil when the session is closed or the task is cancelled.
         public mutating func next() async -> SessionEvent? { await events.next() }
     }
 
-    /// A reader. A second one takes the first one's place.
+    /// Returns an iterator. A second iterator replaces the first.
     public func makeAsyncIterator() -> Iterator { Iterator(events: self) }
 }
 
 extension SessionEvent {
     fileprivate var isProcessed: Bool {
-        if case .hologram = self { true } else { false }
+        if case .processed = self { true } else { false }
     }
 }
 
-/// A value under a lock.
+/// A value protected by a lock.
 final class Locked<Value>: @unchecked Sendable {
     private let lock = NSLock()
     private var value: Value
@@ -110,7 +110,7 @@ final class Locked<Value>: @unchecked Sendable {
     }
 }
 
-/// Passes the library's calls on.
+/// Forwards the library's callbacks.
 final class Listener: SessionListener {
     private let tell: @Sendable (SessionEvent) -> Void
     private let end: @Sendable () -> Void

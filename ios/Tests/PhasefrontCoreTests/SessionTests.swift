@@ -3,7 +3,7 @@ import XCTest
 
 @testable import PhasefrontCore
 
-/// Sessions from Swift: threads, live streams, misuse, memory.
+/// Tests sessions from Swift: threads, live streams, misuse and memory.
 final class SessionTests: XCTestCase {
     /// The message of the `PhasefrontError` that `call` throws.
     private func message<T>(_ call: () throws -> T, line: UInt = #line) -> String {
@@ -165,7 +165,7 @@ final class SessionTests: XCTestCase {
         var (holograms, unread) = (0, 0)
         for await event in session.events {
             switch event {
-            case .hologram: holograms += 1
+            case .processed: holograms += 1
             case .dropped(_, .unread): unread += 1
             default: XCTFail("\(event)")
             }
@@ -184,7 +184,7 @@ final class SessionTests: XCTestCase {
 
     func testALateFrameInAStreamHarmsNothing() throws {
         let made = DispatchSemaphore(value: 0)
-        let session = try Session(options(), mode: .live) { if case .hologram = $0 { made.signal() } }
+        let session = try Session(options(), mode: .live) { if case .processed = $0 { made.signal() } }
         try session.submit(still(timestampNs: 5))
         XCTAssertEqual(made.wait(timeout: .now() + 60), .success)
         assertRefused("5 ns") { try session.submit(still(timestampNs: 5)) }
@@ -292,7 +292,7 @@ final class SessionTests: XCTestCase {
         let options = try SessionOptions(target: target)
         XCTAssertEqual(try options.target.display(), smallDisplay)
         let levels = try Session(options, mode: .image).process(still()).levels()
-        // The table is that of equal steps.
+        // This table has equal steps.
         XCTAssertEqual(try Session(SessionOptions(display: smallDisplay), mode: .image).process(still()).levels(), levels)
     }
 
@@ -383,7 +383,7 @@ final class SessionTests: XCTestCase {
             try frames(1000)
             let before = try residentMb()
             try frames(9000)
-            // Each frame's results are 15 KB: kept, they would be 138 MB.
+            // The results of each frame take 15 KB. All of them would take 138 MB.
             XCTAssertLessThan(try residentMb() - before, 16)
             XCTAssertGreaterThan(sum, 0)
         }
