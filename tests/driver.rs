@@ -1,8 +1,8 @@
-//! What the tests of the GPU need: a GPU, or a driver in software. In the tests of every crate (`#[path]`).
+//! The GPU that tests need, real or as a software driver. The tests of every crate include this file (`#[path]`).
 
 use std::fmt::Display;
 
-/// What was opened on a GPU. The test fails where there is none, and says what to install.
+/// Returns the value opened on a GPU. If there is no GPU, the test fails and says what to install.
 #[track_caller]
 pub(crate) fn opened<T, E: Display>(result: Result<T, E>) -> T {
     result.unwrap_or_else(|why| {

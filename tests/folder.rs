@@ -1,4 +1,4 @@
-//! The crate's command, run in a folder of its own; for the tests of both commands.
+//! Runs the crate's command in its own folder, for the tests of both commands.
 
 use std::path::PathBuf;
 use std::process::{Command, Output};
@@ -32,7 +32,7 @@ impl Folder {
             .unwrap()
     }
 
-    /// The command succeeds; what it prints.
+    /// Runs the command, checks that it succeeds and returns its output.
     pub(crate) fn succeeds(&self, arguments: &[&str]) -> String {
         let output = self.run(arguments);
         let errors = String::from_utf8(output.stderr).unwrap();
@@ -40,7 +40,7 @@ impl Folder {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// The command fails with `code`, without a panic; what it says.
+    /// Runs the command, checks that it fails with `code` and without a panic, and returns its error output.
     pub(crate) fn fails(&self, arguments: &[&str], code: i32) -> String {
         let output = self.run(arguments);
         let errors = String::from_utf8(output.stderr).unwrap();

@@ -1,11 +1,11 @@
-//! ONNX files of residual chains with random weights, written as a training package would export them.
+//! Builds ONNX files of residual chains with random weights, in the form that a training package exports.
 #![allow(clippy::unwrap_used, dead_code, unreachable_pub)]
 
 use prost::Message;
 use rand::{RngExt, SeedableRng};
 use tract_onnx::pb::*;
 
-/// What to build.
+/// The parameters of a model to build.
 #[derive(Clone)]
 pub struct Model {
     pub layers: usize,
@@ -14,13 +14,14 @@ pub struct Model {
     pub int8: bool,
     pub tanh: bool,
     pub seed: u64,
-    /// int8: round the ReLU before a sum, the sum before the concatenation, and the concatenated input a first time.
+    /// For int8: whether to round the ReLU before a sum, the sum before the concatenation, and the concatenated input
+    /// separately.
     pub inner_roundings: bool,
     pub head: &'static str,
     pub input: &'static str,
     pub offset_mm: &'static str,
     pub seed_planes: Option<usize>,
-    /// At half the resolution.
+    /// Whether the chain works at half the resolution.
     pub halved: bool,
 }
 
@@ -53,7 +54,7 @@ impl Model {
         }
     }
 
-    /// A pre-filter for an offset.
+    /// Returns a pre-filter for an offset.
     pub fn prefilter(offset_mm: &'static str) -> Model {
         Model {
             inputs: 6,
@@ -181,7 +182,7 @@ impl Model {
         }
     }
 
-    /// What follows the last convolution.
+    /// Adds the nodes that follow the last convolution.
     fn end(&self, b: &mut Builder, mut end: String) {
         if self.halved {
             let to = if self.tanh { "pixels_out" } else { "field" };
@@ -330,7 +331,7 @@ fn planes(name: &str, channels: i64) -> ValueInfoProto {
     }
 }
 
-/// A frame of random RGB-D minus 0.5.
+/// Returns a frame of random RGB-D minus 0.5.
 pub fn frame(channels: usize, height: usize, width: usize, seed: u64) -> Vec<f32> {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     (0..channels * height * width)

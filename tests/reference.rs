@@ -1,7 +1,7 @@
-//! The paper's equations once more, in f64 and written apart from the library: what its optics are
-//! tested against, in the tests of every crate (`#[path]`).
+//! A second implementation of the paper's equations in f64, independent of the library. The tests of every crate
+//! include this file (`#[path]`) and compare the library's optics with it.
 //!
-//! Nothing here is fast, and nothing here calls the library.
+//! It is not optimised and does not call the library.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used)]
 
 use ndarray::{Array2, Array3, s};
@@ -9,7 +9,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
 
-/// F, or F⁻¹ with its 1/(H·W).
+/// Returns the Fourier transform F, or F⁻¹ with its factor 1/(H·W).
 pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
     let (h, w) = plane.dim();
     let mut planner = FftPlanner::<f64>::new();
@@ -35,7 +35,7 @@ pub fn fft2(plane: &Array2<Complex64>, inverse: bool) -> Array2<Complex64> {
     }
 }
 
-/// Eq. 2 on a periodic plane: F⁻¹(F(u)·exp(i2πs√(λ⁻² − µ² − ν²))), the carrier in.
+/// Computes Eq. 2 on a periodic plane, with the carrier: F⁻¹(F(u)·exp(i2πs√(λ⁻² − µ² − ν²))).
 pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> Array2<Complex64> {
     let (h, w) = u.dim();
     let bin = |k: usize, n: usize| (if 2 * k < n { k as f64 } else { k as f64 - n as f64 }) / n as f64;
@@ -51,7 +51,7 @@ pub fn asm_periodic(u: &Array2<Complex64>, pitch: f64, lambda: f64, s: f64) -> A
     fft2(&spectrum, true)
 }
 
-/// Eq. 2 as a linear convolution: in a plane padded with zeros to `padded`, cropped.
+/// Computes Eq. 2 as a linear convolution, in a plane padded with zeros to `padded` and then cropped.
 pub fn asm(u: &Array2<Complex64>, pitch: f64, lambda: f64, distance: f64, padded: (usize, usize)) -> Array2<Complex64> {
     let (h, w) = u.dim();
     let mut plane = Array2::zeros(padded);
@@ -61,7 +61,7 @@ pub fn asm(u: &Array2<Complex64>, pitch: f64, lambda: f64, distance: f64, padded
         .to_owned()
 }
 
-/// Eq. 1–4 for one colour: `layers` are (amplitude, depth; NaN: no hit), front first; the result at z = 0.
+/// Computes Eq. 1–4 for one colour at z = 0. `layers` are (amplitude, depth), front first; a depth of NaN means no hit.
 pub fn sm_lbm(
     layers: &[(Array2<f64>, Array2<f64>)],
     planes: usize,
@@ -95,7 +95,7 @@ pub fn sm_lbm(
         .to_owned()
 }
 
-/// Eq. 7: the phases of φ ± acos(A/scale), + where x + y is even, in [0, 2π).
+/// Computes Eq. 7: the phases of φ ± acos(A/scale), + where x + y is even, in [0, 2π).
 pub fn double_phase(field: &Array3<Complex64>, scale: f64) -> Array3<f64> {
     Array3::from_shape_fn(field.dim(), |(c, y, x)| {
         let value = field[(c, y, x)];
@@ -105,20 +105,20 @@ pub fn double_phase(field: &Array3<Complex64>, scale: f64) -> Array3<f64> {
     })
 }
 
-/// |a − b| over |b|, in the sense of energy.
+/// Returns the relative error |a − b| / |b|, with norms over all values.
 pub fn relative_error(a: &Array2<Complex64>, b: &Array2<Complex64>) -> f64 {
     let difference: f64 = a.iter().zip(b).map(|(a, b)| (a - b).norm_sqr()).sum();
     let energy: f64 = b.iter().map(|b| b.norm_sqr()).sum();
     (difference / energy).sqrt()
 }
 
-/// A plane of the library in f64.
+/// Converts a plane of the library to f64.
 pub fn widen(plane: &[Complex32], (h, w): (usize, usize)) -> Array2<Complex64> {
     let values = plane.iter().map(|v| Complex64::new(v.re.into(), v.im.into())).collect();
     Array2::from_shape_vec((h, w), values).unwrap()
 }
 
-/// A plane that has detail at every scale and no symmetry; the same for the same `seed`.
+/// Returns a plane with detail at every scale and no symmetry. It is the same for the same `seed`.
 pub fn test_plane((h, w): (usize, usize), seed: u32) -> Vec<Complex32> {
     let mut state = seed.wrapping_mul(2_654_435_761).wrapping_add(12345);
     let mut random = move || {

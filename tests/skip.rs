@@ -1,4 +1,4 @@
-//! What a test does where something is missing. In the tests of every crate (`#[path]`).
+//! Reports tests that are skipped because something is missing. The tests of every crate include this file (`#[path]`).
 
 use std::fmt::Display;
 use std::fs::OpenOptions;
@@ -6,8 +6,8 @@ use std::io::{Write, stderr};
 
 const EXPECTED: &str = include_str!("expected-skips");
 
-/// Notes that a test, or a part of it, does not run because `what` is missing, for `tests/run` to report. The test
-/// fails where `tests/expected-skips` does not name `what`; `why` then says how to get it.
+/// Notes, for `tests/run` to report, that a test or part of it does not run because `what` is missing. The test fails
+/// if `tests/expected-skips` does not name `what`; `why` then says how to get it.
 #[track_caller]
 pub(crate) fn or_fail(what: &str, why: impl Display) {
     let named = |line: &str| line.split('|').next().is_some_and(|name| name.trim() == what);
@@ -15,7 +15,7 @@ pub(crate) fn or_fail(what: &str, why: impl Display) {
         EXPECTED.lines().any(named),
         "{what} is missing ({why}), and tests/expected-skips does not name it"
     );
-    // Past the test harness, which keeps what passing tests print.
+    // Bypasses the test harness, which captures the output of passing tests.
     let _ = writeln!(stderr(), "skipped: {what}: {why}");
     if let Some(list) = std::env::var_os("PHASEFRONT_SKIPS") {
         let mut list = OpenOptions::new()

@@ -1,4 +1,4 @@
-//! What follows the network on a 960×540 frame, one thread: propagation, filters and encoders.
+//! Benchmarks the stages after the network on a 960×540 frame with one thread: propagation, filters and encoders.
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use divan::{Bencher, counter::ItemsCount};
@@ -18,7 +18,7 @@ fn main() {
     pool.build().unwrap().install(divan::main);
 }
 
-/// `planes` planes of a field that bends.
+/// Returns `planes` planes of a field with a curved phase.
 fn field(planes: usize) -> Vec<Complex32> {
     (0..planes * SIZE.0 * SIZE.1)
         .map(|i| Complex32::from_polar(0.6 + 0.3 * (i as f32 * 0.01).sin(), i as f32 * 1e-4))
@@ -52,7 +52,7 @@ fn remove_mean_phase(bencher: Bencher<'_, '_>) {
     bencher.counter(pixels(3)).bench_local(run);
 }
 
-/// 24 maps of 16 levels into a frame of 1920×1080 cells.
+/// Packs 24 maps of 16 levels into a frame of 1920×1080 cells.
 #[divan::bench(args = [1, 2])]
 fn pack_24_maps(bencher: Bencher<'_, '_>, threads: usize) {
     let device = ModulatorSpec::shipped("ti-plm-p47").unwrap();

@@ -1,7 +1,7 @@
-//! Depth as sensors and files give it, to normalized depth: units, range, holes; and the depth images of phones,
-//! aligned with colour, smoothed over time, and refined to the display's resolution.
+//! Converts the depth of sensors and files to normalized depth. The modules handle units, range and holes, and align,
+//! smooth over time and refine the depth images of phones to the resolution of the display.
 //!
-//! Everything here ends at d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
+//! The result is d ∈ \[0, 1], 0 nearest, 1 farthest, linear in metres between near and far.
 
 pub mod align;
 pub mod camera;
@@ -16,11 +16,12 @@ pub mod stream;
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, ArrayView2};
 
-/// What the numbers of a depth image mean. But for [`DepthUnit::Normalized`], 0, negative numbers and
-/// what is not finite mean no reading.
+/// The unit of the numbers in a depth image.
+///
+/// In all units except [`DepthUnit::Normalized`], 0, negative numbers and numbers that are not finite mean no reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DepthUnit {
-    /// Already 0 nearest to 1 farthest; only NaN means no reading.
+    /// Normalized depth, from 0 nearest to 1 farthest. Only NaN means no reading.
     Normalized,
     /// Metres from the camera.
     Metres,
@@ -28,15 +29,15 @@ pub enum DepthUnit {
     Millimetres,
     /// Inverse metres.
     Disparity,
-    /// A sensor's own units, so many a metre.
+    /// Units of the sensor.
     Raw {
-        /// Units in a metre; 5000 in the TUM RGB-D benchmark.
+        /// The number of units in a metre; 5000 in the TUM RGB-D benchmark.
         units_per_m: f64,
     },
 }
 
 impl DepthUnit {
-    /// The distance of a reading in metres, or `None` where it is no reading.
+    /// Returns the distance of a reading in metres, or `None` if `value` is not a valid reading.
     pub fn metres(self, value: f32) -> Option<f32> {
         let valid = value.is_finite() && value > 0.0;
         valid.then(|| match self {
@@ -48,29 +49,30 @@ impl DepthUnit {
     }
 }
 
-/// Normalized depth and how it was made.
+/// Normalized depth and the parameters of its conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalizedDepth {
-    /// (H, W), 0 nearest, 1 farthest, no holes.
+    /// The normalized depth, (H, W), 0 nearest, 1 farthest, without holes.
     pub depth: Array2<f32>,
-    /// Metres at d = 0 and at d = 1; `None` where the input was normalized already.
+    /// The distances in metres at d = 0 and d = 1, or `None` if the input was already normalized.
     pub range_m: Option<(f32, f32)>,
-    /// Pixels that had no reading.
+    /// The number of pixels that had no reading.
     pub filled: usize,
-    /// Pixels that lie before near or beyond far, and became 0 or 1.
+    /// The number of pixels before near or beyond far, which became 0 or 1.
     pub clipped: usize,
 }
 
-/// Share of the pixels that near and far may clip; beyond it nothing is left of the depth.
+/// The largest share of the pixels that near and far may clip. Beyond it, no usable depth remains.
 const MOST_CLIPPED: f64 = 0.99;
 
-/// Normalizes `depth`, (H, W), of `unit`: pixels with no reading take the nearest reading's, and
-/// `near_m` and `far_m` (metres) become 0 and 1, by default the 1st and 99th percentile of the readings;
-/// what lies beyond them is clamped.
+/// Normalizes `depth`, (H, W), given in `unit`.
+///
+/// Pixels without a reading take the nearest reading. `near_m` and `far_m`, in metres, become 0 and 1; they default to
+/// the 1st and 99th percentile of the readings. Values beyond them are clamped.
 ///
 /// # Errors
-/// An empty image, no reading at all, a normalized value outside \[0, 1], near or far for normalized depth, a range
-/// that is no range, or one that hardly any reading lies in.
+/// Returns an error if the image is empty or has no reading, if a normalized value lies outside \[0, 1], if near or far
+/// is given for normalized depth, or if the range is invalid or contains almost no reading.
 pub fn normalize(
     depth: ArrayView2<'_, f32>,
     unit: DepthUnit,
@@ -132,7 +134,7 @@ pub fn normalize(
             "near {near} m and far {far} m leave nothing of the depth, which lies from {least} m to {most} m; both are metres"
         )));
     }
-    // One distance everywhere has no extent: it lies in the middle of the volume.
+    // If all distances are equal, there is no extent to scale, so d = ½ puts the surface in the middle of the volume.
     let depth = match near < far {
         true => metres.mapv(|m| ((m - near) / (far - near)).clamp(0.0, 1.0)),
         false => metres.mapv(|_| 0.5),
@@ -145,7 +147,7 @@ pub fn normalize(
     })
 }
 
-/// The 1st and 99th percentile of `readings`, which are not empty and hold no NaN.
+/// Returns the 1st and 99th percentile of `readings`, which must not be empty or contain NaN.
 fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
     let last = readings.len() - 1;
     let mut at = |q: f64| {
@@ -155,11 +157,11 @@ fn percentiles(mut readings: Vec<f32>) -> (f32, f32) {
     (at(0.01), at(0.99))
 }
 
-/// Gives each NaN of `depth` the value of a nearest reading (in steps along rows and columns), in
-/// O(H·W); gives how many there were.
+/// Replaces each NaN of `depth` by the nearest reading, measured in steps along rows and columns, in O(H·W), and
+/// returns the number of replaced pixels.
 ///
 /// # Errors
-/// If nothing but NaN is there.
+/// Returns an error if all values are NaN.
 pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
     let holes = depth.iter().filter(|v| v.is_nan()).count();
     if holes == depth.len() {
@@ -176,10 +178,11 @@ pub fn fill_nearest(depth: &mut Array2<f32>) -> Result<usize> {
     Ok(holes)
 }
 
-/// Gives each NaN of `depth`, rows of `width`, the value of a nearest reading in steps along rows and columns.
-/// `front` and `next` are working memory. There must be a reading.
+/// Replaces each NaN of `depth`, rows of `width`, by the nearest reading, measured in steps along rows and columns.
+///
+/// `front` and `next` are working memory. `depth` must contain a reading.
 fn fill_from_nearest(depth: &mut [f32], width: usize, front: &mut Vec<u32>, next: &mut Vec<u32>) {
-    // A wave that starts at all readings at once reaches every hole from a nearest one.
+    // A wave that starts at all readings at once reaches each hole from its nearest reading.
     front.clear();
     front.extend((0..depth.len() as u32).filter(|i| !depth[*i as usize].is_nan()));
     while !front.is_empty() {

@@ -1,6 +1,6 @@
-//! The physics of one holographic display, checked once, at construction.
+//! The physics of a holographic display, validated at construction.
 //!
-//! Lengths are metres inside (`_m`); the TOML form has mm, µm and nm, named so.
+//! Lengths are in metres (`_m`). The TOML form uses mm, µm and nm, and its keys name the unit.
 
 pub mod illumination;
 pub mod panel;
@@ -12,10 +12,10 @@ use crate::runtime::error::{Error, Result};
 use crate::runtime::keys;
 use serde::{Deserialize, Serialize};
 
-/// One spatial light modulator, its lasers, and the volume it shows.
+/// A spatial light modulator, its lasers, and the display volume.
 ///
-/// z runs toward the viewer. The midpoint hologram lies at z = 0 and the volume spans
-/// z ∈ \[−V/2, V/2\]; the modulator lies at z = `offset_m`.
+/// z points toward the viewer. The midpoint hologram lies at z = 0, the volume spans z ∈ \[−V/2, V/2\], and the
+/// modulator lies at z = `offset_m`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "DisplayToml", into = "DisplayToml")]
 pub struct Display {
@@ -29,7 +29,7 @@ pub struct Display {
     aperture_radius: f64,
 }
 
-/// The file's form of a [`Display`]: what is left out has the value of [`Display::default`].
+/// The TOML form of a [`Display`]. Missing keys take the values of [`Display::default`].
 #[derive(Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct DisplayToml {
@@ -44,8 +44,8 @@ struct DisplayToml {
 }
 
 impl Default for Display {
-    /// The paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm around the modulator, 8 bits, an aperture as wide
-    /// as the first order.
+    /// Returns the paper's display: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm around the modulator, 8 bits, and
+    /// an aperture as wide as the first order.
     fn default() -> Self {
         Display {
             width: 1920,
@@ -68,7 +68,7 @@ impl Default for DisplayToml {
 
 impl From<Display> for DisplayToml {
     fn from(d: Display) -> Self {
-        // Multiplying by 1e9 leaves the last digit off (637.9999…): files should say 638.
+        // Multiplying by 1e9 gives 637.9999…; files should say 638.
         let round = |x: f64| (x * 1e6).round() / 1e6;
         DisplayToml {
             width: d.width,
@@ -104,7 +104,7 @@ impl TryFrom<DisplayToml> for Display {
 }
 
 impl Display {
-    /// Reads the TOML form.
+    /// Parses the TOML form.
     ///
     /// ```
     /// let display = phasefront::Display::from_toml("pitch_um = 3.74\nwidth = 3840\nheight = 2160")?;
@@ -113,7 +113,7 @@ impl Display {
     /// ```
     ///
     /// # Errors
-    /// Text that is not TOML, an unknown key, or a value out of its range.
+    /// Returns an error if the text is not valid TOML, has an unknown key, or has a value out of range.
     pub fn from_toml(text: &str) -> Result<Self> {
         toml::from_str(text).map_err(|e| {
             let message = keys::message(&e);
@@ -189,84 +189,85 @@ impl Display {
         Ok(())
     }
 
-    /// Pixels along x.
+    /// Returns the number of pixels along x.
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Pixels along y.
+    /// Returns the number of pixels along y.
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// Distance between neighbouring pixels, metres.
+    /// Returns the distance between neighbouring pixels, in metres.
     pub fn pitch_m(&self) -> f64 {
         self.pitch_m
     }
 
-    /// Wavelengths in the order red, green, blue, or that of the one laser, metres.
+    /// Returns the wavelengths in metres: red, green and blue, or that of the single laser.
     pub fn wavelengths_m(&self) -> &[f64] {
         &self.wavelengths_m
     }
 
-    /// The longest of them, whose light spreads farthest, metres.
+    /// Returns the longest wavelength, whose light spreads farthest, in metres.
     pub fn longest_wavelength_m(&self) -> f64 {
         self.wavelengths_m.iter().copied().fold(0.0, f64::max)
     }
 
-    /// How many lasers it has, C: 3 or 1. Frames, fields, levels and views have as many planes.
+    /// Returns the number of lasers, C: 3 or 1. Frames, fields, levels and views have C planes.
     pub fn colours(&self) -> usize {
         self.wavelengths_m.len()
     }
 
-    /// Depth V of the volume, metres.
+    /// Returns the depth V of the volume, in metres.
     pub fn volume_depth_m(&self) -> f64 {
         self.volume_depth_m
     }
 
-    /// z of the modulator against the midpoint of the volume, metres, positive toward the viewer.
+    /// Returns the z of the modulator relative to the midpoint of the volume, in metres, positive toward the viewer.
     pub fn offset_m(&self) -> f64 {
         self.offset_m
     }
 
-    /// Bits of a modulator level, 1 to 10; over 8 only sessions make.
+    /// Returns the number of bits of a modulator level, 1 to 10. Only sessions support more than 8.
     pub fn bits(&self) -> u32 {
         self.bits
     }
 
-    /// Radius of the aperture in the Fourier plane that lets the picture through and stops double phase's checkerboard
-    /// (Eq. 8): 1 reaches the Nyquist frequency ½/pitch, the paper's r of half the image's resolution.
+    /// Returns the radius of the aperture in the Fourier plane, which passes the image and blocks the checkerboard of
+    /// double phase (Eq. 8). A radius of 1 reaches the Nyquist frequency ½/pitch, the paper's r of half the image
+    /// resolution.
     pub fn aperture_radius(&self) -> f64 {
         self.aperture_radius
     }
 
-    /// The same display with its modulator at z = `offset_m`.
+    /// Returns this display with its modulator at z = `offset_m`.
     ///
     /// # Errors
-    /// An offset that is not finite or beyond 10 m.
+    /// Returns an error if the offset is not finite or exceeds 10 m.
     pub fn with_offset_m(self, offset_m: f64) -> Result<Self> {
         let display = Display { offset_m, ..self };
         display.check()?;
         Ok(display)
     }
 
-    /// The same display with (`height`, `width`) pixels.
+    /// Returns this display with (`height`, `width`) pixels.
     ///
     /// # Errors
-    /// A side outside 1..=65536.
+    /// Returns an error if a side lies outside 1..=65536.
     pub fn with_size(self, height: usize, width: usize) -> Result<Self> {
         let display = Display { height, width, ..self };
         display.check()?;
         Ok(display)
     }
 
-    /// z of a point of normalized depth d (0 nearest, 1 farthest): V/2 − V·d, metres.
+    /// Returns the z of a point of normalized depth d (0 nearest, 1 farthest), V/2 − V·d, in metres.
     pub fn z_of_depth(&self, d: f64) -> f64 {
         self.volume_depth_m / 2.0 - self.volume_depth_m * d
     }
 }
 
-/// Wavelengths as the file has them.
+/// Formats wavelengths as in the TOML form.
 fn nm(wavelengths_m: &[f64]) -> String {
     let all: Vec<_> = (wavelengths_m.iter())
         .map(|m| ((m * 1e15).round() / 1e6).to_string())
@@ -274,10 +275,10 @@ fn nm(wavelengths_m: &[f64]) -> String {
     format!("[{}]", all.join(", "))
 }
 
-/// Checks that `what`, which is of `colours` colours, is for a display of `right` lasers.
+/// Checks that `what`, which has `colours` colours, matches a display with `right` lasers.
 ///
 /// # Errors
-/// Another number.
+/// Returns an error if the numbers differ.
 pub(crate) fn check_colours(what: &str, colours: usize, right: usize) -> Result<()> {
     match colours == right {
         true => Ok(()),
@@ -327,7 +328,7 @@ mod tests {
             assert!(message.contains(word), "{text}: {message}");
             assert!(!message.contains('\n'), "{message}");
         }
-        // One laser's light may stand for all three.
+        // The three lasers may have the same wavelength.
         assert!(Display::from_toml("wavelengths_nm = [532, 532, 532]").is_ok());
     }
 

@@ -1,9 +1,8 @@
-//! From a complex field to phases alone: the double phase method and what is done to a field
-//! before it so that the checkerboard does not alias.
+//! Encodes a complex field as phases alone, by the double phase method and by filters that keep its checkerboard from
+//! aliasing.
 //!
-//! Encoders take the field as given: its phase, its offset, its scale. Phases lie in \[0, 2π).
-//! What level shows a phase is [`crate::display::response`]'s knowledge; an amplitude's scale is what full light stands
-//! for.
+//! Encoders do not change the field's phase, offset or scale. Phases lie in \[0, 2π). [`crate::display::response`] maps
+//! phases to levels. The scale is the amplitude that maps to full light.
 
 pub mod brightness;
 mod dark_threshold;
@@ -19,29 +18,30 @@ use crate::runtime::error::{Error, Result};
 pub use encoder::{Encoder, EncoderScratch};
 pub use encoding::{Encoding, anti_alias, band_limit, deep};
 
-/// How a field becomes levels.
+/// Options for encoding a field into levels.
 #[derive(Debug, Clone)]
 pub struct EncoderOptions {
-    /// From a complex field to phases.
+    /// The encoding from a complex field to phases.
     pub encoding: Encoding,
-    /// Which amplitude full light stands for.
+    /// The amplitude that maps to full light.
     pub brightness: Brightness,
-    /// Where the amplitude is below this share of full light, 0 to 1, the phase is drawn to 0 before double phase,
-    /// which shows noise there as coloured speckle. 0 leaves phases as they are.
+    /// The share of full light, 0 to 1, below which the phase is moved toward 0 before double phase. Double phase would
+    /// display the noise there as coloured speckle. 0 leaves phases unchanged.
     pub dark_threshold: f32,
-    /// Steps of local correction: each draws the image behind the display's aperture toward the field that is
-    /// wanted. The first brings most; 8 at most.
+    /// The number of local correction steps, at most 8. Each step moves the image behind the display's aperture toward
+    /// the target field. The first step brings the largest gain.
     pub local_steps: usize,
-    /// Steps of correction at the midpoint after them, for stills: sharper there, at four transforms a colour and step.
-    /// 3 bring nearly all; 100 at most.
+    /// The number of correction steps at the midpoint that follow the local steps, at most 100. They make still images
+    /// sharper at the midpoint and cost four transforms for each colour and step. Three steps bring nearly all of the
+    /// gain.
     pub midpoint_steps: usize,
 }
 
 impl EncoderOptions {
-    /// The default [`Self::dark_threshold`], chosen on validation scenes.
+    /// The default of [`Self::dark_threshold`], chosen on validation scenes.
     pub const DARK_THRESHOLD: f32 = 0.4;
 
-    /// `encoding` as it is published: nothing is drawn or corrected.
+    /// Returns options for `encoding` as published, without dark threshold and correction steps.
     pub fn plain(encoding: Encoding) -> Self {
         EncoderOptions {
             dark_threshold: 0.0,
@@ -50,8 +50,10 @@ impl EncoderOptions {
         }
     }
 
+    /// Checks the options.
+    ///
     /// # Errors
-    /// A number out of its range.
+    /// Returns an error if a number is out of its range.
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         self.brightness.check()?;
@@ -80,15 +82,15 @@ impl EncoderOptions {
 }
 
 impl Default for EncoderOptions {
-    /// AA-DPM, corrected by one local step; smoothed brightness.
+    /// Returns AA-DPM with smoothed brightness, [`Self::DARK_THRESHOLD`] and one local correction step.
     fn default() -> Self {
         Encoding::ANTI_ALIAS.into()
     }
 }
 
 impl From<Encoding> for EncoderOptions {
-    /// This encoding, smoothed brightness, [`Self::DARK_THRESHOLD`] and one local step. A pre-filter was trained
-    /// without the two: with it both are 0.
+    /// Uses `encoding` with smoothed brightness, [`Self::DARK_THRESHOLD`] and one local step. For a pre-filter, which
+    /// was trained without the last two, both are 0.
     fn from(encoding: Encoding) -> Self {
         let (dark, local_steps) = match encoding {
             Encoding::Deep(_) => (0.0, 0),

@@ -1,7 +1,7 @@
-//! One RGB-D frame as the optics and the networks take it: planar, amplitudes, normalized depth; and the colour
-//! images of cameras that become it.
+//! RGB-D frames in the form that the optics and the networks read (planar amplitudes and normalized depth), and the
+//! camera images that are converted to them.
 //!
-//! Depth in metres, disparity or raw units becomes normalized depth in [`crate::depth`].
+//! [`crate::depth`] converts metres, disparity or raw units to normalized depth.
 
 mod colour;
 mod convert;
@@ -20,8 +20,9 @@ use crate::display::Display;
 use crate::runtime::error::{Error, Result};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 
-/// Colour as amplitude in \[0, 1], (C, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest. C is 3, red, green
-/// and blue, or 1 for a display of one laser.
+/// A frame of colour and depth: amplitudes in \[0, 1], (C, H, W), and normalized depth, (H, W), 0 nearest, 1 farthest.
+///
+/// C is 3 for red, green and blue, or 1 for a display with one laser.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RgbdFrame {
     rgb: Array3<f32>,
@@ -29,10 +30,11 @@ pub struct RgbdFrame {
 }
 
 impl RgbdFrame {
-    /// Joins `rgb`, (C, H, W), and `depth`, (H, W).
+    /// Combines `rgb`, (C, H, W), and `depth`, (H, W).
     ///
     /// # Errors
-    /// Shapes that do not fit, an empty frame, or a value that is not finite or outside \[0, 1].
+    /// Returns an error if the shapes do not match, the frame is empty, or a value is not finite or lies outside \[0,
+    /// 1].
     pub fn new(rgb: Array3<f32>, depth: Array2<f32>) -> Result<Self> {
         let (channels, height, width) = rgb.dim();
         if ![1, 3].contains(&channels) {
@@ -62,7 +64,7 @@ impl RgbdFrame {
                 )));
             }
         }
-        // Copied only where values do not lie row by row already.
+        // Values already in row-major order are not copied.
         Ok(RgbdFrame {
             rgb: match rgb.is_standard_layout() {
                 true => rgb,
@@ -75,9 +77,11 @@ impl RgbdFrame {
         })
     }
 
-    /// The frame as the lasers of `display` show it. One laser shows the luminance Y of the picture, at amplitude √Y;
-    /// light is the square of amplitude, and Y = 0.2126·R + 0.7152·G + 0.0722·B (Rec. 709). Three lasers show a frame
-    /// of one colour as grey.
+    /// Converts the frame to the colours of `display`.
+    ///
+    /// For one laser, the amplitude becomes √Y, where Y is the luminance of the image. Light is the square of the
+    /// amplitude, and Y = 0.2126·R + 0.7152·G + 0.0722·B (Rec. 709). For three lasers, a frame of one colour becomes
+    /// grey.
     pub fn for_display(self, display: &Display) -> Self {
         let (height, width) = self.shape();
         let rgb = match (self.colours(), display.colours()) {
@@ -94,7 +98,7 @@ impl RgbdFrame {
         RgbdFrame { rgb, depth: self.depth }
     }
 
-    /// A black frame of `colours` at the far end of the volume.
+    /// Creates a black frame with `colours` colours at the far end of the volume.
     #[doc(hidden)]
     pub fn black(colours: usize, (height, width): (usize, usize)) -> Self {
         RgbdFrame {
@@ -103,34 +107,34 @@ impl RgbdFrame {
         }
     }
 
-    /// Colour and depth to write into; what is written must be in \[0, 1].
+    /// Returns the colour and depth values for writing. Written values must lie in \[0, 1].
     #[doc(hidden)]
     pub fn planes_mut(&mut self) -> (&mut [f32], &mut [f32]) {
         let planes = self.rgb.as_slice_mut().zip(self.depth.as_slice_mut());
         planes.expect("both are made in standard layout")
     }
 
-    /// (H, W).
+    /// Returns (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.depth.dim()
     }
 
-    /// How many colours it has, C: 3 or 1.
+    /// Returns the number of colours, C: 3 or 1.
     pub fn colours(&self) -> usize {
         self.rgb.dim().0
     }
 
-    /// The amplitudes, (C, H, W), contiguous.
+    /// Returns the amplitudes, (C, H, W), contiguous.
     pub fn rgb(&self) -> ArrayView3<'_, f32> {
         self.rgb.view()
     }
 
-    /// The normalized depth, (H, W), contiguous.
+    /// Returns the normalized depth, (H, W), contiguous.
     pub fn depth(&self) -> ArrayView2<'_, f32> {
         self.depth.view()
     }
 
-    /// The amplitudes and the normalized depth as they lie in memory.
+    /// Returns the amplitudes and the normalized depth as slices in memory order.
     #[doc(hidden)]
     pub fn values(&self) -> (&[f32], &[f32]) {
         let contiguous = "standard layout";
@@ -140,8 +144,10 @@ impl RgbdFrame {
         )
     }
 
+    /// Checks that the frame has the shape and the number of colours of a plan.
+    ///
     /// # Errors
-    /// Another shape than a plan's, or other colours.
+    /// Returns an error if the shape or the number of colours differs.
     #[doc(hidden)]
     pub fn check(&self, plan: (usize, usize), colours: usize) -> Result<()> {
         let (height, width) = self.shape();

@@ -1,24 +1,24 @@
-//! The implementation of Phasefront on the CPU: everything between a camera's frame and a modulator's levels.
+//! The CPU implementation of Phasefront, from camera frames to modulator levels.
 //!
 //! Applications depend on the crate `phasefront`, which has the stable API. This crate is public for the other crates
-//! of the workspace (GPU, calibration, laboratory, command) and its tests: its items change without notice, in any
-//! release.
+//! of the workspace (GPU, calibration, laboratory, command) and for its tests. Any release may change its items without
+//! notice.
 //!
 //! # Map
 //!
-//! Modules depend on modules above them in this table only (`tests/layers.rs`).
+//! Each module depends only on modules above it in this table (`tests/layers.rs`).
 //!
 //! | | |
 //! |---|---|
-//! | [`runtime`] | errors, cancelling, clock, stages, bounded files |
+//! | [`runtime`] | errors, cancellation, clock, stages, bounded file reading |
 //! | [`optics`] | propagation, Fourier transforms, aperture, aberrations |
-//! | [`display`] | the display, its modulator's response, its lasers' light, its correction |
-//! | [`frame`] | colour and depth images of cameras, conversion, resampling |
-//! | [`depth`] | units, holes, alignment, temporal smoothing, range, refinement |
-//! | [`method`] | from a frame to a complex field: networks, the plane sweep, both |
+//! | [`display`] | the display, its modulator's response, its laser illumination, its correction |
+//! | [`frame`] | colour images, depth planes, conversion, resampling |
+//! | [`depth`] | units, hole filling, alignment, temporal smoothing, range, refinement |
+//! | [`method`] | from a frame to a complex field: networks, the plane sweep, both combined |
 //! | [`encode`] | from a field to phases: double phase, its filters, corrections, brightness |
 //! | [`pipeline`] | one frame through all stages |
-//! | [`output`] | levels to the images that a modulator takes; the catalogue of modulators |
+//! | [`output`] | from levels to modulator images; the catalogue of modulators |
 //! | [`view`] | refocused views, previews |
 
 pub mod depth;

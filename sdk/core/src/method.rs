@@ -1,4 +1,4 @@
-//! How the hologram of an RGB-D frame is made. What then becomes of it is the modulator's.
+//! Methods that compute the hologram of an RGB-D frame. Later stages prepare it for the modulator.
 
 pub mod network;
 pub mod seeded;
@@ -15,7 +15,7 @@ use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use std::sync::Arc;
 
-/// What makes the hologram.
+/// A method that computes holograms.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Method {
@@ -23,15 +23,15 @@ pub enum Method {
     Network(Arc<Network>),
     /// The plane sweep, for any display.
     Sweep(Sweep),
-    /// The plane sweep, corrected by a network trained on it.
+    /// The plane sweep, corrected by a network that was trained on it.
     Seeded(Arc<Network>),
-    /// For each frame what suits its depth ([`sharpness::measure`]): the plane sweep where it is clean, the trained
-    /// network where it is noisy or incomplete.
+    /// Chooses the method for each frame by its depth ([`sharpness::measure`]): the plane sweep for clean depth, the
+    /// trained network for noisy or incomplete depth.
     Auto(Sweep, Arc<Network>),
 }
 
 impl Method {
-    /// A trained network as its input asks for.
+    /// Returns the method that fits the input of a trained network.
     pub fn trained(network: Arc<Network>) -> Self {
         match network.input() {
             InputKind::Seeded => Method::Seeded(network),
@@ -39,7 +39,7 @@ impl Method {
         }
     }
 
-    /// Whether it suits `display`.
+    /// Checks whether the method suits `display`.
     #[doc(hidden)]
     pub fn check(&self, display: &Display) -> Result<()> {
         let (network, input) = match self {
@@ -56,7 +56,8 @@ impl Method {
     }
 }
 
-/// Plans `sweep` for (`height`, `width`) frames, on to a display that is not far away, else to the midpoint.
+/// Plans `sweep` for frames of (`height`, `width`). The sweep ends at the display if that is close enough, otherwise at
+/// the midpoint.
 pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) -> Result<SweepPlan> {
     let offset_m = display.offset_m();
     let z_m = match sweep::reaches(display, offset_m) {
@@ -66,7 +67,7 @@ pub fn sweep_plan(height: usize, width: usize, sweep: Sweep, display: &Display) 
     SweepPlan::new(height, width, display, sweep, z_m)
 }
 
-/// A plan of a [`Method`] for one frame shape. Immutable; shared between threads.
+/// A plan of a [`Method`] for one frame shape. It is immutable and can be shared between threads.
 pub struct MethodPlan {
     shape: (usize, usize),
     colours: usize,
@@ -80,7 +81,7 @@ enum Plan {
     Auto(Box<SweepPlan>, Box<MethodPlan>),
 }
 
-/// Working memory of a [`MethodPlan`] for one frame at a time.
+/// The working memory of a [`MethodPlan`] for one frame at a time.
 pub struct MethodScratch(Scratch);
 
 enum Scratch {
@@ -90,13 +91,13 @@ enum Scratch {
     Auto {
         sweep: SweepScratch,
         trained: Box<MethodScratch>,
-        /// Whether the depth of the frame before was clean.
+        /// Whether the depth of the previous frame was clean.
         was_clean: Option<bool>,
     },
 }
 
 impl MethodScratch {
-    /// Has frames end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         match &mut self.0 {
             Scratch::Network(scratch) => scratch.set_cancel(cancel),
@@ -111,10 +112,11 @@ impl MethodScratch {
 }
 
 impl MethodPlan {
-    /// Plans `method` for (`height`, `width`) frames and the volume of `display`.
+    /// Plans `method` for frames of (`height`, `width`) and the volume of `display`.
     ///
     /// # Errors
-    /// A network for layered input or for another display, or a method that cannot be planned for this shape.
+    /// Returns an error if a network is for layered input or for another display, or if the method cannot be planned
+    /// for this shape.
     pub fn new(height: usize, width: usize, method: Method, display: &Display) -> Result<Self> {
         method.check(display)?;
         let plan = match method {
@@ -125,7 +127,7 @@ impl MethodPlan {
             }
             Method::Sweep(sweep) => Plan::Sweep(Box::new(sweep_plan(height, width, sweep, display)?)),
             Method::Auto(sweep, network) => {
-                // Both end where the network does.
+                // Both methods end at the midpoint, as the network does.
                 let sweep = SweepPlan::new(height, width, display, sweep, 0.0)?;
                 let trained = MethodPlan::new(height, width, Method::trained(network), display)?;
                 Plan::Auto(Box::new(sweep), Box::new(trained))
@@ -138,13 +140,13 @@ impl MethodPlan {
         })
     }
 
-    /// (H, W).
+    /// Returns the frame shape (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.shape
     }
 
-    /// Where the hologram stands, metres from the midpoint toward the viewer: a sweep goes on to a display that is not
-    /// far away, all else ends at the midpoint.
+    /// Returns the position of the hologram in metres from the midpoint toward the viewer. A sweep continues to the
+    /// display if that is close enough; all other methods end at the midpoint.
     pub fn z_m(&self) -> f64 {
         match &self.plan {
             Plan::Network(_) | Plan::Seeded(_) | Plan::Auto(..) => 0.0,
@@ -152,7 +154,7 @@ impl MethodPlan {
         }
     }
 
-    /// What runs the network, and why; None for a method without one.
+    /// Returns the engine that runs the network and why it was chosen. Returns `None` for a method without a network.
     pub fn engine(&self) -> Option<&Engine> {
         match &self.plan {
             Plan::Network(plan) => Some(plan.engine()),
@@ -162,7 +164,7 @@ impl MethodPlan {
         }
     }
 
-    /// Working memory for one frame at a time.
+    /// Returns working memory for one frame at a time.
     pub fn scratch(&self) -> MethodScratch {
         MethodScratch(match &self.plan {
             Plan::Network(plan) => Scratch::Network(plan.scratch()),
@@ -176,19 +178,19 @@ impl MethodPlan {
         })
     }
 
-    /// The hologram of `frame`, carrier-free, at [`MethodPlan::z_m`], into `field`, (C, H, W).
+    /// Writes the hologram of `frame`, without the carrier, at [`MethodPlan::z_m`] into `field`, (C, H, W).
     ///
     /// # Errors
-    /// A frame of another shape or of other colours, or a `field` that has not C·H·W values.
+    /// Returns an error if the frame has another shape or other colours, or if `field` does not have C·H·W values.
     ///
     /// # Panics
-    /// If `scratch` is another plan's.
+    /// Panics if `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut MethodScratch) -> Result<()> {
         self.field_after(false, frame, field, scratch)
     }
 
-    /// [`Self::field`] of a frame that `follows` the one before, as video does: a method that is chosen frame by frame
-    /// does not go to and fro.
+    /// Works like [`Self::field`] for a frame that `follows` the previous one, as in video. This keeps [`Method::Auto`]
+    /// from switching back and forth between its methods.
     pub(crate) fn field_after(
         &self,
         follows: bool,

@@ -1,9 +1,9 @@
-//! The optics on complex planes: propagation by the angular spectrum method, the aperture in the
-//! Fourier plane, and the correction of aberrations there.
+//! Optics on complex planes: propagation by the angular spectrum method, the aperture in the Fourier plane, and the
+//! correction of aberrations in that plane.
 //!
-//! A plane is a row-major slice of [`num_complex::Complex32`], (H, W). Distances are signed,
-//! positive toward the viewer. The carrier exp(i2πs/λ) is left out of every field (see
-//! [`asm`]); [`asm::carrier`] gives it back. Turning a field into phases is `encode`'s work.
+//! A plane is a row-major slice of [`num_complex::Complex32`], (H, W). Distances are signed, positive toward the
+//! viewer. Every field leaves out the carrier exp(i2πs/λ) (see [`asm`]); [`asm::carrier`] returns it. The module
+//! `encode` converts fields to phases.
 
 pub mod aperture;
 pub mod asm;

@@ -1,11 +1,11 @@
-//! A hologram's levels as the images that a modulator's driver takes: colours in one image or one after another,
-//! flipped, shifted, at the modulator's resolution with the hologram in its middle.
+//! Packs a hologram's levels into the images that a modulator's driver takes: colours in one image or one after
+//! another, flipped, shifted, at the modulator's resolution with the hologram in the middle.
 //!
-//! Around the hologram the modulator shows amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light
-//! does not pass the aperture. One level everywhere would be a bright frame.
+//! The border around the hologram is amplitude 0 in double phase: a checkerboard of π/2 and 3π/2, whose light does not
+//! pass the aperture. A constant level would appear as a bright frame.
 //!
-//! A per-pixel table counts pixels before flips and shifts: its patterns must have been shown with the same flips,
-//! and a shifted hologram does not stand where the table takes it to be.
+//! A per-pixel table counts pixels before flips and shifts. Measure it with the same flips; a shift moves the hologram
+//! away from the pixels that the table assumes.
 
 mod cells;
 pub mod modulator;
@@ -21,25 +21,25 @@ use crate::runtime::error::{Error, Result};
 use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
-/// How the levels of the colours lie in images. Where all colours are in one, those of one laser stand at each. Levels
-/// of fewer bits than their place in the image stand in its upper bits.
+/// The arrangement of the colours' levels in images. If all colours share one image, a hologram of one laser repeats
+/// its level in each. Levels with fewer bits than their place in the image use its upper bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Layout {
-    /// One image, bytes red, green, blue.
+    /// One image with bytes red, green, blue.
     Rgb,
-    /// One image, bytes red, green, blue, alpha 255.
+    /// One image with bytes red, green, blue, alpha 255.
     Rgba,
-    /// One image, bytes blue, green, red, alpha 255.
+    /// One image with bytes blue, green, red, alpha 255.
     Bgra,
-    /// One image, 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. Android's
-    /// RGBA_1010102, Metal's rgb10a2.
+    /// One image with 32-bit little-endian words: red in the lowest 10 bits, then green, then blue, alpha 3. This is
+    /// Android's RGBA_1010102 and Metal's rgb10a2.
     Rgb10,
-    /// An image for each colour, one after another: red, green, blue; a byte a pixel.
+    /// One image for each colour in the order red, green, blue, with one byte for each pixel.
     Grey,
-    /// An image for each colour, one after another: red, green, blue; a 16-bit little-endian word a pixel.
+    /// One image for each colour in the order red, green, blue, with one 16-bit little-endian word for each pixel.
     Grey16,
-    /// An image for each colour, one after another; bytes red, green, blue, over which a level's bits are spread.
+    /// One image for each colour, whose red, green and blue bytes share the bits of one level.
     #[doc(hidden)]
     Split(Split),
 }
@@ -47,14 +47,14 @@ pub enum Layout {
 /// A hologram's levels, (C, H, W).
 #[derive(Debug, Clone, Copy)]
 pub enum Levels<'a> {
-    /// As the planned response makes them, up to 8 bits.
+    /// Levels of up to 8 bits, as the planned response produces them.
     Bytes(&'a [u8]),
-    /// Of the display's bits, 9 or 10.
+    /// Levels of 9 or 10 bits.
     Words(&'a [u16]),
 }
 
 impl Layout {
-    /// How many images a hologram of `colours` becomes.
+    /// Returns the number of images for a hologram of `colours`.
     pub fn images(self, colours: usize) -> usize {
         match self {
             Layout::Grey | Layout::Grey16 | Layout::Split(_) => colours,
@@ -62,7 +62,7 @@ impl Layout {
         }
     }
 
-    /// Bytes of a pixel.
+    /// Returns the number of bytes of a pixel.
     pub fn pixel_bytes(self) -> usize {
         match self {
             Layout::Rgb | Layout::Split(_) => 3,
@@ -72,7 +72,7 @@ impl Layout {
         }
     }
 
-    /// Bits of a level's place.
+    /// Returns the number of bits that an image reserves for a level.
     pub(crate) fn place_bits(self) -> u32 {
         match self {
             Layout::Rgb10 => 10,
@@ -82,7 +82,7 @@ impl Layout {
         }
     }
 
-    /// A pixel of image `image` from `level` of each colour, levels being as wide as their place.
+    /// Writes a pixel of image `image` from the `level` of each colour. Levels are as wide as their place.
     fn write_pixel(self, image: usize, level: impl Fn(usize) -> u16, pixel: &mut [u8]) {
         let byte = |colour| level(colour) as u8;
         match self {
@@ -100,7 +100,8 @@ impl Layout {
         }
     }
 
-    /// The level of `colour` in a pixel of image `image`, as wide as its place; None where it is another image's.
+    /// Reads the level of `colour` from a pixel of image `image`, as wide as its place. Returns `None` if another image
+    /// holds the colour.
     fn read_pixel(self, image: usize, colour: usize, pixel: &[u8]) -> Option<u16> {
         let alone = |level: u16| (colour == image).then_some(level);
         match self {
@@ -117,23 +118,24 @@ impl Layout {
     }
 }
 
-/// How a hologram is put on its modulator.
+/// The placement of a hologram on its modulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Placement {
-    /// How colours lie in images.
+    /// The arrangement of colours in images.
     pub layout: Layout,
-    /// Whether left and right are exchanged, of the whole image.
+    /// Whether the whole image is flipped left to right.
     pub flip_x: bool,
-    /// Whether top and bottom are exchanged, of the whole image.
+    /// Whether the whole image is flipped top to bottom.
     pub flip_y: bool,
-    /// How many pixels to the right of the middle the hologram stands, before flips. What leaves the modulator is cut.
+    /// The hologram's shift to the right of the middle in pixels, before flips. Pixels outside the modulator are cut
+    /// off.
     pub shift_x: i32,
-    /// How many pixels below the middle it stands, before flips.
+    /// The hologram's shift below the middle in pixels, before flips.
     pub shift_y: i32,
 }
 
 impl Placement {
-    /// In the middle, not flipped.
+    /// Returns a placement in the middle without flips.
     pub fn centred(layout: Layout) -> Self {
         Placement {
             layout,
@@ -145,16 +147,16 @@ impl Placement {
     }
 }
 
-/// A plan for one modulator, hologram shape and placement. Immutable; shared between threads.
+/// A plan for one modulator, hologram shape and placement. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub struct Output {
     colours: usize,
     modulator: (usize, usize),
     hologram: (usize, usize),
     placement: Placement,
-    /// Of the image's upper left pixel, its place in the hologram, which may lie outside.
+    /// The position of the image's upper left pixel in the hologram. It may lie outside.
     from: (i64, i64),
-    /// Bits of a level in bytes, and of one in words.
+    /// The number of bits of a level in bytes and of a level in words.
     bits: (u32, u32),
     around: Dark,
 }
@@ -162,20 +164,20 @@ pub struct Output {
 /// The border around the hologram: double phase of amplitude 0.
 #[derive(Debug, Clone)]
 enum Dark {
-    /// The levels where x + y of the hologram is even and where it is odd.
+    /// The levels for even and for odd x + y of the hologram.
     Everywhere([u8; 2]),
-    /// Those of each pixel of the modulator.
+    /// Levels that depend on the modulator's pixel.
     PerPixel(Arc<PerPixel>),
 }
 
-/// The phases of darkness where x + y is even and where it is odd.
+/// The phases of darkness for even and for odd x + y.
 const DARK: [f32; 2] = [FRAC_PI_2, 3.0 * FRAC_PI_2];
 
 impl Output {
-    /// Plans images of the modulator's resolution for (H, W) holograms for `target`.
+    /// Plans images at the modulator's resolution for holograms of (H, W) and for `target`.
     ///
     /// # Errors
-    /// A hologram larger than the modulator, or a per-pixel table for a smaller one.
+    /// Returns an error if the hologram is larger than the modulator or a per-pixel table is for a smaller one.
     pub fn new(target: &Target, (height, width): (usize, usize), placement: Placement) -> Result<Self> {
         target.check()?;
         let (modulator, bits) = (target.modulator(), target.display.bits());
@@ -208,23 +210,24 @@ impl Output {
         })
     }
 
-    /// Bytes of an image.
+    /// Returns the number of bytes of an image.
     pub fn image_bytes(&self) -> usize {
         self.modulator.0 * self.modulator.1 * self.placement.layout.pixel_bytes()
     }
 
-    /// (H, W) of an image.
+    /// Returns the shape (H, W) of an image.
     pub fn shape(&self) -> (usize, usize) {
         self.modulator
     }
 
-    /// Image `image` of a hologram of `levels`, (C, H, W), into `bytes`, rows without gaps. Allocates nothing.
+    /// Writes image `image` of a hologram of `levels`, (C, H, W), into `bytes`, with no gaps between rows. Allocates
+    /// nothing.
     ///
     /// # Errors
-    /// An image that the layout has not.
+    /// Returns an error if the layout does not have this image.
     ///
     /// # Panics
-    /// If `levels` or `bytes` has another length than planned.
+    /// Panics if `levels` or `bytes` does not have the planned length.
     pub fn write(&self, levels: Levels<'_>, image: usize, bytes: &mut [u8]) -> Result<()> {
         let size = self.colours * self.hologram.0 * self.hologram.1;
         let (byte_bits, word_bits) = self.bits;
@@ -244,7 +247,7 @@ impl Output {
             }
             Levels::Words(levels) => {
                 assert_eq!(levels.len(), size);
-                // Of π/2 and 3π/2.
+                // The levels of π/2 and 3π/2.
                 let quarter = (1u16 << word_bits) / 4;
                 let dark = |odd: usize, _: usize, _: (usize, usize)| quarter * [1, 3][odd];
                 self.write_levels(|at| levels[at], word_bits, dark, image, bytes)
@@ -252,14 +255,15 @@ impl Output {
         }
     }
 
-    /// The inverse of [`Self::write`]: the levels that image `image` shows, of the display's bits, into their places of
-    /// (C, H, W). What other images hold is left as it is, and so are pixels that were shifted off the modulator.
+    /// Reads the levels in image `image`, of the display's bits, into their places in `levels`, (C, H, W). This is the
+    /// inverse of [`Self::write`]. Levels that other images hold and pixels that were shifted off the modulator stay
+    /// unchanged.
     ///
     /// # Errors
-    /// An image that the layout has not, or whose pixels have fewer bits than the display.
+    /// Returns an error if the layout does not have this image or its pixels have fewer bits than the display.
     ///
     /// # Panics
-    /// If `levels` or `bytes` has another length than planned.
+    /// Panics if `levels` or `bytes` does not have the planned length.
     pub fn read(&self, bytes: &[u8], image: usize, levels: &mut [u16]) -> Result<()> {
         let layout = self.placement.layout;
         let (height, width) = self.hologram;
@@ -343,7 +347,7 @@ impl Output {
     }
 }
 
-/// Place `at` of `n`, counted from the other end where `flipped`.
+/// Returns position `at` of `n`, counted from the other end if `flipped`.
 fn flip(at: usize, n: usize, flipped: bool) -> usize {
     if flipped { n - 1 - at } else { at }
 }
@@ -359,7 +363,7 @@ mod tests {
         Display::from_toml(&toml).unwrap().into()
     }
 
-    /// Levels that say colour, row and column.
+    /// Returns levels that identify colour, row and column.
     fn levels(height: usize, width: usize) -> Vec<u8> {
         (0..3 * height * width)
             .map(|i| {
@@ -406,13 +410,13 @@ mod tests {
     #[test]
     fn holograms_stand_in_the_middle_shifted_and_flipped_with_darkness_around() {
         let levels = levels(2, 3);
-        // In a 7×4 modulator two columns and one row are left of and above it.
+        // In a 7×4 modulator the hologram has two columns to its left and one row above it.
         let place = |x: usize, y: usize, p: &Placement| {
             let x = if p.flip_x { 6 - x } else { x } as i32 - 2 - p.shift_x;
             let y = if p.flip_y { 3 - y } else { y } as i32 - 1 - p.shift_y;
             match (0..3).contains(&x) && (0..2).contains(&y) {
                 true => (100 + 10 * y + x) as u8,
-                // π/2 and 3π/2 go on the hologram's checkerboard.
+                // π/2 and 3π/2 continue the hologram's checkerboard.
                 false => [64, 192][(x + y).rem_euclid(2) as usize],
             }
         };

@@ -1,5 +1,5 @@
-//! What every module builds on: errors, panics as values, cancelling, the clock, the stages of a frame, bounded reading
-//! of files, and the keys of TOML files.
+//! The basis of every module: errors, panics as values, cancellation, the clock, the stages of a frame, bounded file
+//! reading, and the keys of TOML files.
 
 pub mod cancel;
 pub mod caught;

@@ -1,4 +1,4 @@
-//! Views of holograms: what an eye or a camera sees of one.
+//! Views of holograms as an eye or a camera sees them.
 
 pub mod preview;
 pub mod refocus;

@@ -1,4 +1,5 @@
-//! The hot calls of plans allocate nothing. One test only, so that nobody else allocates meanwhile.
+//! Checks that the hot calls of plans allocate nothing. There is only one test so that no other test allocates
+//! meanwhile.
 #![allow(clippy::unwrap_used)]
 
 #[path = "../../../tests/counting.rs"]
@@ -38,8 +39,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 fn count(mut call: impl FnMut()) -> usize {
-    // The first calls may grow the pool's queues, and later ones a network's memory where more bands than before happen
-    // to run at once: what a call allocates by itself, every call does.
+    // The first calls may grow the pool's queues. Later calls may grow a network's memory when more bands than before
+    // happen to run at once. An allocation by the call itself occurs in every call.
     for _ in 0..3 {
         call();
     }
@@ -51,7 +52,7 @@ fn count(mut call: impl FnMut()) -> usize {
     counted.min().unwrap_or_default()
 }
 
-/// Colour, depth and a preview, on the current thread pool.
+/// Tests colour, depth and a preview, on the current thread pool.
 fn camera_frames_and_previews() {
     let (h, w) = (30, 40);
     let bytes: Vec<u8> = (0..4 * 50 * 60).map(|i| (i * 37 % 251) as u8).collect();
@@ -78,7 +79,7 @@ fn camera_frames_and_previews() {
     assert_eq!(count(|| plan.look(&levels, 1.0, &mut rgba, &mut scratch)), 0);
 }
 
-/// A target with all that a calibration and a bench may put there.
+/// Returns a target with all possible results of calibration and bench measurements.
 fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
     let (rows, columns) = per_pixel::nodes(h, w, 8);
     let levels_of = |i: usize| (i % 9) as f32 * 32.0;
@@ -104,7 +105,7 @@ fn calibrated(display: &Display, (h, w): (usize, usize)) -> Target {
     }
 }
 
-/// Whole frames on a display of one laser, on the current thread pool.
+/// Tests whole frames on a display of one laser, on the current thread pool.
 fn one_laser(frame: &RgbdFrame, seeded: Arc<Network>) {
     let display = Display::from_toml("wavelengths_nm = [520]\noffset_mm = 6").unwrap();
     let (h, w) = frame.shape();

@@ -4,8 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The modules, lowest first. Where a group's own modules are listed one by one, they depend on each other in this
-/// order too.
+/// The modules, lowest first. If a group's own modules are listed one by one, they depend on each other in this order
+/// too.
 const LAYERS: &[&str] = &[
     "runtime::error",
     "runtime::caught",
@@ -48,7 +48,7 @@ fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The code of `text` without comments, up to its tests.
+/// Returns the code of `text` without comments, up to its tests.
 fn code(text: &str) -> String {
     let tests = text.find("#[cfg(test)]").unwrap_or(text.len());
     let lines = text[..tests].lines();
@@ -58,7 +58,7 @@ fn code(text: &str) -> String {
         .join("\n")
 }
 
-/// The paths that `code` names behind `crate::`.
+/// Returns the paths that `code` names after `crate::`.
 fn named(code: &str) -> Vec<String> {
     let mut paths = Vec::new();
     for (at, _) in code.match_indices("crate::") {
@@ -69,7 +69,7 @@ fn named(code: &str) -> Vec<String> {
     paths
 }
 
-/// The place in [`LAYERS`] of the deepest module that `path` lies in.
+/// Returns the index in [`LAYERS`] of the deepest module that contains `path`.
 fn layer(path: &str) -> Option<usize> {
     let inside = |module: &str| path == module || path.strip_prefix(module).is_some_and(|rest| rest.starts_with("::"));
     let deepest = |&at: &usize| LAYERS[at].len();

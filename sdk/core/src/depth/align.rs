@@ -1,37 +1,37 @@
-//! Depth of one camera as another camera would see it: each reading is taken to its place in the other's picture.
+//! Alignment of depth with another camera: each reading is projected to its position in the other camera's image.
 
 use crate::runtime::error::{Error, Result};
 
-/// The pinhole model of a camera, in pixels of the image that it belongs to, before it is turned upright. The middle
-/// of the first pixel is (0, 0).
+/// The pinhole model of a camera, in pixels of its image before the image is turned upright. The middle of the first
+/// pixel is (0, 0).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intrinsics {
-    /// Focal length along x.
+    /// The focal length along x.
     pub fx: f64,
-    /// Focal length along y.
+    /// The focal length along y.
     pub fy: f64,
-    /// x of the principal point.
+    /// The x of the principal point.
     pub cx: f64,
-    /// y of the principal point.
+    /// The y of the principal point.
     pub cy: f64,
 }
 
-/// How the depth camera and the colour camera stand to each other.
+/// The intrinsics and the relative pose of the depth camera and the colour camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cameras {
-    /// Of the colour image.
+    /// The intrinsics of the colour camera.
     pub colour: Intrinsics,
-    /// Of the depth image.
+    /// The intrinsics of the depth camera.
     pub depth: Intrinsics,
-    /// A point p of the depth camera (x right, y down, z forward) is at `rotation`·p + `translation_m` of the colour
-    /// camera; rows of the matrix.
+    /// The rotation from the depth camera to the colour camera, as rows of the matrix. A point p of the depth camera (x
+    /// right, y down, z forward) is at `rotation`·p + `translation_m` of the colour camera.
     pub rotation: [[f64; 3]; 3],
-    /// In metres.
+    /// The translation, in metres.
     pub translation_m: [f64; 3],
 }
 
 impl Cameras {
-    /// Cameras at one place, looking one way.
+    /// Creates cameras at the same position with the same orientation.
     pub fn concentric(colour: Intrinsics, depth: Intrinsics) -> Self {
         Cameras {
             colour,
@@ -41,8 +41,10 @@ impl Cameras {
         }
     }
 
+    /// Checks the intrinsics and the pose.
+    ///
     /// # Errors
-    /// A focal length that is not positive, or a number that is not finite.
+    /// Returns an error if a focal length is not positive or a number is not finite.
     pub fn check(&self) -> Result<()> {
         for (what, i) in [("colour", self.colour), ("depth", self.depth)] {
             if !(i.fx > 0.0 && i.fy > 0.0 && [i.fx, i.fy, i.cx, i.cy].iter().all(|v| v.is_finite())) {
@@ -61,13 +63,15 @@ impl Cameras {
         Ok(())
     }
 
-    /// `metres` and `confidence` of the depth camera, (h, w) with NaN for no reading, as the colour camera sees them,
-    /// into `to` and `to_confidence`, (h, w): the whole picture of the colour image, (H, W) = `colour_shape`, at that
-    /// resolution. Where several readings meet, the nearest is seen; where none is, there is NaN. Gives how many there
-    /// are. Allocates nothing.
+    /// Projects `metres` and `confidence` of the depth camera, (h, w) with NaN for no reading, to the colour camera and
+    /// writes them to `to` and `to_confidence`, (h, w).
+    ///
+    /// The output covers the whole colour image of (H, W) = `colour_shape` at the resolution of the depth image. If
+    /// several readings meet at a pixel, the nearest one is kept; a pixel without a reading is NaN. Returns the number
+    /// of pixels with a reading. Does not allocate.
     ///
     /// # Panics
-    /// If the lengths are not h·w.
+    /// Panics if a length is not h·w.
     #[doc(hidden)]
     pub fn reproject(
         &self,
@@ -100,11 +104,12 @@ impl Cameras {
             if distance <= 0.0 {
                 continue;
             }
-            // The middle of the colour image's pixel u is at (u + ½)·scale − ½ of this grid.
+            // The middle of pixel u of the colour image is at (u + ½)·scale − ½ in this grid.
             let u = self.colour.fx * turned(0) / distance + self.colour.cx;
             let v = self.colour.fy * turned(1) / distance + self.colour.cy;
             let (u, v) = ((u + 0.5) * scale_x - 0.5, (v + 0.5) * scale_y - 0.5);
-            // A reading is a small patch: both neighbours each way, or a picture that is stretched gets gaps.
+            // A reading is a small patch. It fills both neighbours along each axis, because an enlarged image would
+            // have gaps otherwise.
             for (u, v) in [
                 (u.floor(), v.floor()),
                 (u.ceil(), v.floor()),
@@ -150,7 +155,7 @@ mod tests {
             .collect();
         let sure: Vec<f32> = (0..64 * 48).map(|i| i as f32).collect();
         let (mut to, mut to_sure) = (vec![0.0; 64 * 48], vec![0.0; 64 * 48]);
-        // Twice the resolution is the same picture.
+        // The same image at twice the resolution.
         let colour = Intrinsics {
             fx: 100.0,
             fy: 100.0,
@@ -163,13 +168,13 @@ mod tests {
             let kept = (metres.iter().zip(&to))
                 .filter(|(a, b)| (**a - **b).abs() < 1e-5)
                 .count();
-            // Rounding may move a reading's patch by a pixel; most stay alone.
+            // Rounding may move a reading's patch by a pixel, but most patches stay alone.
             assert!(kept > 64 * 48 / 2, "{kept}");
         }
     }
 
-    /// A wall at 2 m behind a square at 1 m, seen from 0.1 m to the right: the square moves left by f·t/z = 5 pixels,
-    /// the wall by 2.5, and what the square hid is a hole.
+    /// A wall at 2 m behind a square at 1 m, seen from 0.1 m to the right. The square moves left by f·t/z = 5 pixels,
+    /// the wall by 2.5, and the part of the wall that the square hid is a hole.
     #[test]
     fn near_things_move_farther_and_leave_holes() {
         let square = |x: usize, y: usize| (24..40).contains(&x) && (16..32).contains(&y);

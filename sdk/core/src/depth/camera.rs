@@ -1,40 +1,40 @@
-//! What a camera gives at one moment: colour, depth, and how they belong together.
+//! Camera frames: the colour and depth of one moment, and their alignment.
 
 use super::align::Cameras;
 use super::image::DepthImage;
 use crate::frame::{ColourImage, Orientation};
 use crate::runtime::error::{Error, Result};
 
-/// How far the aspect ratios of aligned colour and depth may lie apart, relative.
+/// The largest relative difference between the aspect ratios of aligned colour and depth.
 const ASPECT_TOLERANCE: f64 = 0.02;
 
-/// How the pixels of depth and colour correspond.
+/// The correspondence between the pixels of depth and colour.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Alignment {
-    /// Both show the same field of view, whatever their resolutions.
+    /// Both images have the same field of view; their resolutions may differ.
     #[default]
     Aligned,
-    /// By two cameras; each reading is taken to where the colour camera sees it.
+    /// The images come from two cameras. Each reading is projected to the colour camera.
     Cameras(Cameras),
 }
 
-/// Colour and depth of one moment, borrowed.
+/// The borrowed colour and depth of one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct CameraFrame<'a> {
-    /// When it was taken, in nanoseconds of any clock that runs forward.
+    /// The time of capture, in nanoseconds of any clock that runs forward.
     pub timestamp_ns: u64,
     /// The colour image.
     pub colour: ColourImage<'a>,
     /// The depth image.
     pub depth: DepthImage<'a>,
-    /// How both must be turned to stand upright.
+    /// The rotation and mirroring that turn both images upright.
     pub orientation: Orientation,
-    /// How their pixels correspond.
+    /// The correspondence between their pixels.
     pub alignment: Alignment,
 }
 
 impl<'a> CameraFrame<'a> {
-    /// A frame of aligned images that stand upright.
+    /// Creates a frame of aligned, upright images.
     pub fn new(timestamp_ns: u64, colour: ColourImage<'a>, depth: DepthImage<'a>) -> Self {
         CameraFrame {
             timestamp_ns,
@@ -45,17 +45,17 @@ impl<'a> CameraFrame<'a> {
         }
     }
 
-    /// Checks that colour and depth belong together.
+    /// Checks that colour and depth match.
     ///
     /// # Errors
-    /// [`Error::Frame`]: aligned images of other aspect ratios, cameras that cannot be, or cameras with normalized
-    /// depth, which has no metres to project.
+    /// Returns [`Error::Frame`] if the aspect ratios of aligned images differ, if the cameras are invalid, or if
+    /// cameras are given for normalized depth, which has no metres to project.
     pub fn check(&self) -> Result<()> {
         let ((height, width), (depth_height, depth_width)) = (self.colour.shape(), self.depth.shape());
         match self.alignment {
             Alignment::Aligned => {
                 let ratio = (width * depth_height) as f64 / (height * depth_width) as f64;
-                // A pixel more or less of a small image is no other field of view.
+                // A rounding difference of one pixel in a small image does not change the field of view.
                 let rounding = 1.0 / depth_height.min(depth_width) as f64;
                 match (ratio - 1.0).abs() <= ASPECT_TOLERANCE.max(rounding) {
                     true => Ok(()),

@@ -1,36 +1,37 @@
-//! Depth images and confidence maps as phones give them, to metres and confidences in 0..=1.
+//! Conversion of the depth images and confidence maps of phones to metres and confidences in 0..=1.
 
 use crate::frame::{Plane, check_size};
 use crate::runtime::error::{Error, Result};
 use half::f16;
 
-/// How a depth image lies in memory: one plane, numbers in little-endian byte order. But for the normalized ones, 0,
-/// negative numbers and what is not finite mean no reading.
+/// The memory layout of a depth image: one plane of little-endian numbers.
+///
+/// In all formats except the normalized ones, 0, negative numbers and numbers that are not finite mean no reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DepthFormat {
-    /// Metres, 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
+    /// Metres as 32-bit floats: ARKit's sceneDepth, AVFoundation's DepthFloat32.
     MetresF32,
-    /// Metres, 16-bit floats: AVFoundation's DepthFloat16.
+    /// Metres as 16-bit floats: AVFoundation's DepthFloat16.
     MetresF16,
-    /// Inverse metres, 32-bit floats: AVFoundation's DisparityFloat32.
+    /// Inverse metres as 32-bit floats: AVFoundation's DisparityFloat32.
     DisparityF32,
-    /// Inverse metres, 16-bit floats: AVFoundation's DisparityFloat16.
+    /// Inverse metres as 16-bit floats: AVFoundation's DisparityFloat16.
     DisparityF16,
-    /// Millimetres, all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
+    /// Millimetres in all 16 bits: ARCore's acquireDepthImage16Bits, HardwareBuffer's D_16.
     MillimetresU16,
-    /// Android's DEPTH16: millimetres in the lower 13 bits; in the upper 3 a confidence, 0 for 100 %, 1 for none, n
-    /// for (n − 1)/7. Not the same as [`Self::MillimetresU16`]: taken for it, all but the surest readings are off by
-    /// 8 metres and more, without a sign of it.
+    /// Android's DEPTH16: millimetres in the lower 13 bits, and a confidence in the upper 3 bits, where 0 means 100 %,
+    /// 1 means none, and n means (n − 1)/7. If it is read as [`Self::MillimetresU16`] by mistake, all but the most
+    /// confident readings are off by 8 metres or more, without an error.
     AndroidDepth16,
-    /// 0 nearest to 255 farthest; every pixel is a reading.
+    /// Bytes from 0 nearest to 255 farthest. Every pixel is a reading.
     NormalizedU8,
-    /// 0 nearest to 65535 farthest; every pixel is a reading.
+    /// 16-bit numbers from 0 nearest to 65535 farthest. Every pixel is a reading.
     NormalizedU16,
 }
 
 impl DepthFormat {
-    /// Bytes of a pixel.
+    /// Returns the number of bytes of a pixel.
     pub fn pixel_bytes(self) -> usize {
         match self {
             DepthFormat::NormalizedU8 => 1,
@@ -39,13 +40,13 @@ impl DepthFormat {
         }
     }
 
-    /// Whether readings are distances; if not, they are normalized depth.
+    /// Returns whether readings are distances rather than normalized depth.
     pub fn is_metric(self) -> bool {
         !matches!(self, DepthFormat::NormalizedU8 | DepthFormat::NormalizedU16)
     }
 
-    /// The reading in `pixel`, [`Self::pixel_bytes`] of them, and its confidence: metres, or normalized depth where
-    /// the format is; NaN where there is none.
+    /// Returns the reading in `pixel`, which has [`Self::pixel_bytes`] bytes, and its confidence. The reading is in
+    /// metres or, for normalized formats, normalized depth. It is NaN if the pixel has no reading.
     #[doc(hidden)]
     pub fn reading(self, pixel: &[u8]) -> (f32, f32) {
         let u16_at = || u16::from_le_bytes([pixel[0], pixel[1]]);
@@ -74,18 +75,18 @@ impl DepthFormat {
     }
 }
 
-/// How a confidence map lies in memory: one plane of bytes.
+/// The memory layout of a confidence map: one plane of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ConfidenceFormat {
-    /// 0 low, 1 medium, 2 high: ARKit's ARConfidenceLevel.
+    /// 0 low, 1 medium, 2 high, as in ARKit's ARConfidenceLevel.
     LowMediumHigh,
-    /// 0 none to 255 full: ARCore's acquireRawDepthConfidenceImage.
+    /// 0 none to 255 full, as in ARCore's acquireRawDepthConfidenceImage.
     U8,
 }
 
 impl ConfidenceFormat {
-    /// The confidence that `byte` stands for, in 0..=1.
+    /// Converts `byte` to a confidence in 0..=1.
     #[doc(hidden)]
     pub fn confidence(self, byte: u8) -> f32 {
         match self {
@@ -95,7 +96,7 @@ impl ConfidenceFormat {
     }
 }
 
-/// A depth image with its confidence map, borrowed.
+/// A borrowed depth image with an optional confidence map.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthImage<'a> {
     format: DepthFormat,
@@ -106,10 +107,11 @@ pub struct DepthImage<'a> {
 }
 
 impl<'a> DepthImage<'a> {
-    /// A depth image of `width` × `height` pixels in `plane`.
+    /// Creates a depth image of `width` × `height` pixels in `plane`.
     ///
     /// # Errors
-    /// [`Error::Frame`] that names an empty or too large image, a stride that is too small, or too few bytes.
+    /// Returns [`Error::Frame`] if the image is empty or too large, a stride is too small, or the plane has too few
+    /// bytes.
     pub fn new(format: DepthFormat, width: usize, height: usize, plane: Plane<'a>) -> Result<Self> {
         check_size("depth", width, height)?;
         plane.check("depth", width, height, format.pixel_bytes())?;
@@ -122,11 +124,11 @@ impl<'a> DepthImage<'a> {
         })
     }
 
-    /// The same with a confidence map of `width` × `height` pixels. A reading is as sure as the less sure of the map
-    /// and what the depth's own format says.
+    /// Adds a confidence map of `width` × `height` pixels. The confidence of a reading is the lower of the map's and
+    /// the depth format's own.
     ///
     /// # Errors
-    /// As [`Self::new`], and a map of another size than the depth's.
+    /// Returns an error in the cases of [`Self::new`], or if the map's size differs from the depth's.
     pub fn with_confidence(
         mut self,
         format: ConfidenceFormat,
@@ -145,32 +147,34 @@ impl<'a> DepthImage<'a> {
         Ok(self)
     }
 
-    /// How it lies in memory.
+    /// Returns the memory layout.
     pub fn format(&self) -> DepthFormat {
         self.format
     }
 
-    /// (H, W) as the sensor gives it.
+    /// Returns (H, W) in the sensor's orientation.
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// The plane of readings.
+    /// Returns the plane of readings.
     pub fn plane(&self) -> Plane<'a> {
         self.plane
     }
 
-    /// The confidence map.
+    /// Returns the format and the plane of the confidence map, if there is one.
     pub fn confidence(&self) -> Option<(ConfidenceFormat, Plane<'a>)> {
         self.confidence
     }
 
-    /// The readings, as the sensor's picture lies, into `values`, (H, W): metres or normalized depth, NaN where there
-    /// is none or its confidence is under `least`; and the confidences in 0..=1 into `confidence`, (H, W), 0 where
-    /// there is no reading. Gives how many readings there are. Allocates nothing.
+    /// Writes the readings to `values` and their confidences to `confidence`, both (H, W) in the sensor's orientation,
+    /// and returns the number of readings. Does not allocate.
+    ///
+    /// Readings are in metres or normalized depth. A pixel without a reading, or with a confidence below `least`,
+    /// becomes NaN with confidence 0.
     ///
     /// # Panics
-    /// If `values` or `confidence` has not H·W values.
+    /// Panics if `values` or `confidence` does not have H·W values.
     pub fn readings(&self, least: f32, values: &mut [f32], confidence: &mut [f32]) -> usize {
         assert_eq!(values.len(), self.width * self.height);
         assert_eq!(confidence.len(), self.width * self.height);
@@ -247,7 +251,7 @@ mod tests {
         assert!(DepthFormat::AndroidDepth16.reading(&[0, 0x20]).0.is_nan());
     }
 
-    /// Strides at random against each pixel by itself.
+    /// Compares images with random strides with each pixel read separately.
     #[test]
     fn any_strides_read_alike() {
         use rand::{RngExt, SeedableRng};

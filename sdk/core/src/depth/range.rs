@@ -1,26 +1,28 @@
-//! Which metres are shown at the near and at the far end of the volume, moving smoothly from frame to frame.
+//! The range of metres between the near and the far end of the volume. It changes smoothly from frame to frame.
 
 use crate::runtime::error::{Error, Result};
 use std::time::Duration;
 
-/// How near and far are found.
+/// The method that determines near and far.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum DepthRange {
-    /// The 1st and 99th percentile of the readings, in video smoothed over half a second.
+    /// The 1st and 99th percentile of the readings, smoothed over half a second in video.
     #[default]
     Percentiles,
-    /// These.
+    /// Fixed distances.
     Fixed {
-        /// Metres shown nearest.
+        /// The distance at the near end of the volume, in metres.
         near_m: f32,
-        /// Metres shown farthest.
+        /// The distance at the far end of the volume, in metres.
         far_m: f32,
     },
 }
 
 impl DepthRange {
+    /// Checks the range.
+    ///
     /// # Errors
-    /// Fixed metres that are no range.
+    /// Returns an error if fixed distances are not a valid range.
     #[doc(hidden)]
     pub fn check(self) -> Result<()> {
         match self {
@@ -34,10 +36,10 @@ impl DepthRange {
     }
 }
 
-/// Time in which near and far go 63 % of the way to where they should be.
+/// The time in which near and far move 63 % of the way to their new values.
 const TIME_CONSTANT: Duration = Duration::from_millis(500);
 
-/// Near and far of a sequence of frames.
+/// Tracks near and far over a sequence of frames.
 #[derive(Debug, Clone)]
 pub struct RangeTracker {
     range: DepthRange,
@@ -46,7 +48,7 @@ pub struct RangeTracker {
 }
 
 impl RangeTracker {
-    /// A tracker that has seen nothing.
+    /// Creates a tracker without a history.
     pub fn new(range: DepthRange) -> Self {
         RangeTracker {
             range,
@@ -55,16 +57,16 @@ impl RangeTracker {
         }
     }
 
-    /// Forgets what it has seen.
+    /// Clears the history.
     pub fn reset(&mut self) {
         self.current = None;
     }
 
-    /// Near and far in metres for a frame with these readings (NaN for none) that follows the last one after
-    /// `elapsed`. Near may equal far where everything is equally far.
+    /// Returns near and far in metres for a frame with these readings, NaN for none, that follows the previous one
+    /// after `elapsed`. Near equals far if all distances are equal.
     ///
     /// # Errors
-    /// No reading at all.
+    /// Returns an error if there is no reading.
     pub fn next(&mut self, metres: &[f32], elapsed: Duration) -> Result<(f32, f32)> {
         if let DepthRange::Fixed { near_m, far_m } = self.range {
             return Ok((near_m, far_m));

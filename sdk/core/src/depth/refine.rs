@@ -1,50 +1,51 @@
-//! Depth at a sensor's resolution, with holes and noise, to depth at the display's: cleaned, filled, and brought up
-//! along the edges of the colour image. [`super::refine_reference`] is its oracle.
+//! Refinement of depth from a sensor's resolution, with holes and noise, to the display's resolution. The depth is
+//! cleaned, filled, and enlarged along the edges of the colour image. Tests compare the results with
+//! [`super::refine_reference`].
 //!
-//! First, at the sensor's resolution, each reading becomes the weighted median of its 5×5 neighbours, or rather the
-//! mean of those that agree with it: neighbours weigh more the nearer they are, the surer, and the more alike their
-//! colour is. Readings that an edge has mixed, and holes, so take the depth of the surface that their colour belongs
-//! to. Then each display pixel does the same with the 3×3 readings around it and its own colour. Where all neighbours
-//! agree no median is needed: a mean, and bilinear interpolation. A median never makes a depth that no surface has, as
-//! a mean across an edge would.
+//! First, at the sensor's resolution, each reading is replaced by the mean of those of its 5×5 neighbours that agree
+//! with their weighted median. A neighbour's weight increases with its proximity, its confidence and the similarity of
+//! its colour. Readings mixed at an edge, and holes, thereby take the depth of the surface with their colour. Then each
+//! display pixel is computed in the same way from the 3×3 readings around it and its own colour. If all neighbours
+//! agree, no median is needed: a mean, or bilinear interpolation for display pixels, is enough. Unlike a mean across an
+//! edge, a median never creates a depth that no surface has.
 //!
-//! The cost, for a depth image of n pixels and a display of N of which a share e lies at edges: some 25·n + 40·e·n
-//! weights at the sensor's resolution, 4·N + 9·e·N at the display's; a tenth of the pixels of typical scenes lies at
-//! edges.
+//! For a depth image of n pixels and a display of N, of which a share e lies at edges, the cost is about 25·n + 40·e·n
+//! weights at the sensor's resolution and 4·N + 9·e·N at the display's. In typical scenes, a tenth of the pixels lies
+//! at edges.
 
 use super::fill_from_nearest;
 use crate::frame::Crop;
 use crate::runtime::error::{Error, Result};
 use rayon::prelude::*;
 
-/// Depths that differ by no more belong to one surface; of the volume.
+/// The largest depth difference within one surface, as a share of the volume.
 pub(crate) const TOLERANCE: f32 = 0.03;
-/// Neighbours to each side that clean a reading.
+/// The number of neighbours on each side that clean a reading.
 pub(crate) const CLEAN_REACH: usize = 2;
-/// Spread of their weights, readings.
+/// The spread of their weights, in readings.
 pub(crate) const CLEAN_SIGMA: f32 = 2.0;
-/// Spread of their weights in colour: distance of amplitudes in red, green, blue.
+/// The spread of their weights in colour, as a distance of amplitudes in red, green, blue.
 pub(crate) const CLEAN_COLOUR_SIGMA: f32 = 0.07;
-/// The same for the 3×3 readings that make a display pixel.
+/// The spread of the weights of the 3×3 readings around a display pixel, in readings.
 pub(crate) const UP_SIGMA: f32 = 1.4;
-/// The same for their colour.
+/// The spread of these weights in colour.
 pub(crate) const UP_COLOUR_SIGMA: f32 = 0.07;
-/// The least weight of a neighbour by its colour, so that nothing is decided where no colour is alike.
+/// The least weight of a neighbour by its colour, so that colour has no effect if no neighbour has a similar one.
 pub(crate) const LEAST_CLOSENESS: f32 = 1e-5;
-/// Passes that fill holes from their rim; what is still open takes its nearest reading.
+/// The number of passes that fill holes from their rims. Remaining holes take their nearest reading.
 pub(crate) const FILL_PASSES: usize = 8;
 
-/// exp(−x²/2σ²) of a squared distance x², by a table that is interpolated.
+/// An interpolated table of exp(−x²/2σ²) over the squared distance x².
 struct Closeness {
     table: Vec<f32>,
     scale: f32,
 }
 
 impl Closeness {
-    /// The weights of `sigma`, not under `least`.
+    /// Creates the table of `sigma` with weights of at least `least`.
     fn new(sigma: f32, least: f32) -> Self {
         const STEPS: usize = 512;
-        // Beyond 6σ nothing is left but the least.
+        // Beyond 6σ, all weights equal the least.
         let scale = (STEPS - 1) as f32 / (36.0 * sigma * sigma);
         let weight = |i: usize| (-(i as f32 / scale) / (2.0 * sigma * sigma)).exp().max(least);
         Closeness {
@@ -61,13 +62,13 @@ impl Closeness {
     }
 }
 
-/// The display pixels along one axis, and the readings around each.
+/// The display pixels along one axis and the readings around them.
 struct AxisMap {
-    /// Of each display pixel, the reading that it lies in.
+    /// The reading that each display pixel lies in.
     cell: Vec<u32>,
-    /// Of each display pixel, how far it lies from that reading's middle, −½..=½.
+    /// The offset of each display pixel from the middle of that reading, −½..=½.
     offset: Vec<f32>,
-    /// Of each reading, the display pixels that give it its colour: first, and behind the last.
+    /// The range of display pixels that give each reading its colour: the first, and one past the last.
     pixels: Vec<(u32, u32)>,
 }
 
@@ -82,7 +83,7 @@ impl AxisMap {
         let pixels = (0..cells as u32).map(|c| {
             let first = cell.partition_point(|v| *v < c) as u32;
             let end = cell.partition_point(|v| *v <= c) as u32;
-            // Readings between or beyond the display's pixels take the colour of a next one.
+            // Readings between or beyond the display's pixels take the colour of an adjacent pixel.
             match first < end {
                 true => (first, end),
                 false => (first.min(out as u32 - 1), first.min(out as u32 - 1) + 1),
@@ -96,7 +97,7 @@ impl AxisMap {
     }
 }
 
-/// A plan for one shape of depth and of colour. Immutable; shared between threads.
+/// A plan for one shape of depth and of colour. It is immutable and can be shared between threads.
 pub struct Refiner {
     depth: (usize, usize),
     out: (usize, usize),
@@ -104,26 +105,26 @@ pub struct Refiner {
     y: AxisMap,
     clean_colour: Closeness,
     up_colour: Closeness,
-    /// Of the 5×5 neighbours.
+    /// The spatial weights of the 5×5 neighbours.
     near: [f32; (2 * CLEAN_REACH + 1) * (2 * CLEAN_REACH + 1)],
     up_near: Closeness,
 }
 
-/// Working memory of a [`Refiner`] for one call at a time.
+/// The working memory of a [`Refiner`] for one call at a time.
 pub struct RefineScratch {
     /// The colour of each reading.
     guide: Vec<[f32; 3]>,
     cleaned: Vec<f32>,
     holes: Vec<u32>,
     filled: Vec<f32>,
-    /// The readings that a fill from the nearest goes on from.
+    /// The front of readings from which holes are filled.
     front: Vec<u32>,
 }
 
-/// One neighbour in a weighted median: its depth and its weight.
+/// A neighbour in a weighted median: its depth and its weight.
 type Vote = (f32, f32);
 
-/// The smallest value of `votes` at which half of the weight is reached. Orders them.
+/// Returns the smallest value of `votes` at which the weights reach half of their sum. Sorts `votes`.
 fn weighted_median(votes: &mut [Vote]) -> f32 {
     votes.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let half = votes.iter().map(|v| v.1).sum::<f32>() / 2.0;
@@ -137,7 +138,7 @@ fn weighted_median(votes: &mut [Vote]) -> f32 {
     votes.last().map_or(f32::NAN, |v| v.0)
 }
 
-/// The mean of the `votes` that agree with their weighted median.
+/// Returns the mean of the `votes` that agree with their weighted median.
 fn surface(votes: &mut [Vote]) -> f32 {
     let median = weighted_median(votes);
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -153,17 +154,17 @@ fn surface(votes: &mut [Vote]) -> f32 {
     }
 }
 
-/// The squared distance of two colours.
+/// Returns the squared distance between two colours.
 fn apart(a: [f32; 3], b: [f32; 3]) -> f32 {
     let [r, g, b] = [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     r * r + g * g + b * b
 }
 
 impl Refiner {
-    /// Plans the way of (h, w) = `depth` readings, of which `crop` is shown, to (H, W) = `out`.
+    /// Plans the refinement of the part `crop` of (h, w) = `depth` readings to (H, W) = `out`.
     ///
     /// # Errors
-    /// An empty shape, or one with over 2³² pixels.
+    /// Returns an error if a side lies outside 1..=65536.
     pub fn new(depth: (usize, usize), crop: Crop, out: (usize, usize)) -> Result<Self> {
         let sides = [depth.0, depth.1, out.0, out.1];
         if sides.contains(&0) || sides.iter().any(|n| *n > 1 << 16) {
@@ -189,12 +190,12 @@ impl Refiner {
         })
     }
 
-    /// (H, W) of what comes out.
+    /// Returns (H, W) of the refined depth.
     pub fn shape(&self) -> (usize, usize) {
         self.out
     }
 
-    /// Working memory for one call at a time.
+    /// Allocates working memory for one call at a time.
     pub fn scratch(&self) -> RefineScratch {
         let size = self.depth.0 * self.depth.1;
         RefineScratch {
@@ -206,15 +207,16 @@ impl Refiner {
         }
     }
 
-    /// Refines `depth`, (h, w), normalized, NaN where there is no reading, whose readings are as sure as `confidence`,
-    /// (h, w) in 0..=1, along the edges of `rgb`, (3, H, W), into `refined`, (H, W), within what `depth` spans. Runs on
-    /// the current thread pool. Allocates nothing.
+    /// Refines `depth` along the edges of `rgb`, (3, H, W), and writes it to `refined`, (H, W).
+    ///
+    /// `depth`, (h, w), is normalized, with NaN for no reading, and `confidence`, (h, w), lies in 0..=1. The result
+    /// stays within the range of `depth`. Runs on the current thread pool. Does not allocate.
     ///
     /// # Errors
-    /// No reading at all.
+    /// Returns an error if there is no reading.
     ///
     /// # Panics
-    /// If a length is not that of its shape.
+    /// Panics if a length does not match its shape.
     pub fn refine(
         &self,
         depth: &[f32],
@@ -246,7 +248,7 @@ impl Refiner {
         Ok(())
     }
 
-    /// The mean colour of the display pixels that lie in each reading.
+    /// Computes the mean colour of the display pixels in each reading.
     fn guide(&self, rgb: &[f32], guide: &mut [[f32; 3]]) {
         let (height, width) = self.out;
         let rows = guide.par_chunks_exact_mut(self.depth.1);
@@ -264,7 +266,7 @@ impl Refiner {
         });
     }
 
-    /// Each reading from its neighbours; NaN where none of them is one.
+    /// Cleans each reading from its neighbours. A reading without valid neighbours becomes NaN.
     fn clean(&self, depth: &[f32], confidence: &[f32], guide: &[[f32; 3]], cleaned: &mut [f32]) {
         let width = self.depth.1;
         (cleaned.par_chunks_exact_mut(width)).enumerate().for_each(|(y, row)| {
@@ -274,7 +276,7 @@ impl Refiner {
         });
     }
 
-    /// One reading from its neighbours.
+    /// Cleans one reading from its neighbours.
     fn clean_one(
         &self,
         x: usize,
@@ -322,7 +324,8 @@ impl Refiner {
         }
     }
 
-    /// Fills the holes of `cleaned`: from their rims as readings are cleaned, and far from any from the nearest.
+    /// Fills the holes of `cleaned` from their rims, as readings are cleaned. Holes far from any reading take the
+    /// nearest one.
     fn fill(&self, scratch: &mut RefineScratch) {
         let width = self.depth.1;
         let RefineScratch {
@@ -355,7 +358,7 @@ impl Refiner {
         }
     }
 
-    /// Row `y` of the display.
+    /// Computes row `y` of the display.
     fn up_row(&self, y: usize, readings: &Readings<'_>, rgb: &[f32], row: &mut [f32]) {
         let (out_height, out_width) = self.out;
         let (height, width) = self.depth;
@@ -397,13 +400,13 @@ impl Refiner {
     }
 }
 
-/// What display pixels are made of.
+/// The cleaned readings that display pixels are computed from.
 struct Readings<'a> {
     depth: &'a [f32],
     guide: &'a [[f32; 3]],
 }
 
-/// The depth `dx`, `dy` from the middle of 3×3 `depths`, each −½..=½, between the four around it.
+/// Interpolates 3×3 `depths` bilinearly at the offset `dx`, `dy` from their middle, each −½..=½.
 fn bilinear(depths: &[f32; 9], dx: f32, dy: f32) -> f32 {
     let (left, right_share) = if dx < 0.0 { (0, 1.0 + dx) } else { (1, dx) };
     let (top, bottom_share) = if dy < 0.0 { (0, 1.0 + dy) } else { (1, dy) };
@@ -431,7 +434,8 @@ mod tests {
     }
 
     impl Case {
-        /// Two surfaces of different colour, with noise and holes, seen at another resolution than the depth's.
+        /// Creates two surfaces of different colours, with noise and holes, at different resolutions of depth and
+        /// colour.
         fn random(seed: u64) -> Self {
             let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
             let mut side = || random.random_range(1..40usize);
@@ -498,7 +502,7 @@ mod tests {
             all += fast.len();
             differ += count;
         }
-        // Where two surfaces have nearly half of the votes each, rounding may decide.
+        // Rounding may decide if each of two surfaces has nearly half of the weight.
         assert!(all > 30_000 && differ * 1000 < all, "{differ} of {all}");
     }
 
@@ -511,8 +515,8 @@ mod tests {
         assert_eq!(run(1), run(3));
     }
 
-    /// Depth whose edge is 2 pixels beside the colour's, with mixed readings: the edge goes to where the colour has it,
-    /// and no depth is made between the surfaces.
+    /// The depth's edge lies 2 pixels beside the colour's, with mixed readings. The edge must move to the colour's,
+    /// without depths between the surfaces.
     #[test]
     fn edges_follow_the_colour() {
         let (h, w, f) = (12, 16, 4);
@@ -521,7 +525,7 @@ mod tests {
             8 => 0.5,
             _ => 0.8,
         });
-        // The colour's edge is at pixel 36, in the middle of reading 8's neighbour.
+        // The colour's edge is at pixel 36, in the middle of the reading beside reading 8.
         let rgb = Array3::from_shape_fn((3, h * f, w * f), |(_, _, x)| if x < 36 { 0.9 } else { 0.1 });
         let case = Case {
             confidence: Array2::ones((h, w)),
@@ -541,7 +545,7 @@ mod tests {
     fn holes_take_the_surface_of_their_colour() {
         let (h, w) = (24, 32);
         let is_front = |x: usize| x < 16;
-        // All around the edge nothing was read; far right a hole larger than any neighbourhood.
+        // There are no readings around the edge, and the hole on the far right is larger than any neighbourhood.
         let depth = Array2::from_shape_fn((h, w), |(_, x)| match x {
             12..20 | 25.. => f32::NAN,
             x if is_front(x) => 0.1,

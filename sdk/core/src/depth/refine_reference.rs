@@ -1,5 +1,5 @@
-//! The refinement of depth, naively: every pixel by itself, from its definition. The oracle of [`super::refine`], where
-//! the definition stands in words.
+//! The definition of the refinement of depth, which [`super::refine`] describes. It computes each pixel separately.
+//! Tests compare [`super::refine`] with it.
 
 use super::refine::{
     CLEAN_COLOUR_SIGMA, CLEAN_REACH, CLEAN_SIGMA, FILL_PASSES, LEAST_CLOSENESS, TOLERANCE, UP_COLOUR_SIGMA, UP_SIGMA,
@@ -7,8 +7,8 @@ use super::refine::{
 use crate::frame::Crop;
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-/// `depth`, (h, w) with NaN for no reading and at least one reading, of `confidence`, (h, w), of which `crop` is shown,
-/// refined along the edges of `rgb`, (3, H, W): (H, W).
+/// Refines the part `crop` of `depth`, (h, w), with the confidences `confidence`, (h, w), along the edges of `rgb`, (3,
+/// H, W), and returns (H, W). `depth` has NaN for no reading and at least one reading.
 pub fn refine(
     depth: ArrayView2<'_, f32>,
     confidence: ArrayView2<'_, f32>,
@@ -57,7 +57,7 @@ pub fn refine(
     })
 }
 
-/// The readings of `pixels` display pixels along one side: `length` of them, from `from` on.
+/// The readings along one side of the display: `length` readings, starting at `from`, for `pixels` display pixels.
 struct Axis {
     from: f64,
     length: f64,
@@ -66,7 +66,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// Where a display pixel lies, in readings.
+    /// Returns the position of a display pixel, in readings.
     fn place(&self, pixel: usize) -> f64 {
         self.from + (pixel as f64 + 0.5) * self.length / self.pixels as f64 - 0.5
     }
@@ -76,7 +76,8 @@ impl Axis {
         self.place(pixel).round().clamp(0.0, last) as usize
     }
 
-    /// The display pixels of a reading; where it has none, the first behind it or the last of all.
+    /// Returns the display pixels in a reading. If there are none, returns the first pixel after it, or the last of
+    /// all.
     fn pixels(&self, reading: usize) -> Vec<usize> {
         let of: Vec<usize> = (0..self.pixels)
             .filter(|pixel| self.reading(*pixel) == reading)
@@ -89,7 +90,7 @@ impl Axis {
     }
 }
 
-/// The mean colour of each reading.
+/// Computes the mean colour of each reading.
 fn guide(rgb: ArrayView3<'_, f32>, rows: &Axis, columns: &Axis) -> Array2<[f64; 3]> {
     Array2::from_shape_fn((rows.readings, columns.readings), |(y, x)| {
         let (rows, columns) = (rows.pixels(y), columns.pixels(x));
@@ -102,7 +103,7 @@ fn guide(rgb: ArrayView3<'_, f32>, rows: &Axis, columns: &Axis) -> Array2<[f64; 
     })
 }
 
-/// What the readings around say of one, or NaN.
+/// Returns the depth of a reading from its neighbours, or NaN if none of them is valid.
 fn clean(
     from: &Array2<f32>,
     confidence: &dyn Fn(usize, usize) -> f64,
@@ -131,8 +132,8 @@ fn clean(
     }
 }
 
-/// The depth of a display pixel of `colour` that lies `off` its reading, (y, x); `around` gives the depth and the
-/// colour of the readings beside that.
+/// Returns the depth of a display pixel of `colour` at the offset `off`, (y, x), from its reading. `around` returns the
+/// depth and the colour of the neighbouring readings.
 fn enlarged(around: &dyn Fn(isize, isize) -> (f64, [f64; 3]), [dy, dx]: [f64; 2], colour: [f64; 3]) -> f32 {
     let mut votes = Vec::new();
     for row in -1..=1 {
@@ -146,7 +147,7 @@ fn enlarged(around: &dyn Fn(isize, isize) -> (f64, [f64; 3]), [dy, dx]: [f64; 2]
     if !one_surface(&votes) {
         return surface(votes);
     }
-    // Between the four readings around.
+    // Interpolates between the four readings around the pixel.
     let (row, column) = (dy.signum() as isize, dx.signum() as isize);
     let (dy, dx) = (dy.abs(), dx.abs());
     let sum = around(0, 0).0 * (1.0 - dy) * (1.0 - dx)
@@ -164,11 +165,11 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
 }
 
-/// Whether all votes, of a depth and two weights, are within the tolerance of each other.
+/// Returns whether all votes, each a depth and two weights, lie within the tolerance of each other.
 fn one_surface(votes: &[(f64, f64, f64)]) -> bool {
     let least = votes.iter().map(|v| v.0).fold(f64::INFINITY, f64::min);
     let most = votes.iter().map(|v| v.0).fold(f64::NEG_INFINITY, f64::max);
-    // Differences of f32 values, as the fast form has them.
+    // The differences are in f32, as in the fast implementation.
     most as f32 - least as f32 <= TOLERANCE
 }
 
@@ -177,7 +178,7 @@ fn mean(votes: impl Iterator<Item = (f64, f64)>) -> f32 {
     (sum / weights) as f32
 }
 
-/// The mean of the votes that agree with their weighted median.
+/// Returns the mean of the votes that agree with their weighted median.
 fn surface(mut votes: Vec<(f64, f64, f64)>) -> f32 {
     votes.sort_by(|a, b| a.0.total_cmp(&b.0));
     let half: f64 = votes.iter().map(|v| v.1 * v.2).sum::<f64>() / 2.0;

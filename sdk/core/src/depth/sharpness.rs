@@ -1,46 +1,49 @@
-//! Measures whether a frame's depth is clean. The plane sweep, which trusts every depth, makes the better hologram of
-//! clean depth, and a network that of noisy or incomplete depth.
+//! Measures whether a frame's depth is clean. The plane sweep, which relies on every depth, makes better holograms from
+//! clean depth; a network makes better ones from noisy or incomplete depth.
 //!
-//! Rendered depth changes from surface to surface within one pixel, and where the colour does; and on surfaces it is
-//! smooth. Depth that was enlarged ramps over several pixels, that of a camera beside the colour's changes elsewhere,
-//! and sensors have noise.
+//! Rendered depth changes between surfaces within one pixel, at the same place as the colour, and is smooth on
+//! surfaces. Enlarged depth ramps over several pixels, the depth of a camera beside the colour camera changes at other
+//! places, and sensors have noise.
 
 use crate::frame::RgbdFrame;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Depths at the ends of [`WINDOW`] that differ by more are of two surfaces; of the volume.
+/// The difference between the depths at the ends of a [`WINDOW`] above which they belong to two surfaces, as a share of
+/// the volume.
 const EDGE: f32 = 0.06;
-/// Steps of a window in which an edge is looked for, an odd number.
+/// The number of steps of the window in which an edge is searched; odd.
 const WINDOW: usize = 5;
-/// The part of the window's change that a sharp edge makes in one step.
+/// The share of the window's change that a sharp edge makes in one step.
 const ONE_STEP: f32 = 0.75;
 /// The least share of sharp edges in clean depth.
 pub const SHARP_EDGES: f32 = 0.6;
-/// The most noise of clean depth, of the volume.
+/// The largest noise of clean depth, as a share of the volume.
 pub const SMOOTH: f32 = 1.5e-3;
-/// How far over a bound, relative, a frame of a video must be to be taken for other than the one before.
+/// The relative margin by which a video frame must cross a bound to be classified differently from the previous frame.
 pub const HYSTERESIS: f32 = 0.15;
 
-/// What [`measure`] finds.
+/// The result of [`measure`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sharpness {
-    /// Of the edges between surfaces along rows and columns, the share that is one step wide and lies where the colour
-    /// changes most among the five steps around; 1 in a frame without edges.
+    /// The share of the edges between surfaces, along rows and columns, that are one step wide and lie at the largest
+    /// colour change among the five steps around them; 1 in a frame without edges.
     pub edges: f32,
-    /// The noise's standard deviation, of the volume, as the median of second differences along rows tells it.
+    /// The standard deviation of the noise, as a share of the volume, estimated from the median of second differences
+    /// along rows.
     pub noise: f32,
 }
 
 impl Sharpness {
-    /// Whether the depth is so clean that the plane sweep makes the better hologram: at least [`SHARP_EDGES`], at most
-    /// [`SMOOTH`].
+    /// Returns whether the depth is clean, so that the plane sweep makes the better hologram: edges of at least
+    /// [`SHARP_EDGES`], and noise of at most [`SMOOTH`].
     pub fn is_clean(&self) -> bool {
         self.edges >= SHARP_EDGES && self.noise <= SMOOTH
     }
 
-    /// [`Self::is_clean`] of a frame that follows one which `was` clean or not: what lies within [`HYSTERESIS`] of the
-    /// bounds stays what it was, so that video does not go to and fro between two methods.
+    /// Returns whether the depth is clean, like [`Self::is_clean`], given whether the previous frame `was` clean.
+    /// Values within [`HYSTERESIS`] of the bounds keep the previous result, so that a video does not alternate between
+    /// two methods.
     pub fn stays_clean(&self, was: bool) -> bool {
         let slack = match was {
             true => 1.0 + HYSTERESIS,
@@ -50,11 +53,11 @@ impl Sharpness {
     }
 }
 
-/// Lines that a thread looks at together.
+/// The number of lines in a thread's unit of work.
 const LINES: usize = 16;
 
-/// Measures the depth of `frame`, on the current rayon pool; allocates nothing. A frame narrower and lower than six
-/// pixels has no edges, one narrower than three no noise.
+/// Measures the depth of `frame` on the current rayon pool. Does not allocate. A frame with both sides under six pixels
+/// has no edges, and a frame narrower than three pixels has no noise.
 pub fn measure(frame: &RgbdFrame) -> Sharpness {
     let (height, width) = frame.shape();
     let along_rows = (0..height.div_ceil(LINES)).into_par_iter();
@@ -73,8 +76,8 @@ pub fn measure(frame: &RgbdFrame) -> Sharpness {
     }
 }
 
-/// How many edges are sharp, and how many there are, along `lines`, each `next` values from the one before and `along`
-/// long, its values `step` apart.
+/// Returns the number of sharp edges and of all edges along `lines`. Successive lines start `next` values apart and
+/// have `along` values, `step` apart.
 fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), next: usize) -> (u32, u32) {
     let (rgb, depth) = frame.values();
     let (size, colours) = (depth.len(), frame.colours());
@@ -95,7 +98,7 @@ fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), 
                 let planes = (0..colours).map(|c| c * size);
                 planes.map(|c| (rgb[c + b] - rgb[c + a]).abs()).sum::<f32>()
             };
-            // Each edge is looked at once, where its largest step is in the middle.
+            // Each edge is counted once, where its largest step is in the middle.
             let middle = change(WINDOW / 2);
             if (0..WINDOW).any(|j| change(j) > middle) {
                 continue;
@@ -110,11 +113,13 @@ fn edges(frame: &RgbdFrame, lines: Range<usize>, (step, along): (usize, usize), 
     (sharp, all)
 }
 
-/// Steps that second differences are told apart by, of the volume; the last one holds all that are larger.
+/// The resolution and the number of the bins of second differences, as a share of the volume. The last bin holds all
+/// larger differences.
 const DIFFERENCE: f32 = 2e-5;
 const DIFFERENCES: usize = 2048;
 
-/// The median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the standard deviation of independent normal noise.
+/// Returns the median of |d(x−1) − 2d(x) + d(x+1)| over 0.6745·√6, which is the standard deviation of independent
+/// normal noise.
 fn noise(depth: &[f32], width: usize) -> f32 {
     let none = || [0u32; DIFFERENCES];
     let counts = depth
@@ -147,8 +152,8 @@ mod tests {
 
     const SIZE: usize = 60;
 
-    /// A square before a wall; its depth is shifted against its colour to the right, ramps over `ramp` pixels, and is
-    /// noisy.
+    /// Measures a square in front of a wall. Its depth is shifted to the right of its colour, ramps over `ramp` pixels,
+    /// and is noisy.
     fn square(shift: usize, ramp: usize, noise: f32) -> Sharpness {
         let inside = |y: usize, x: usize| (20..40).contains(&y) && (20..40).contains(&x);
         let rgb = Array3::from_shape_fn((3, SIZE, SIZE), |(_, y, x)| {
@@ -175,7 +180,7 @@ mod tests {
         let [shifted, ramps, noisy] = [square(2, 1, 0.0), square(0, 4, 0.0), square(0, 1, 0.01)];
         assert!(shifted.edges < 0.6, "{shifted:?}");
         assert!(ramps.edges < 0.1, "{ramps:?}");
-        // Uniform noise of ±0.01.
+        // The noise is uniform in ±0.01.
         assert!((0.003..0.01).contains(&noisy.noise), "{noisy:?}");
         for bad in [shifted, ramps, noisy] {
             assert!(!bad.is_clean(), "{bad:?}");

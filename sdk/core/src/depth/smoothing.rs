@@ -1,36 +1,36 @@
-//! Temporal smoothing of depth: readings that agree with the frame before are averaged with it, readings that do not
-//! replace it at once, so that what moves leaves no trail.
+//! Temporal smoothing of depth. Readings that agree with the previous frame are averaged with it, and other readings
+//! replace it at once, so that moving objects leave no trail.
 
 use std::time::Duration;
 
-/// Over this share of its distance a reading is another surface than the one before; of normalized depth, over this
-/// much of the volume.
+/// The largest difference between readings of one surface, as a share of the distance or, for normalized depth, of the
+/// volume.
 const TOLERANCE: f32 = 0.04;
-/// Time in which the average goes 63 % of the way to a new reading.
+/// The time in which the average moves 63 % of the way to a new reading.
 const TIME_CONSTANT: Duration = Duration::from_millis(120);
-/// A surface without a reading is believed in for this long.
+/// The time for which a surface without a reading is kept.
 const HOLD: Duration = Duration::from_millis(300);
-/// How far a neighbour with a reading may be that speaks for a surface without, pixels.
+/// The largest distance, in pixels, of a neighbour whose reading confirms a surface without a reading.
 const NEIGHBOURS: usize = 2;
 
-/// Depth readings over time, at the sensor's resolution.
+/// Smooths depth readings over time, at the sensor's resolution.
 #[derive(Debug, Clone, Default)]
 pub struct Smoother {
-    /// NaN where nothing is known.
+    /// The smoothed readings, NaN for unknown pixels.
     known: Vec<f32>,
-    /// How long ago each was read.
+    /// The time since each pixel was read.
     age: Vec<Duration>,
 }
 
 impl Smoother {
-    /// Forgets what it has seen.
+    /// Clears the history.
     pub fn reset(&mut self) {
         self.known.clear();
     }
 
-    /// Replaces `readings`, (H, `width`), NaN for none, by the smoothed ones; the last call was `elapsed` ago.
-    /// `metric` says that readings are metres; if not, they are normalized depth. Another size begins anew. Gives how
-    /// many readings there are now.
+    /// Replaces `readings`, (H, `width`), NaN for none, by smoothed ones and returns the number of readings. `elapsed`
+    /// is the time since the previous call. Readings are in metres if `metric`, else normalized depth. A different size
+    /// clears the history.
     pub fn smooth(&mut self, readings: &mut [f32], width: usize, elapsed: Duration, metric: bool) -> usize {
         if self.known.len() != readings.len() {
             self.known.clear();
@@ -101,7 +101,8 @@ mod tests {
         assert!(after < before / 5.0, "{before} {after}");
     }
 
-    /// A near square moves over a far wall: wherever it is not, the wall is, in the very next frame.
+    /// A near square moves in front of a far wall. The wall must reappear in the next frame wherever the square has
+    /// left.
     #[test]
     fn what_moves_leaves_no_trail() {
         let mut smoother = Smoother::default();
@@ -129,14 +130,14 @@ mod tests {
             held += usize::from(smoother.smooth(&mut readings, 10, FRAME, true) == 100);
         }
         assert_eq!(held, 9);
-        // All around it another surface: nothing speaks for the old one.
+        // All neighbours are of another surface, so none confirms the old one.
         let mut readings = vec![2.0; 100];
         smoother.smooth(&mut readings, 10, FRAME, true);
         let mut readings = vec![3.0; 100];
         readings[55] = f32::NAN;
         assert_eq!(smoother.smooth(&mut readings, 10, FRAME, true), 99);
         assert!(readings[55].is_nan());
-        // Another size begins anew.
+        // A different size clears the history.
         assert_eq!(smoother.smooth(&mut [5.0, f32::NAN], 2, FRAME, true), 1);
     }
 }

@@ -1,5 +1,5 @@
-//! The depth of a sequence of camera frames, each brought to the display: readings, alignment, temporal smoothing,
-//! range, refinement, in this order.
+//! Processing of the depth of a sequence of camera frames for a display: readings, alignment, temporal smoothing, range
+//! and refinement, in this order.
 
 use super::align::Cameras;
 use super::camera::{Alignment, CameraFrame};
@@ -11,17 +11,18 @@ use crate::frame::{Crop, Orientation};
 use crate::runtime::error::{Error, Result};
 use std::time::Duration;
 
-/// What a session makes of depth.
+/// The depth settings of a session.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthOptions {
-    /// Which metres are shown at the ends of the volume.
+    /// The range of metres between the ends of the volume.
     pub range: DepthRange,
-    /// Readings less sure than this, in 0..=1, are none. ARKit's "low" is 0, "medium" ½, "high" 1.
+    /// The least confidence of a reading, in 0..=1. Less confident readings are ignored. ARKit's levels are 0 ("low"),
+    /// ½ ("medium") and 1 ("high").
     pub least_confidence: f32,
 }
 
 impl Default for DepthOptions {
-    /// Percentiles; readings of low confidence are left out.
+    /// Returns percentiles, without readings of low confidence.
     fn default() -> Self {
         DepthOptions {
             range: DepthRange::Percentiles,
@@ -31,8 +32,10 @@ impl Default for DepthOptions {
 }
 
 impl DepthOptions {
+    /// Checks the settings.
+    ///
     /// # Errors
-    /// A range that is none, or a confidence outside 0..=1.
+    /// Returns an error if the range is invalid or the confidence lies outside 0..=1.
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         if !(0.0..=1.0).contains(&self.least_confidence) {
@@ -45,16 +48,16 @@ impl DepthOptions {
     }
 }
 
-/// What became of a frame's depth.
+/// The result of a frame's depth processing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthReport {
-    /// Metres at the near and the far end of the volume; None for normalized depth.
+    /// The distances at the near and the far end of the volume, in metres, or `None` for normalized depth.
     pub range_m: Option<(f32, f32)>,
-    /// The share of the sensor's pixels that had a usable reading.
+    /// The share of the sensor's pixels with a usable reading.
     pub valid: f32,
 }
 
-/// What the plans and the memory of a [`DepthStream`] are for.
+/// The inputs that determine the plans and the memory of a [`DepthStream`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Layout {
     format: DepthFormat,
@@ -70,11 +73,11 @@ struct Plan {
     scratch: RefineScratch,
     values: Vec<f32>,
     confidence: Vec<f32>,
-    /// What `values` and `confidence` become when they are aligned or turned.
+    /// Buffers for `values` and `confidence` while they are aligned or turned.
     moved: (Vec<f32>, Vec<f32>),
 }
 
-/// The depth of a sequence of frames for one display shape.
+/// Processes the depth of a sequence of frames for one display shape.
 pub struct DepthStream {
     options: DepthOptions,
     out: (usize, usize),
@@ -84,10 +87,10 @@ pub struct DepthStream {
 }
 
 impl DepthStream {
-    /// Depth for (H, W) = `out`.
+    /// Creates a stream with depth of (H, W) = `out`.
     ///
     /// # Errors
-    /// As [`DepthOptions::check`].
+    /// Returns an error if [`DepthOptions::check`] does.
     pub fn new(options: DepthOptions, out: (usize, usize)) -> Result<Self> {
         options.check()?;
         Ok(DepthStream {
@@ -99,21 +102,22 @@ impl DepthStream {
         })
     }
 
-    /// Forgets the frames before.
+    /// Clears the history.
     pub fn reset(&mut self) {
         self.range.reset();
         self.smoother.reset();
     }
 
-    /// The normalized depth of `frame` into `depth`, (H, W) in \[0, 1], along the edges of `rgb`, (3, H, W), what
-    /// [`Crop::cover`] shows of its colour. `elapsed` is the time since the frame before, None where there is none to
-    /// smooth with. Frames of one layout allocate nothing after the first.
+    /// Computes the normalized depth of `frame` along the edges of `rgb` and writes it to `depth`, (H, W) in \[0, 1].
+    ///
+    /// `rgb`, (3, H, W), is the part [`Crop::cover`] of the frame's colour. `elapsed` is the time since the previous
+    /// frame, or `None` if there is no previous frame to smooth with. Later frames of the same layout do not allocate.
     ///
     /// # Errors
-    /// Depth without any usable reading.
+    /// Returns an error if the depth has no usable reading.
     ///
     /// # Panics
-    /// If `rgb` has not 3·H·W values or `depth` H·W.
+    /// Panics if `rgb` does not have 3·H·W values or `depth` does not have H·W.
     pub fn next(
         &mut self,
         frame: &CameraFrame<'_>,
@@ -160,7 +164,8 @@ impl DepthStream {
             false => None,
         };
         if let Some((near, far)) = range_m {
-            // One distance everywhere has no extent: it lies in the middle of the volume.
+            // If all distances are equal, there is no extent to scale, so d = ½ puts the surface in the middle of the
+            // volume.
             let (scale, shift) = match near < far {
                 true => (1.0 / (far - near), -near / (far - near)),
                 false => (0.0, 0.5),
@@ -203,7 +208,8 @@ impl Plan {
         self.layout.orientation.upright_shape(height, width)
     }
 
-    /// The readings of `image`, aligned with the colour and upright, into `values` and `confidence`; gives how many.
+    /// Reads `image`, aligned with the colour and upright, into `values` and `confidence`, and returns the number of
+    /// readings.
     fn readings(&mut self, image: &DepthImage<'_>, least: f32) -> usize {
         let mut found = image.readings(least, &mut self.values, &mut self.confidence);
         if let Some(cameras) = self.layout.cameras {

@@ -1,8 +1,8 @@
-//! The laser's light over the modulator: a Gaussian beam is brighter in the middle than at the rim, so the
-//! target amplitude is divided by what arrives.
+//! Compensation of the laser light over the modulator. A Gaussian beam is brighter in the middle than at the rim, so
+//! the target amplitude is divided by the amplitude of the light.
 //!
-//! The map is coarse, as beams are smooth; it is interpolated linearly between nodes that are spread evenly from
-//! the first to the last pixel of each axis.
+//! Beams are smooth, so the map is coarse. It is interpolated linearly between nodes that are evenly spaced from the
+//! first to the last pixel of each axis.
 
 use crate::runtime::error::{Error, Result};
 use ndarray::{ArrayView3, Axis};
@@ -10,24 +10,26 @@ use num_complex::Complex32;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// The most that a value is brightened: light below a tenth of the brightest is taken as that.
+/// The largest gain. Light below a tenth of the brightest counts as a tenth.
 pub const MAX_GAIN: f32 = 10.0;
 
-/// One over the laser's amplitude, for a modulator of any size. Immutable; shared between threads.
+/// The reciprocal of the laser's amplitude, for a modulator of any size. It is immutable and can be shared between
+/// threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Illumination {
-    /// (Gh, Gw).
+    /// The grid of nodes, (Gh, Gw).
     nodes: (usize, usize),
-    /// (C, Gh, Gw).
+    /// The gain of each node, (C, Gh, Gw).
     gain: Vec<f32>,
 }
 
 impl Illumination {
-    /// From the lasers' amplitudes, (C, Gh, Gw), of any scale: each colour is divided by its largest value.
+    /// Creates the map from the lasers' amplitudes, (C, Gh, Gw), of any scale. Each colour is divided by its largest
+    /// value.
     ///
     /// # Errors
-    /// Neither three colours nor one, fewer than 2 nodes along an axis, or a value that is not finite or negative, or a
-    /// colour without light.
+    /// Returns an error if there are neither three colours nor one, fewer than 2 nodes along an axis, a value that is
+    /// negative or not finite, or a colour without light.
     pub fn new(amplitude: ArrayView3<'_, f32>) -> Result<Self> {
         let refuse = |what: String| Err(Error::Setting(format!("laser map: {what}")));
         let (colours, rows, columns) = amplitude.dim();
@@ -53,28 +55,28 @@ impl Illumination {
         })
     }
 
-    /// How many colours it is of.
+    /// Returns the number of colours.
     pub fn colours(&self) -> usize {
         self.gain.len() / (self.nodes.0 * self.nodes.1)
     }
 
-    /// (Gh, Gw).
+    /// Returns the grid of nodes, (Gh, Gw).
     #[doc(hidden)]
     pub fn nodes(&self) -> (usize, usize) {
         self.nodes
     }
 
-    /// One over the amplitude of each node, (C, Gh, Gw), at least 1, at most [`MAX_GAIN`].
+    /// Returns the reciprocal amplitude of each node, (C, Gh, Gw), from 1 to [`MAX_GAIN`].
     #[doc(hidden)]
     pub fn gains(&self) -> &[f32] {
         &self.gain
     }
 
-    /// One over the amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator: in y first, then in x. The oracle
-    /// of [`Self::divide`].
+    /// Returns the reciprocal amplitude at pixel (`x`, `y`) of a (`height`, `width`) modulator, interpolated in y, then
+    /// in x. Tests compare [`Self::divide`] with it.
     ///
     /// # Panics
-    /// If it has no such colour or the pixel is outside.
+    /// Panics if the map has no such colour or the pixel lies outside the modulator.
     #[doc(hidden)]
     pub fn gain(&self, colour: usize, y: usize, x: usize, (height, width): (usize, usize)) -> f32 {
         assert!(y < height && x < width);
@@ -92,33 +94,34 @@ impl Illumination {
         top + (bottom - top) * fy
     }
 
-    /// Divides `field`, (C, H, W) of `shape`, in the middle of a `modulator` of (H, W) pixels, by the laser's
-    /// amplitude. An axis of the modulator shorter than the field's counts as that. Allocates nothing.
+    /// Divides `field` by the laser's amplitude. `field` has shape (C, H, W), with (H, W) = `shape`, and lies in the
+    /// middle of a `modulator` of (H, W) pixels. If an axis of the modulator is shorter than the field, the field's
+    /// length is used. Does not allocate.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values.
+    /// Panics if `field` does not have C·H·W values.
     #[doc(hidden)]
     pub fn divide(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value *= gain);
     }
 
-    /// Multiplies by the laser's amplitude as [`Self::divide`] divides: what becomes of light on its way over the
-    /// modulator.
+    /// Multiplies `field` by the laser's amplitude, as the inverse of [`Self::divide`]. This simulates the illumination
+    /// of the modulator.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values.
+    /// Panics if `field` does not have C·H·W values.
     #[doc(hidden)]
     pub fn shine(&self, field: &mut [Complex32], shape: (usize, usize), modulator: (usize, usize)) {
         self.each_row(field, shape, modulator, |value, gain| *value /= gain);
     }
 
-    /// [`Self::divide`] for row `row` of a stack of planes of `height` rows.
+    /// Divides row `row` of a stack of planes with `height` rows, like [`Self::divide`].
     #[doc(hidden)]
     pub fn divide_row(&self, values: &mut [Complex32], row: usize, height: usize, modulator: (usize, usize)) {
         wide!(self.change_row(values, row, height, modulator, |value, gain| *value *= gain));
     }
 
-    /// The laser's amplitude on row `row` of a stack of planes of `height` rows, 1 at its brightest.
+    /// Fills `light` with the laser's amplitude on row `row` of a stack of planes with `height` rows. The maximum is 1.
     pub(crate) fn light_row(&self, light: &mut [f32], row: usize, height: usize, modulator: (usize, usize)) {
         wide!(self.change_row(light, row, height, modulator, |light, gain| *light = 1.0 / gain));
     }
@@ -154,7 +157,7 @@ impl Illumination {
         let (spans, steps) = (self.nodes.1 - 1, (columns - 1).max(1));
         let mut at = left;
         while at < end {
-            // All pixels that lie between the same two nodes.
+            // All pixels between the same two nodes.
             let (j, _) = split(at, columns, self.nodes.1);
             let next = match j + 1 {
                 last if last == spans => end,
@@ -172,7 +175,7 @@ impl Illumination {
     }
 }
 
-/// The node before pixel `n` of `count`, and how far it is to the next of `nodes`.
+/// Returns the node before pixel `n` of `count`, and the fraction of the way to the next of `nodes`.
 fn split(n: usize, count: usize, nodes: usize) -> (usize, f32) {
     let steps = (count - 1).max(1);
     let scaled = n * (nodes - 1);
@@ -204,7 +207,8 @@ mod tests {
                 let mut divided = field.clone();
                 map.divide(&mut divided, shape, (h + 5, w + 8));
                 for (i, value) in divided.iter().enumerate() {
-                    // Five rows and eight columns more: two above, four on the left.
+                    // The modulator has five more rows and eight more columns: two rows above, four columns on the
+                    // left.
                     let (y, x) = (i / w % h + 2, i % w + 4);
                     let gain = map.gain(i / (h * w), y, x, (h + 5, w + 8));
                     assert_eq!(*value, field[i] * gain, "{shape:?} {nodes:?} {i}");

@@ -1,7 +1,8 @@
-//! What a modulator's panel adds to a response: phases at each pixel (what makes it flat, a carrier, a lens), and a
-//! range over 2π, by which neighbours need not jump.
+//! Phases that a modulator's panel adds at each pixel (flatness correction, carrier, lens), and phase ranges over 2π,
+//! in which neighbouring pixels need no jump.
 //!
-//! It stands between the encoder and the response, on phases that lie in memory. The encoder's sweep does not know it.
+//! The panel is applied between the encoder and the response, to phases in memory. The encoder's sweep does not depend
+//! on it.
 
 use crate::display::{Display, check_colours};
 use crate::runtime::error::{Error, Result};
@@ -10,35 +11,36 @@ use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
-/// What a panel adds. The default is nothing.
+/// The phases and the phase range of a panel. The default adds nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Panel {
-    /// The angles, radians, by which a blazed grating turns all light right and down, the same for each colour: it
-    /// parts the image from the light that the panel does not modulate.
+    /// The angles, in radians, by which a blazed grating turns light right and down, the same for each colour. This
+    /// separates the image from the light that the panel does not modulate.
     pub carrier_rad: [f64; 2],
-    /// Focal length of a lens at the panel, metres: positive draws light together toward the viewer. None: no lens.
+    /// The focal length of a lens at the panel, in metres, or `None` for no lens. A positive lens converges light
+    /// toward the viewer.
     pub lens_m: Option<f64>,
     /// The phases that make the panel flat.
     pub flatness: Option<Flatness>,
-    /// The phase that each level shows, in turns of 2π, rising from 0: where they go on over one turn, each row's
-    /// phases follow their neighbours instead of jumping at 2π, as far as the range goes. None: the response alone
-    /// decides.
+    /// The phase of each level, in turns of 2π, rising from 0. If they exceed one turn, the phases of a row follow
+    /// their neighbours instead of jumping at 2π, as far as the range allows. If `None`, the response alone determines
+    /// the levels.
     pub levels_turns: Option<Vec<f64>>,
 }
 
-/// Phases for each pixel of a modulator, one map for all colours or one for each.
+/// Phases for each pixel of a modulator, with one map for all colours or one for each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flatness {
     shape: (usize, usize),
-    /// (1 or 3, H, W), in turns of 2π/65536.
+    /// The phases, (1 or 3, H, W), in turns of 2π/65536.
     maps: Arc<[u16]>,
 }
 
 impl Flatness {
-    /// `maps`, (1 or 3, H, W) = `shape`: phases in turns of 2π/65536, to be added.
+    /// Creates the phases to add from `maps`, (1 or 3, H, W) with (H, W) = `shape`, in turns of 2π/65536.
     ///
     /// # Errors
-    /// An empty map, or a length that does not fit.
+    /// Returns an error if the map is empty or its length does not match `shape`.
     pub fn new(shape: (usize, usize), maps: Vec<u16>) -> Result<Self> {
         let area = shape.0 * shape.1;
         if area == 0 || (maps.len() != area && maps.len() != 3 * area) {
@@ -55,15 +57,15 @@ impl Flatness {
         })
     }
 
-    /// (H, W) of the modulator.
+    /// Returns (H, W) of the modulator.
     pub fn shape(&self) -> (usize, usize) {
         self.shape
     }
 
-    /// The map of the (`height`, `width`) pixels in the middle, for a hologram smaller than the modulator.
+    /// Returns the map of the central (`height`, `width`) pixels, for a hologram smaller than the modulator.
     ///
     /// # Errors
-    /// More pixels than there are.
+    /// Returns an error if the map has fewer pixels.
     pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
         let (rows, columns) = self.shape;
         if height > rows || width > columns {
@@ -77,7 +79,7 @@ impl Flatness {
         Self::new((height, width), middle.copied().collect())
     }
 
-    /// (1 or 3, H, W), in turns of 2π/65536.
+    /// Returns the maps, (1 or 3, H, W), in turns of 2π/65536.
     #[doc(hidden)]
     pub fn maps(&self) -> &[u16] {
         &self.maps
@@ -85,28 +87,30 @@ impl Flatness {
 }
 
 impl Panel {
-    /// Whether it adds nothing, so that the response alone makes levels of phases.
+    /// Returns whether the panel adds nothing, so that the response alone converts phases to levels.
     #[doc(hidden)]
     pub fn is_plain(&self) -> bool {
         !self.adds() && !self.goes_on()
     }
 
-    /// Whether it adds phases.
+    /// Returns whether the panel adds phases.
     #[doc(hidden)]
     pub fn adds(&self) -> bool {
         self.carrier_rad != [0.0; 2] || self.lens_m.is_some() || self.flatness.is_some()
     }
 
-    /// Whether levels go on over one turn.
+    /// Returns whether the levels exceed one turn.
     fn goes_on(&self) -> bool {
         self.levels_turns
             .as_ref()
             .is_some_and(|turns| turns.last().is_some_and(|most| *most >= 1.0))
     }
 
+    /// Checks the panel for `display`.
+    ///
     /// # Errors
-    /// A map for another modulator or other colours; a carrier and a lens that turn the phase by over half a turn from
-    /// pixel to pixel.
+    /// Returns an error if the flatness map is for another size or number of colours, the focal length is 0 or not
+    /// finite, or the carrier and the lens change the phase by more than half a turn between neighbouring pixels.
     #[doc(hidden)]
     pub fn check(&self, display: &Display) -> Result<()> {
         let (height, width) = (display.height(), display.width());
@@ -141,20 +145,21 @@ impl Panel {
     }
 }
 
-/// A plan for holograms of one shape in the middle of a display. Immutable; shared between threads.
+/// A plan for holograms of one shape in the middle of a display. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub struct PanelPlan {
-    /// (C, H, W), in turns of 2π/65536; empty where nothing is added.
+    /// The added phases, (C, H, W), in turns of 2π/65536; empty if the panel adds none.
     added: Arc<[u16]>,
     width: usize,
     nearest: Option<Nearest>,
 }
 
 impl PanelPlan {
-    /// Plans (C, H, W) = `shape` phases for `display`; None where `panel` adds nothing.
+    /// Plans (C, H, W) = `shape` phases for `display`, or returns `None` if `panel` adds nothing.
     ///
     /// # Errors
-    /// A map for another modulator; a carrier and a lens that turn the phase by over half a turn from pixel to pixel.
+    /// Returns an error if a map is for another modulator, or if the carrier and the lens change the phase by more than
+    /// half a turn between neighbouring pixels.
     pub fn new(panel: &Panel, display: &Display, shape: (usize, usize)) -> Result<Option<Self>> {
         panel.check(display)?;
         if panel.is_plain() {
@@ -174,10 +179,10 @@ impl PanelPlan {
         }))
     }
 
-    /// Adds its phases to `phases`, (C, H, W) in \[0, 2π), where they stay. Allocates nothing.
+    /// Adds the panel's phases to `phases`, (C, H, W), and wraps them to \[0, 2π). Does not allocate.
     ///
     /// # Panics
-    /// If `phases` has another length than planned.
+    /// Panics if the length of `phases` differs from the plan.
     pub fn add(&self, phases: &mut [f32]) {
         if self.added.is_empty() {
             return;
@@ -193,15 +198,15 @@ impl PanelPlan {
             });
     }
 
-    /// The phase that is added at value `at` of a stack (C, H, W).
+    /// Returns the phase added to value `at` of a stack (C, H, W).
     pub fn added(&self, at: usize) -> f32 {
         self.added.get(at).copied().map_or(0.0, radians)
     }
 
-    /// The inverse of [`Self::add`] on a field, (C, H, W), whose phases are those of levels.
+    /// Removes the panel's phases from `field`, (C, H, W), as the inverse of [`Self::add`].
     ///
     /// # Panics
-    /// If `field` has another length than planned.
+    /// Panics if the length of `field` differs from the plan.
     pub fn remove(&self, field: &mut [Complex32]) {
         if self.added.is_empty() {
             return;
@@ -211,12 +216,14 @@ impl PanelPlan {
         pairs.for_each(|(value, added)| *value *= Complex32::from_polar(1.0, -radians(*added)));
     }
 
-    /// The levels of `phases`, (C, H, W) in \[0, 2π), where they go on over one turn: of the levels that show a phase,
-    /// the one whose own phase is nearest to its left neighbour's, the first pixel's nearest to the middle of the
-    /// range. False, and nothing done, where they do not. Allocates nothing.
+    /// Converts `phases`, (C, H, W) in \[0, 2π), to levels that exceed one turn.
+    ///
+    /// Of the levels with the same phase modulo 2π, it chooses the one nearest to the left neighbour, or to the middle
+    /// of the range for the first pixel of a row. If the levels do not exceed one turn, it writes nothing and returns
+    /// false. Does not allocate.
     ///
     /// # Panics
-    /// If `phases` or `levels` has another length than planned.
+    /// Panics if the length of `phases` or `levels` differs from the plan.
     pub fn levels(&self, phases: &[f32], levels: &mut [u8]) -> bool {
         let Some(nearest) = &self.nearest else {
             return false;
@@ -233,8 +240,10 @@ fn radians(turns: u16) -> f32 {
     f32::from(turns) * (TAU / 65536.0)
 }
 
-/// The phases that `panel` adds, (C, H, W), in turns of 2π/65536. Light is exp(+i2πz/λ), so a wave that goes right by
-/// the angle θ is exp(i2πx·sin θ/λ), and one that comes together f behind the panel exp(−iπ(x² + y²)/(λf)).
+/// Computes the phases that `panel` adds, (C, H, W), in turns of 2π/65536.
+///
+/// Light is exp(+i2πz/λ), so a wave that travels right at the angle θ is exp(i2πx·sin θ/λ), and a wave that converges
+/// at the distance f from the panel is exp(−iπ(x² + y²)/(λf)).
 fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> Vec<u16> {
     let modulator = (display.height(), display.width());
     let corner = (
@@ -267,16 +276,16 @@ fn added(panel: &Panel, display: &Display, (height, width): (usize, usize)) -> V
     all
 }
 
-/// Levels whose phases go on over one turn.
+/// The levels of a panel whose range exceeds one turn.
 #[derive(Debug, Clone)]
 struct Nearest {
-    /// Of each 1/STEPS of a turn the nearest level.
+    /// The nearest level for each step of 1/STEPS of a turn.
     level: Vec<u8>,
-    /// The phase of the last level, turns.
+    /// The phase of the last level, in turns.
     most: f32,
 }
 
-/// Steps of a turn.
+/// The number of steps in a turn.
 const STEPS: f32 = 4096.0;
 
 impl Nearest {
@@ -299,12 +308,12 @@ impl Nearest {
         }
     }
 
-    /// The levels of a row of phases.
+    /// Converts a row of phases to levels.
     fn row(&self, phases: &[f32], levels: &mut [u8]) {
         let mut before = self.most / 2.0;
         for (phase, level) in phases.iter().zip(levels) {
             let turn = phase / TAU;
-            // The turn's copy that is nearest to what stands before it, and lies in the range.
+            // The copy of the phase, in whole turns, that lies in the range and nearest to the previous pixel.
             let whole = (before - turn)
                 .round()
                 .max(0.0)
@@ -336,7 +345,7 @@ mod tests {
             flatness: Some(Flatness::new((24, 40), maps.clone()).unwrap()),
             levels_turns: None,
         };
-        // A smaller hologram stands in the middle.
+        // A smaller hologram lies in the middle.
         let (height, width) = (10, 16);
         let plan = PanelPlan::new(&panel, &display, (height, width)).unwrap().unwrap();
         let phases: Vec<f32> = (0..3 * 160).map(|i| (i % 63) as f32 * 0.1).collect();
@@ -379,7 +388,7 @@ mod tests {
         let plan = PanelPlan::new(&panel, &display, (64, 128)).unwrap().unwrap();
         let distance_m = 20e-3;
         for (colour, wavelength_m) in display.wavelengths_m().iter().copied().enumerate() {
-            // A beam of 20 pixels that goes straight without the carrier.
+            // A beam 20 pixels wide that travels straight without the carrier.
             let beam = |y: usize, x: usize| {
                 let (y, x) = (y as f32 - 31.5, x as f32 - 63.5);
                 (-(y * y + x * x) / 200.0).exp()
@@ -407,7 +416,7 @@ mod tests {
             ..Panel::default()
         };
         let plan = PanelPlan::new(&panel, &display(), (1, 300)).unwrap().unwrap();
-        // A ramp that goes up and down over three quarters of a turn around 2π.
+        // A ramp that rises and falls by three quarters of a turn across 2π.
         let ramp: Vec<f32> = (0..900)
             .map(|i| {
                 let t = (i % 100) as f32 / 100.0;
@@ -423,7 +432,7 @@ mod tests {
                 assert!(apart.min(1.0 - apart) < 1.05 / 256.0, "{} {phase}", pair[0]);
             }
         }
-        // Where the range ends, any phase is still shown by a level that shows it.
+        // At the ends of the range, each phase still gets a level with that phase.
         let wild: Vec<f32> = (0..900).map(|i| (i * 7919 % 1000) as f32 / 1000.0 * TAU).collect();
         assert!(plan.levels(&wild, &mut levels));
         for (level, phase) in levels.iter().zip(&wild) {
@@ -434,7 +443,7 @@ mod tests {
 
     #[test]
     fn what_pixels_cannot_show_is_refused() {
-        // Half a turn from pixel to pixel in blue.
+        // Half a turn between neighbouring pixels in blue.
         let most = (450e-9_f64 / (2.0 * display().pitch_m())).asin();
         let with = |carrier_rad, lens_m, flatness| Panel {
             carrier_rad,

@@ -1,35 +1,38 @@
-//! Chromatic registration: lenses show the colours at slightly different places and sizes, which a shift and a scale of
-//! each colour's field at the modulator undoes.
+//! Chromatic registration. Lenses image the colours at slightly different positions and sizes, so each colour's field
+//! at the modulator is shifted and scaled to compensate.
 //!
-//! A field is band-limited to the aperture, so its values between pixels are those of a windowed sinc (Lanczos, four
-//! lobes): first along rows, then along columns.
+//! A field is band-limited to the aperture, so values between pixels are interpolated with a windowed sinc (Lanczos,
+//! four lobes), first along rows, then along columns.
 
 use crate::display::check_colours;
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-/// How each colour is moved, in the order red, green, blue. The default moves none.
+/// The shift and the scale of each colour, in the order red, green, blue. The default changes nothing.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Registration {
-    /// How far right and down, pixels of the modulator: one for each colour, or none where none is shifted.
+    /// The shifts right and down, in modulator pixels: one for each colour, or empty for no shifts.
     pub shift_px: Vec<[f64; 2]>,
-    /// How much larger, about the middle of the hologram: one for each colour, or none where all keep their size.
+    /// The scales about the middle of the hologram: one for each colour, or empty for no scaling.
     pub scale: Vec<f64>,
 }
 
-/// Values on each side of a place that it is made of.
+/// The number of values on each side that an interpolated value depends on.
 const REACH: usize = 4;
 
 impl Registration {
-    /// Whether any colour is moved.
+    /// Returns whether any colour is shifted or scaled.
     #[doc(hidden)]
     pub fn moves(&self) -> bool {
         self.shift_px.iter().any(|shift| *shift != [0.0; 2]) || self.scale.iter().any(|scale| *scale != 1.0)
     }
 
+    /// Checks the shifts and scales for a display with `colours` colours.
+    ///
     /// # Errors
-    /// Another number of colours, a shift of over 1000 pixels, or a scale outside 0.8 to 1.25.
+    /// Returns an error if the number of colours differs, a shift exceeds 1000 pixels, or a scale is outside 0.8 to
+    /// 1.25.
     #[doc(hidden)]
     pub fn check(&self, colours: usize) -> Result<()> {
         for (what, count) in [("shift_px", self.shift_px.len()), ("scale", self.scale.len())] {
@@ -55,31 +58,31 @@ impl Registration {
     }
 }
 
-/// A plan for one shape. Immutable; shared between threads.
+/// A plan for one shape. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub(crate) struct RegistrationPlan {
     height: usize,
     width: usize,
-    /// Of each colour, for x and for y; None where it stays.
+    /// The x and y axes of each colour, or `None` for a colour that does not move.
     axes: Vec<Option<[Axis; 2]>>,
 }
 
-/// Where each value of an axis comes from.
+/// The source values of each value of an axis.
 #[derive(Debug, Clone)]
 struct Axis(Vec<Taps>);
 
 #[derive(Debug, Clone, Copy)]
 struct Taps {
-    /// The first value, which may lie before the axis.
+    /// The first source value, which may lie before the axis.
     first: isize,
     weights: [f32; 2 * REACH],
 }
 
 impl RegistrationPlan {
-    /// Plans the move of fields of `colours` planes of (H, W) = `shape`; None where every colour stays.
+    /// Plans the registration of `colours` planes of (H, W) = `shape`, or returns `None` if no colour moves.
     ///
     /// # Errors
-    /// As [`Registration::check`].
+    /// Returns an error if [`Registration::check`] does.
     pub(crate) fn new((height, width): (usize, usize), colours: usize, of: &Registration) -> Result<Option<Self>> {
         of.check(colours)?;
         if !of.moves() {
@@ -98,10 +101,11 @@ impl RegistrationPlan {
         }))
     }
 
-    /// Moves `plane`, (H, W), of `colour`, in place; what comes from outside is 0. `scratch` has as many values.
+    /// Shifts and scales `plane`, (H, W), of `colour` in place. Values from outside the plane are 0. `scratch` has the
+    /// same length as `plane`.
     ///
     /// # Panics
-    /// If `plane` or `scratch` has another length than planned.
+    /// Panics if the length of `plane` or `scratch` differs from the plan.
     pub(crate) fn apply(&self, colour: usize, plane: &mut [Complex32], scratch: &mut [Complex32]) {
         assert!(plane.len() == self.height * self.width && scratch.len() == plane.len());
         let Some([along_x, along_y]) = &self.axes[colour] else {
@@ -154,7 +158,7 @@ impl Taps {
     }
 }
 
-/// sinc(x)·sinc(x/REACH) within REACH.
+/// Returns sinc(x)·sinc(x/REACH) for |x| < REACH, else 0.
 fn lanczos(x: f64) -> f64 {
     let sinc = |x: f64| match x == 0.0 {
         true => 1.0,
@@ -172,7 +176,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A field whose phase turns by up to a quarter turn a pixel, around `middle`.
+    /// Returns a field around the middle whose phase changes by up to a quarter turn between neighbouring pixels.
     fn field(x: f64, y: f64) -> Complex32 {
         let amplitude = (-(x * x + 2.0 * y * y) / 300.0).exp();
         Complex32::from_polar(amplitude as f32, (0.8 * x - 0.5 * y + 0.01 * x * y) as f32)
@@ -212,7 +216,7 @@ mod tests {
                     (moved[at] - field(x, y)).norm()
                 })
                 .fold(0.0, f32::max);
-            // Whole pixels are copied.
+            // Shifts by whole pixels copy values.
             let most = if colour == 1 { 0.02 } else { 1e-5 };
             assert!(worst < most, "{colour}: {worst}");
         }

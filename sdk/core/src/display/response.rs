@@ -1,5 +1,5 @@
-//! Phase to modulator levels and back: the linear response, a 256-entry look-up table for the whole
-//! modulator, or a table for each pixel, [`per_pixel`]; the tables are what a calibration measured.
+//! Conversion of phases to modulator levels and back, with a linear response, a 256-entry look-up table for the whole
+//! modulator, or a table for each pixel ([`per_pixel`]). Calibration measures the tables.
 
 pub mod per_pixel;
 
@@ -9,32 +9,32 @@ use phasefront_kernels::wide;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
-/// What a modulator answers to a phase. Immutable; shared between threads.
+/// A modulator's response to phases. It is immutable and can be shared between threads.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Response {
-    /// Level round(φ/2π·2^bits) mod 2^bits.
+    /// The linear response: level round(φ/2π·2^bits) mod 2^bits.
     Linear {
-        /// Bits of a level, 1 to 8.
+        /// The number of bits of a level, 1 to 8.
         bits: u32,
     },
-    /// The phase is rounded to one of 256 steps of 2π/256, and `level[step]` shows it.
+    /// A look-up table. The phase is rounded to one of 256 steps of 2π/256, and `level[step]` is its level.
     Lut {
-        /// The level that shows each step.
+        /// The level of each step.
         level: Box<[u8; 256]>,
-        /// For each level the middle of the steps that it shows; for a level that no step uses, the
-        /// phase of the nearest one that does.
+        /// The phase of each level: the middle of its steps. A level without steps takes the phase of the nearest level
+        /// with steps.
         phase: Box<[f32; 256]>,
     },
-    /// Each pixel of each colour has its own curve. It comes with a calibrated target's file.
+    /// A curve for each pixel of each colour, from a calibration file.
     #[doc(hidden)]
     PerPixel(Arc<PerPixel>),
 }
 
 impl Response {
-    /// The linear response.
+    /// Creates the linear response.
     ///
     /// # Errors
-    /// `bits` outside 1..=8.
+    /// Returns an error if `bits` lies outside 1..=8.
     pub fn linear(bits: u32) -> Result<Self> {
         if !(1..=8).contains(&bits) {
             return Err(Error::Setting(format!(
@@ -44,11 +44,11 @@ impl Response {
         Ok(Response::Linear { bits })
     }
 
-    /// The response of a calibrated modulator: `level[i]` shows the phase 2πi/256.
+    /// Creates the response of a calibrated modulator, in which `level[i]` has the phase 2πi/256.
     pub fn lut(level: [u8; 256]) -> Self {
         let mut used: [Option<f32>; 256] = [None; 256];
         for shown in 0..=255u8 {
-            // The steps of one level may wrap around 2π, so their middle is that of unit vectors.
+            // The steps of a level may wrap around 2π, so their middle is the direction of a sum of unit vectors.
             let steps = (0..256).filter(|&i| level[i] == shown);
             let (sum, n) = steps.fold((num_complex::Complex32::ZERO, 0), |(sum, n), i| {
                 let step = num_complex::Complex32::from_polar(1.0, i as f32 / 256.0 * TAU);
@@ -71,12 +71,14 @@ impl Response {
         }
     }
 
-    /// The response of a modulator whose level l shows `turns[l]` of 2π, in rising order from 0 on: a phase becomes
-    /// the level whose phase, modulo 2π, is nearest, the higher of two that are as near. Above 2π only what the first
-    /// turn does not hold is used.
+    /// Creates the response of a modulator whose level l has the phase `turns[l]`·2π, rising from 0.
+    ///
+    /// A phase becomes the level whose phase is nearest modulo 2π, or the higher of two equally near levels. Only
+    /// levels in the first turn are used.
     ///
     /// # Errors
-    /// Fewer than 2 or more than 256 levels, or phases that do not rise from 0, up to 4 turns.
+    /// Returns an error if there are fewer than 2 or more than 256 levels, or if the phases do not rise from 0 to at
+    /// most 4 turns.
     pub fn of_turns(turns: &[f64]) -> Result<Self> {
         let refuse = |what: String| Err(Error::Setting(format!("a modulator's levels: {what}")));
         if !(2..=256).contains(&turns.len()) {
@@ -89,7 +91,7 @@ impl Response {
         let first_turn = turns.iter().take_while(|turn| **turn < 1.0).count();
         let nearest = |step: usize| {
             let apart = |turn: f64| (turn - step as f64 / 256.0).abs();
-            // Level 0 stands at the turn's end too.
+            // Level 0 is also at the end of the turn.
             let all = turns[..first_turn].iter().copied().zip(0..).chain([(1.0, 0)]);
             let best = all.reduce(|best, other| if apart(other.0) <= apart(best.0) { other } else { best });
             best.map_or(0, |(_, level)| level)
@@ -104,10 +106,10 @@ impl Response {
         })
     }
 
-    /// The response of the (`height`, `width`) pixels in the middle of the modulator, where a smaller hologram stands.
+    /// Returns the response of the central (`height`, `width`) pixels of the modulator, for a smaller hologram.
     ///
     /// # Errors
-    /// A table for fewer pixels.
+    /// Returns an error if the table has fewer pixels.
     #[doc(hidden)]
     pub fn centred(self, height: usize, width: usize) -> Result<Self> {
         match self {
@@ -118,7 +120,7 @@ impl Response {
         }
     }
 
-    /// The shape that the response is made for, (H, W); None where it suits any.
+    /// Returns the shape (H, W) of the response, or `None` if it fits any shape.
     #[doc(hidden)]
     pub fn shape(&self) -> Option<(usize, usize)> {
         match self {
@@ -127,10 +129,10 @@ impl Response {
         }
     }
 
-    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (C, H, W).
+    /// Returns the level for `phase`, in \[0, 2π), at value `at` of a stack (C, H, W).
     ///
     /// # Panics
-    /// If `at` is outside the shape that the response is made for.
+    /// Panics if `at` lies outside the shape of the response.
     #[doc(hidden)]
     pub fn level(&self, phase: f32, at: usize) -> u8 {
         match self {
@@ -140,10 +142,10 @@ impl Response {
         }
     }
 
-    /// The phase that `level` shows, in \[0, 2π), at value `at` of a stack (C, H, W).
+    /// Returns the phase of `level`, in \[0, 2π), at value `at` of a stack (C, H, W).
     ///
     /// # Panics
-    /// As [`Self::level`].
+    /// Panics if `at` lies outside the shape of the response.
     #[doc(hidden)]
     pub fn phase(&self, level: u8, at: usize) -> f32 {
         match self {
@@ -156,11 +158,11 @@ impl Response {
         }
     }
 
-    /// [`Self::level`] of each phase of a row or part of one, which begins at value `first` of a stack
-    /// (C, H, W). Allocates nothing.
+    /// Writes the level of each of `phases`, like [`Self::level`]. `phases` is a row or a part of one that begins at
+    /// value `first` of a stack (C, H, W). Does not allocate.
     ///
     /// # Panics
-    /// If the lengths differ, or the response is made for a shape whose row ends before.
+    /// Panics if the lengths differ, or if the phases extend beyond a row of the response's shape.
     #[inline(always)]
     #[doc(hidden)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
@@ -181,17 +183,18 @@ impl Response {
     }
 }
 
-/// `phase` brought to \[0, 2π).
+/// Wraps `phase` to \[0, 2π).
 pub fn wrap(phase: f32) -> f32 {
     let wrapped = phase.rem_euclid(TAU);
-    // rem_euclid of a tiny negative number rounds up to 2π itself.
+    // `rem_euclid` of a tiny negative number rounds up to 2π.
     if wrapped < TAU { wrapped } else { 0.0 }
 }
 
-/// The linear response of a modulator of `bits`, 1 to 16, whose levels do not fit bytes. Allocates nothing.
+/// Writes the linear response of a modulator with `bits` bits, 1 to 16, for levels that do not fit in bytes. Does not
+/// allocate.
 ///
 /// # Panics
-/// If the lengths differ.
+/// Panics if the lengths differ.
 pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {
     assert_eq!(phases.len(), words.len());
     wide!(for (word, phase) in words.iter_mut().zip(phases) {
@@ -199,10 +202,10 @@ pub fn linear_words(phases: &[f32], bits: u32, words: &mut [u16]) {
     });
 }
 
-/// round(φ/2π·n) mod n, for n a power of two up to 65536.
+/// Returns round(φ/2π·n) mod n, where n is a power of two up to 65536.
 #[inline(always)]
 fn step(phase: f32, n: i32) -> usize {
-    // From 2²³ on a number's low bits are the integer that it is; a conversion that saturates would not vectorise.
+    // From 2²³ on, the low bits of a float are its integer value. A saturating conversion would not vectorise.
     let rounded = (phase * (n as f32 / TAU) + 0.5).floor();
     ((rounded + 8_388_608.0).to_bits() & (n as u32 - 1)) as usize
 }
@@ -254,10 +257,10 @@ mod tests {
             assert!(apart(level.into()) < best + 1e-9, "{turn}: {level}");
             assert!((response.phase(level, 0) - turns[level as usize] as f32 * TAU).abs() < 1e-5);
         }
-        // Half-way from the last level to the turn.
+        // Half-way between the last level and the end of the turn.
         assert_eq!(response.level(0.96 * TAU, 0), 0);
         assert_eq!(response.level(0.94 * TAU, 0), 5);
-        // A panel of 1.5 turns: what its upper levels show is known, though none is asked for.
+        // In a panel of 1.5 turns, the upper levels are never used, but their phases are known.
         let over: Vec<f64> = (0..256).map(|l| 1.5 * f64::from(l) / 256.0).collect();
         let response = Response::of_turns(&over).unwrap();
         assert!((response.phase(192, 0) - 0.125 * TAU).abs() < 1e-5);

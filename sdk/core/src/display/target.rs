@@ -1,5 +1,5 @@
-//! What a hologram is made for: a display, what its modulator answers to a phase, its lasers' light, what corrects its
-//! optics. Every plan takes one. Where nothing is calibrated it is a [`Display`] alone.
+//! The target of a hologram: a display, its modulator's response, its laser illumination, and the correction of its
+//! optics. Every plan takes a target. An uncalibrated target is just a [`Display`].
 //!
 //! ```
 //! use phasefront::{Display, Target};
@@ -20,27 +20,27 @@ use crate::optics::asm::{Padding, Propagator};
 use crate::optics::zernike::Aberration;
 use crate::runtime::error::{Error, Result};
 
-/// A display, and what a calibration found of it. A hologram smaller than the modulator stands in its middle.
+/// A display and its calibration. A hologram smaller than the modulator lies in its middle.
 #[derive(Debug, Clone)]
 pub struct Target {
-    /// The physics.
+    /// The physics of the display.
     pub display: Display,
-    /// What the modulator answers to a phase: of a display of over 8 bits linear levels, whose upper 8 it says.
+    /// The modulator's response to phases. For a display of more than 8 bits it is linear and gives the upper 8 bits.
     pub response: Response,
-    /// The lasers' light over the modulator; None where it is even.
+    /// The laser light over the modulator, or `None` if it is uniform.
     pub illumination: Option<Illumination>,
-    /// What corrects the optics' aberration, where it is one for all depths.
+    /// The correction of the optics' aberration, if it is the same at all depths.
     pub correction: Option<Aberration>,
-    /// What the panel adds to the response. It comes with a calibrated target's file.
+    /// The phases and the phase range of the panel, from a calibration file.
     #[doc(hidden)]
     pub panel: Panel,
-    /// How each colour is moved and scaled. It comes with a calibrated target's file.
+    /// The shift and the scale of each colour, from a calibration file.
     #[doc(hidden)]
     pub registration: Registration,
 }
 
 impl From<Display> for Target {
-    /// A linear response of the display's bits, even light, nothing to correct.
+    /// Creates a target with a linear response of the display's bits, uniform light and no correction.
     fn from(display: Display) -> Self {
         Target {
             response: Response::Linear {
@@ -62,15 +62,18 @@ impl From<&Display> for Target {
 }
 
 impl Default for Target {
-    /// The paper's display: [`Display::default`].
+    /// Returns the target of the paper's display, [`Display::default`].
     fn default() -> Self {
         Display::default().into()
     }
 }
 
 impl Target {
+    /// Checks that all parts of the target match the display.
+    ///
     /// # Errors
-    /// A table or a map for another modulator or another number of lasers, or a table for a display of over 8 bits.
+    /// Returns an error if a table or a map is for another modulator or number of lasers, if a table is given for a
+    /// display of more than 8 bits, or if the panel or the registration is invalid.
     #[doc(hidden)]
     pub fn check(&self) -> Result<()> {
         let colours = self.display.colours();
@@ -102,16 +105,17 @@ impl Target {
         self.registration.check(colours)
     }
 
-    /// (H, W) of the modulator.
+    /// Returns (H, W) of the modulator.
     pub fn modulator(&self) -> (usize, usize) {
         (self.display.height(), self.display.width())
     }
 
-    /// The way of each colour of (C, H, W) = `shape` fields over `distance_m`, `correction` being part of it: in pixels
-    /// of `binning`² of the modulator's. None where there is nothing to do.
+    /// Plans the propagation of each colour of (C, H, W) = `shape` fields over `distance_m`, including `correction`. A
+    /// pixel of the fields covers `binning`² modulator pixels. Returns `None` if the distance is 0 and there is no
+    /// correction.
     ///
     /// # Errors
-    /// A distance or correction that moves light farther than can be padded.
+    /// Returns an error if the distance or the correction moves light farther than the field can be padded.
     #[doc(hidden)]
     pub fn propagators(
         &self,

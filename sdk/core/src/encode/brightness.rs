@@ -1,25 +1,26 @@
-//! Which amplitude full light stands for, and how bright a field is without its brightest points. How a scale moves
-//! from frame to frame is a session's.
+//! The amplitude that maps to full light, and the brightness of a field without its brightest points. A session
+//! controls how the scale changes from frame to frame.
 
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 
-/// How the scale of a frame is chosen.
+/// The rule that chooses the scale of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Brightness {
-    /// The amplitude that all but one of a thousand stay under, in a session smoothed over a second. What is brighter
-    /// is clipped.
+    /// The 99.9th percentile of the amplitudes, smoothed over a second in a session. Brighter values are clipped.
     #[default]
     Smoothed,
-    /// This one, always. What is brighter is clipped.
+    /// A constant scale. Brighter values are clipped.
     Fixed(f32),
-    /// Each frame's own largest amplitude: nothing is clipped, and video flickers.
+    /// The largest amplitude of each frame. Nothing is clipped, but video flickers.
     FrameMax,
 }
 
 impl Brightness {
+    /// Checks a fixed scale.
+    ///
     /// # Errors
-    /// A fixed scale that is not positive.
+    /// Returns an error if it is not positive.
     #[doc(hidden)]
     pub fn check(self) -> Result<()> {
         match self {
@@ -30,7 +31,7 @@ impl Brightness {
         }
     }
 
-    /// The scale of `field`, which a smoothed one comes to from `past`; None for the field's largest amplitude.
+    /// Returns the scale of `field`, or `None` for the field's largest amplitude. A smoothed scale starts from `past`.
     #[doc(hidden)]
     pub fn scale(self, field: &[Complex32], past: Option<Past>, percentile: &mut Percentile) -> Option<f32> {
         match self {
@@ -41,33 +42,34 @@ impl Brightness {
     }
 }
 
-/// Where a smoothed scale comes from.
+/// The starting point of a smoothed scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Past {
-    /// The scale of the frame before.
+    /// The scale of the previous frame.
     pub scale: f32,
-    /// The share of the way from there to the frame's own percentile that it goes, 0 to 1.
+    /// The share, 0 to 1, by which the scale moves from the previous one toward the frame's own percentile.
     pub share: f32,
 }
 
 /// The share of amplitudes that are clipped.
 pub const CLIPPED: f64 = 1e-3;
-/// Of so many values one is looked at. Odd, so that both colours of a checkerboard are.
+/// The sampling step in values. It is odd so that both colours of a checkerboard are sampled.
 pub const STEP: usize = 17;
-/// Bins of the histogram, over amplitudes up to [`MOST`].
+/// The number of bins in the histogram of amplitudes up to [`MOST`].
 pub const BINS: usize = 2048;
-/// What is brighter counts as this.
+/// The largest amplitude of the histogram. Brighter values are counted in the last bin.
 pub const MOST: f32 = 4.0;
-/// A picture darker than this is shown as dark, not made bright.
+/// The smallest scale. Darker images stay dark instead of being brightened.
 pub const LEAST: f32 = 0.05;
 
-/// Values of a field of `len` that are looked at, and how many of them may be clipped.
+/// Returns the number of sampled values in a field of `len` and how many of them may be clipped.
 pub fn looked_at(len: usize) -> (usize, u32) {
     let count = len.div_ceil(STEP);
     (count, (count as f64 * CLIPPED) as u32)
 }
 
-/// The amplitude that all but [`CLIPPED`] of a field stay under, to a bin, and [`LEAST`] at least.
+/// A histogram that finds the amplitude that all but [`CLIPPED`] of a field's values stay below, to the nearest bin and
+/// at least [`LEAST`].
 #[derive(Debug)]
 pub struct Percentile {
     histogram: Vec<u32>,
@@ -82,7 +84,8 @@ impl Default for Percentile {
 }
 
 impl Percentile {
-    /// That of `field`, moved to from `past`, where there is one. Allocates nothing.
+    /// Returns the percentile of `field`. If `past` is given, the result moves from the previous scale toward it.
+    /// Allocates nothing.
     pub fn scale(&mut self, field: &[Complex32], past: Option<Past>) -> f32 {
         self.histogram.fill(0);
         for value in field.iter().step_by(STEP) {

@@ -1,13 +1,13 @@
-//! The double phase method, Eq. 7: one complex value A·exp(iφ) as two phases φ ± acos A, on the
-//! two colours of a checkerboard, whose light sums to it.
+//! The double phase method, Eq. 7. It represents one complex value A·exp(iφ) by two phases φ ± acos A on the two
+//! colours of a checkerboard, whose light adds up to the value.
 
 use crate::display::response::{Response, wrap};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-/// The two phases of one value at pixel (x, y): φ + acos A where x + y is even, φ − acos A where it is
-/// odd, in \[0, 2π). A is the amplitude over `scale`, clamped to 1. A scale of 0 stands for darkness.
+/// Returns the phase of one value at pixel (x, y), in \[0, 2π): φ + acos A if x + y is even, φ − acos A if it is odd. A
+/// is the amplitude divided by `scale`, clamped to 1. A scale of 0 means darkness.
 pub fn encode_value(value: Complex32, x: usize, y: usize, scale: f32) -> f32 {
     let amplitude = if scale > 0.0 {
         (value.norm() / scale).min(1.0)
@@ -19,14 +19,14 @@ pub fn encode_value(value: Complex32, x: usize, y: usize, scale: f32) -> f32 {
     wrap(phase)
 }
 
-/// The largest |u|² of a row, 0 for an empty one.
+/// Returns the largest |u|² of a row, or 0 for an empty row.
 pub fn max_norm_sqr(row: &[Complex32]) -> f32 {
     wide!(largest(row))
 }
 
 #[inline(always)]
 fn largest(row: &[Complex32]) -> f32 {
-    // Several maxima side by side, so that it vectorises.
+    // Several parallel maxima let the loop vectorise.
     let (runs, rest) = row.as_chunks::<16>();
     let mut most = [0.0f32; 16];
     for run in runs {
@@ -38,16 +38,16 @@ fn largest(row: &[Complex32]) -> f32 {
     rest.chain(most).fold(0.0, f32::max)
 }
 
-/// [`encode_value`] on row `y` of a plane, to 1e-5 rad.
+/// Encodes row `y` of a plane like [`encode_value`], to 1e-5 rad.
 pub fn encode_row(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
     wide!(encode_run(values, y, scale, phases));
 }
 
-/// A run of row `y` that begins in an even column.
+/// Encodes a run of row `y` that begins in an even column.
 #[inline(always)]
 fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
     let inverse = if scale > 0.0 { 1.0 / scale } else { 0.0 };
-    // The sign of acos, on the two colours of the checkerboard.
+    // The sign of acos on the two colours of the checkerboard.
     let sign = if y.is_multiple_of(2) { 1.0 } else { -1.0 };
     let signs: [f32; 16] = std::array::from_fn(|x| if x % 2 == 0 { sign } else { -sign });
     let (runs, rest) = values.as_chunks::<16>();
@@ -62,8 +62,8 @@ fn encode_run(values: &[Complex32], y: usize, scale: f32, phases: &mut [f32]) {
     }
 }
 
-/// [`encode_row`] and [`Response::level`] in one sweep: phases never leave the cache. The row begins at value `first`
-/// of the stack (C, H, W).
+/// Applies [`encode_row`] and [`Response::level`] in one pass, so that phases never leave the cache. The row begins at
+/// value `first` of the stack (C, H, W).
 pub fn encode_row_levels(
     values: &[Complex32],
     y: usize,
@@ -77,17 +77,17 @@ pub fn encode_row_levels(
     )));
 }
 
-/// The phases of a row's own values, in \[0, 2π), to 1e-6 rad; 0 for the origin.
+/// Writes the phases of the values of a row, in \[0, 2π), to 1e-6 rad. The phase of 0 is 0.
 pub fn phase_row(values: &[Complex32], phases: &mut [f32]) {
     wide!(phase_run(values, phases));
 }
 
-/// [`phase_row`] and [`Response::level`] in one sweep. The row begins at value `first` of the stack (C, H, W).
+/// Applies [`phase_row`] and [`Response::level`] in one pass. The row begins at value `first` of the stack (C, H, W).
 pub fn phase_row_levels(values: &[Complex32], response: &Response, first: usize, levels: &mut [u8]) {
     wide!(levels_by(values, response, first, levels, phase_run));
 }
 
-/// The levels of the phases that `phases_of` makes of runs of a row.
+/// Writes the levels of the phases that `phases_of` computes for runs of a row.
 #[inline(always)]
 fn levels_by(
     values: &[Complex32],
@@ -96,7 +96,7 @@ fn levels_by(
     levels: &mut [u8],
     phases_of: impl Fn(&[Complex32], &mut [f32]),
 ) {
-    /// Even, so that each run starts on the colour of the checkerboard that its row starts on.
+    /// An even length starts each run on the same colour of the checkerboard as its row.
     const RUN: usize = 256;
     let mut phases = [0.0; RUN];
     let runs = values.chunks(RUN).zip(levels.chunks_mut(RUN));
@@ -114,21 +114,21 @@ fn phase_run(values: &[Complex32], phases: &mut [f32]) {
     }
 }
 
-/// One value's phase; without branches, so that loops over it vectorise.
+/// Returns the phase of one value. It has no branches, so loops over it vectorise.
 #[inline(always)]
 fn encode_one(value: Complex32, inverse: f32, sign: f32) -> f32 {
     let amplitude = (value.norm_sqr().sqrt() * inverse).min(1.0);
     one_turn(atan2(value.im, value.re) + sign * acos(amplitude))
 }
 
-/// A phase from [−3π/2, 3π/2] in \[0, 2π).
+/// Maps a phase from [−3π/2, 3π/2] to \[0, 2π).
 #[inline(always)]
 fn one_turn(phase: f32) -> f32 {
     let turned = if phase < 0.0 { phase + TAU } else { phase };
     if turned < TAU { turned } else { 0.0 }
 }
 
-/// acos of a number in \[0, 1], to 1e-6: √(1 − a) times a polynomial (Abramowitz and Stegun, 4.4.46).
+/// Returns the acos of a number in \[0, 1] to 1e-6: √(1 − a) times a polynomial (Abramowitz and Stegun, 4.4.46).
 #[inline(always)]
 fn acos(a: f32) -> f32 {
     const C: [f32; 8] = [
@@ -145,7 +145,7 @@ fn acos(a: f32) -> f32 {
     (1.0 - a).max(0.0).sqrt() * polynomial
 }
 
-/// The angle of (x, y) to 1e-6, 0 for the origin: a polynomial on the octant (Abramowitz and Stegun,
+/// Returns the angle of (x, y) to 1e-6, or 0 for the origin, from a polynomial on the octant (Abramowitz and Stegun,
 /// 4.4.49) and reflections.
 #[inline(always)]
 fn atan2(y: f32, x: f32) -> f32 {
@@ -207,7 +207,7 @@ mod tests {
         assert_eq!(wrap(-1e-12), 0.0);
     }
 
-    /// A table whose curves differ from node to node.
+    /// Returns a table whose curves differ from node to node.
     fn per_pixel((h, w): (usize, usize)) -> Response {
         let (rows, columns) = per_pixel::nodes(h, w, 20);
         let steepness = |node: usize| 20.0 + (node % 11) as f32;
@@ -243,7 +243,7 @@ mod tests {
             for (i, (value, phase)) in field.iter().zip(&phase).enumerate() {
                 let exact = encode_value(*value, i % w, i / w % h, scale);
                 let apart = (exact - phase).abs();
-                // acos is steep at full light, where the amplitude's own rounding is worth 1e-3.
+                // acos is steep at full light, where rounding the amplitude changes it by up to 1e-3.
                 let most = if value.norm() > 0.999 * scale && scale > 0.0 {
                     1e-3
                 } else {

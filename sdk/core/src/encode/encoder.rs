@@ -1,5 +1,5 @@
-//! The plan from fields to phases or levels: what needs the whole field first, then row by row in one sweep over
-//! memory.
+//! Plans that turn fields into phases or levels. Filters that need the whole field run first; the remaining work is one
+//! pass over memory, row by row.
 
 use super::dark_threshold::DarkThreshold;
 use super::encoding::{Prefilter, PrefilterScratch};
@@ -14,7 +14,7 @@ use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-/// A plan for one shape, target and encoding. Immutable; shared between threads.
+/// A plan for one shape, target and encoding. It is immutable and can be shared between threads.
 pub struct Encoder {
     colours: usize,
     height: usize,
@@ -22,7 +22,7 @@ pub struct Encoder {
     prefilter: Prefilter,
     dark_threshold: f32,
     local: Option<Local>,
-    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, (usize, usize))>,
     response: Response,
 }
@@ -32,12 +32,12 @@ struct Local {
     steps: usize,
 }
 
-/// Working memory of an [`Encoder`] for one call at a time.
+/// The working memory of an [`Encoder`] for one call at a time.
 pub struct EncoderScratch {
     prefilter: Option<PrefilterScratch>,
-    /// The field before a filter that needs all of it, for the correction.
+    /// The field before a whole-field filter, used by the correction.
     wanted: Vec<Complex32>,
-    /// For each part of a plane that a thread takes.
+    /// Working memory for each part of a plane that a thread processes.
     parts: Vec<PartScratch>,
     /// The largest |u|² of each row.
     most: Vec<f32>,
@@ -45,7 +45,7 @@ pub struct EncoderScratch {
 }
 
 impl EncoderScratch {
-    /// Has fields end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         if let Some(prefilter) = &mut self.prefilter {
             prefilter.set_cancel(cancel);
@@ -60,28 +60,29 @@ struct PartScratch {
     row: Vec<Complex32>,
 }
 
-/// What is done to a field row by row.
+/// The operations that are applied to a field row by row.
 #[derive(Clone, Copy)]
 struct Work<'a> {
     dark_threshold: Option<DarkThreshold>,
-    /// With 1 over the scale.
+    /// The local correction and the reciprocal of the scale.
     local: Option<(&'a Local, f32)>,
 }
 
-/// A row on its way to phases.
+/// A processed row before its conversion to phases.
 enum Row<'a> {
-    /// Values that double phase shows.
+    /// Values to encode by double phase.
     Field(&'a [Complex32]),
-    /// Values whose own phase is shown.
+    /// Corrected values, whose own phase is displayed.
     Corrected(&'a [Complex32]),
 }
 
 impl Encoder {
-    /// Plans the encoding of (C, H, W) = `shape` fields at the modulator of `target`: after its filter a field is
-    /// divided by the light that falls there.
+    /// Plans the encoding of fields of (C, H, W) = `shape` at the modulator of `target`. After filtering, a field is
+    /// divided by the light that falls on the modulator.
     ///
     /// # Errors
-    /// An empty plane, a parameter out of its range, a network that is no pre-filter, or a table for another modulator.
+    /// Returns an error if a plane is empty, a parameter is out of its range, a network is not a pre-filter, or a table
+    /// is for another modulator.
     pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
         let (height, width) = shape;
         if height == 0 || width == 0 {
@@ -108,7 +109,7 @@ impl Encoder {
         })
     }
 
-    /// Working memory for one call at a time, for the threads of the current pool.
+    /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> EncoderScratch {
         let prefilter = self.prefilter.scratch();
         let wanted = match (&prefilter, &self.local) {
@@ -132,12 +133,12 @@ impl Encoder {
         }
     }
 
-    /// Encodes `field`, a stack (C, H, W), into `phase`, (C, H, W) in \[0, 2π); gives the scale it used, the amplitude
-    /// that full light stands for: `scale`, or the largest amplitude of the filtered field. `field` is worked on: what
-    /// it holds afterwards means nothing. Allocates nothing.
+    /// Encodes `field`, a stack (C, H, W), into `phase`, (C, H, W) in \[0, 2π). Returns the amplitude that maps to full
+    /// light: `scale`, or the largest amplitude of the filtered field. Afterwards the contents of `field` are
+    /// unspecified. Allocates nothing.
     ///
     /// # Panics
-    /// If `field` or `phase` has not C·H·W values.
+    /// Panics if `field` or `phase` does not have C·H·W values.
     pub fn encode(
         &self,
         field: &mut [Complex32],
@@ -159,10 +160,10 @@ impl Encoder {
         scale
     }
 
-    /// [`Self::encode`] straight to the target's levels.
+    /// Encodes like [`Self::encode`], directly to the target's levels.
     ///
     /// # Panics
-    /// If `field` or `levels` has not C·H·W values.
+    /// Panics if `field` or `levels` does not have C·H·W values.
     pub fn encode_levels(
         &self,
         field: &mut [Complex32],
@@ -183,10 +184,10 @@ impl Encoder {
         scale
     }
 
-    /// The target's levels of `phases`, (C, H, W) in \[0, 2π).
+    /// Writes the target's levels of `phases`, (C, H, W) in \[0, 2π).
     ///
     /// # Panics
-    /// If `phases` or `levels` has not C·H·W values.
+    /// Panics if `phases` or `levels` does not have C·H·W values.
     pub fn levels(&self, phases: &[f32], levels: &mut [u8]) {
         assert!(phases.len() == self.colours * self.height * self.width && levels.len() == phases.len());
         let rows = phases
@@ -197,7 +198,7 @@ impl Encoder {
     }
 
     fn work(&self, scale: f32) -> Work<'_> {
-        // In darkness there is nothing to correct.
+        // Darkness needs no correction.
         let local = self.local.as_ref().filter(|_| scale > 0.0);
         Work {
             dark_threshold: DarkThreshold::new(self.dark_threshold, scale),
@@ -205,7 +206,7 @@ impl Encoder {
         }
     }
 
-    /// The filters that need the whole field at once, and the scale.
+    /// Applies the filters that need the whole field and returns the scale.
     fn prepare(&self, field: &mut [Complex32], scale: Option<f32>, scratch: &mut EncoderScratch) -> f32 {
         let plane = self.height * self.width;
         assert_eq!(field.len(), self.colours * plane);
@@ -232,8 +233,8 @@ impl Encoder {
         })
     }
 
-    /// Hands each row of `field`, worked on, to `then`: its index in the stack, what it is, and its part of `out`,
-    /// which is cut into C·H parts of one size.
+    /// Processes each row of `field` and calls `then` with its index in the stack, the row and its part of `out`. `out`
+    /// is divided into C·H parts of equal size.
     fn rows<T: Send>(
         &self,
         field: &[Complex32],

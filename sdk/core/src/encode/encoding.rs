@@ -1,5 +1,5 @@
-//! The encodings: what each is, its name, and the plan of its filter. Dark, light, correction and levels are the same
-//! for all, and [`super::Encoder`]'s.
+//! The encodings, their names and the plans of their filters. The dark threshold, illumination, correction and levels
+//! are common to all encodings and belong to [`super::Encoder`].
 
 pub mod anti_alias;
 pub mod band_limit;
@@ -16,25 +16,25 @@ use deep::{Deep, DeepScratch};
 use num_complex::Complex32;
 use std::sync::Arc;
 
-/// A way from a field to phases.
+/// A method of encoding a field as phases.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Encoding {
-    /// Double phase on the field as it is, Eq. 7.
+    /// Double phase on the unfiltered field, Eq. 7.
     DoublePhase,
-    /// AA-DPM: a small Gaussian blur first. `sigma` in pixels over `width` taps (odd).
+    /// AA-DPM: double phase after a small Gaussian blur.
     AntiAlias {
-        /// Standard deviation, pixels.
+        /// The standard deviation in pixels.
         sigma: f32,
-        /// Taps, an odd number.
+        /// The number of taps, which is odd.
         width: usize,
     },
-    /// BL-DPM: high diagonal frequencies cut first; larger `k` keeps more.
+    /// BL-DPM: double phase after cutting high diagonal frequencies. A larger `k` keeps more.
     BandLimit {
-        /// The bound of |tan(πfx)·tan(πfy)|, f in cycles a pixel.
+        /// The bound of |tan(πfx)·tan(πfy)|, with f in cycles per pixel.
         k: f32,
     },
-    /// DDPM: a pre-filter network first, trained for the modulator's offset.
+    /// DDPM: double phase after a pre-filter network that was trained for the modulator's offset.
     Deep(Arc<Network>),
 }
 
@@ -44,7 +44,7 @@ impl Encoding {
     /// BL-DPM as published: k = 1.
     pub const BAND_LIMIT: Self = Encoding::BandLimit { k: 1.0 };
 
-    /// Those that need no network, as published: what they are called, what they are, themselves.
+    /// The published encodings that need no network, each with its name and description.
     pub const BY_NAME: &[(&str, &str, Encoding)] = &[
         ("double", "Double phase", Encoding::DoublePhase),
         (
@@ -59,7 +59,7 @@ impl Encoding {
         ),
     ];
 
-    /// Whether it was trained on the phase that a network's field has.
+    /// Returns whether the encoding was trained on the phase of a network's field.
     #[doc(hidden)]
     pub fn keeps_phase(&self) -> bool {
         matches!(self, Encoding::Deep(_))
@@ -70,19 +70,19 @@ impl Encoding {
 pub(super) enum Prefilter {
     None,
     AntiAlias(AntiAlias),
-    /// With the values of a plane.
+    /// A band limit and the number of values in a plane.
     BandLimit(BandLimit, usize),
     Deep(Box<Deep>),
 }
 
-/// Working memory of a [`Prefilter`] that needs the whole field.
+/// The working memory of a [`Prefilter`] that needs the whole field.
 pub(super) enum PrefilterScratch {
     Spectrum(ConvolveScratch),
     Deep(DeepScratch),
 }
 
 impl PrefilterScratch {
-    /// Has a network end where `cancel` is requested.
+    /// Makes a network stop early once `cancel` is requested.
     pub(super) fn set_cancel(&mut self, cancel: &Cancel) {
         if let PrefilterScratch::Deep(scratch) = self {
             scratch.set_cancel(cancel);
@@ -91,7 +91,7 @@ impl PrefilterScratch {
 }
 
 impl Prefilter {
-    /// Plans the filter of `encoding` for (H, W) fields of the colours of `display`.
+    /// Plans the filter of `encoding` for fields of (H, W) and the colours of `display`.
     pub(super) fn new((height, width): (usize, usize), encoding: &Encoding, display: &Display) -> Result<Self> {
         Ok(match encoding {
             Encoding::DoublePhase => Prefilter::None,
@@ -104,7 +104,7 @@ impl Prefilter {
         })
     }
 
-    /// None where nothing needs the whole field.
+    /// Returns working memory, or `None` if the filter does not need the whole field.
     pub(super) fn scratch(&self) -> Option<PrefilterScratch> {
         match self {
             Prefilter::None | Prefilter::AntiAlias(_) => None,
@@ -113,7 +113,7 @@ impl Prefilter {
         }
     }
 
-    /// A blur, which is done row by row.
+    /// Returns the blur if there is one. It is applied row by row.
     pub(super) fn blur(&self) -> Option<&AntiAlias> {
         match self {
             Prefilter::AntiAlias(blur) => Some(blur),
@@ -121,7 +121,7 @@ impl Prefilter {
         }
     }
 
-    /// Filters `field`, (C, H, W), by what needs all of it.
+    /// Applies the filters that need the whole field to `field`, (C, H, W).
     pub(super) fn filter(&self, field: &mut [Complex32], scratch: &mut PrefilterScratch) {
         match (self, scratch) {
             (Prefilter::BandLimit(plan, plane), PrefilterScratch::Spectrum(scratch)) => {

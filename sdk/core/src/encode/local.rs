@@ -1,18 +1,18 @@
-//! Local correction of a phase map: what double phase shows behind the aperture is drawn toward the field that is
-//! wanted, by the aperture's filter alone. No propagation, no transform, any offset.
+//! Local correction of phases. It moves the image of double phase behind the aperture toward the target field with a
+//! short filter that approximates the aperture. It needs no propagation and no transform, and works for any offset.
 //!
-//! With e the phasors that the modulator shows, |e| = 1, L the light that falls on it, and g the wanted field over the
-//! scale, a step is
+//! Let e be the displayed phasors, |e| = 1, L the light that falls on the modulator, and g the target field divided by
+//! the scale. A step computes
 //!
 //!   z = L·e + B∗(g − L·e),  e' = z/|z|,
 //!
-//! the projection of Gerchberg and Saxton (Optik 35, 237, 1972) with a short filter B in the aperture's place, which
-//! cuts off no more than the corners of the spectrum's square, where the checkerboard's copy of the picture lies: its
-//! circle in 7×7 taps ([`LocalFilter`]). At the frame's edges g − L·e is mirrored about the last pixel,
-//! which is not repeated: so the checkerboard goes on.
+//! the projection of Gerchberg and Saxton (Optik 35, 237, 1972) with a short filter B in place of the aperture. B
+//! approximates the aperture's circle with 7×7 taps ([`LocalFilter`]). It removes no more than the corners of the
+//! square spectrum, where the checkerboard's copy of the image lies. At the frame's edges g − L·e is mirrored about the
+//! last pixel without repeating it, which continues the checkerboard.
 //!
-//! Rows flow through all steps at once: a step's row needs three rows of the step before on either side, so a part of
-//! the frame keeps seven rows a step and begins that much earlier.
+//! Rows pass through all steps at once. A step's row needs three rows of the previous step on either side, so a part of
+//! the frame keeps seven rows for each step and begins three rows earlier for each step.
 
 use super::start::{Start, StartScratch};
 use num_complex::{Complex32, Complex64};
@@ -20,32 +20,32 @@ use phasefront_kernels::wide;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Rows and columns to either side that a step looks at.
+/// The number of rows and columns to either side that a step reads.
 pub(super) const REACH: usize = 3;
-/// Rows that a step keeps of the one before.
+/// The number of rows that a step keeps of the previous one.
 const KEPT: usize = 2 * REACH + 1;
 
-/// Most steps. After the second they bring nothing.
+/// The largest number of steps. Steps after the second bring no gain.
 pub(super) const MAX_STEPS: usize = 8;
 
-/// B in 7×7 taps: the aperture's circle by least squares, with 1 at frequency 0 and 0 at (½, ½). The zero counts most:
-/// there stands the light of the checkerboard, 10⁵ times the spectrum's mean.
+/// B in 7×7 taps: a least-squares fit of the aperture's circle with the values 1 at frequency 0 and 0 at (½, ½). The
+/// zero matters most because the light of the checkerboard is there, 10⁵ times the spectrum's mean.
 #[derive(Debug, Clone, Copy)]
 pub struct LocalFilter {
-    /// At (dy, dx), alike in all quadrants and about the diagonals.
+    /// The taps at (dy, dx), symmetric in all quadrants and about the diagonals.
     taps: [[f32; REACH + 1]; REACH + 1],
 }
 
 impl LocalFilter {
-    /// At (dy, dx), from 0 to 3 each.
+    /// Returns the taps at (dy, dx), each from 0 to 3.
     pub fn taps(&self) -> &[[f32; REACH + 1]; REACH + 1] {
         &self.taps
     }
 
-    /// Of an aperture of `radius`, 1 reaching the Nyquist frequency.
+    /// Returns the filter of an aperture of `radius`, where 1 reaches the Nyquist frequency.
     ///
-    /// The circle's own taps are k(ρ) = R·J₁(πRρ)/(2ρ); what they lack at the two frequencies is added as a constant
-    /// and as a checkerboard, which is least in their squares.
+    /// The circle's own taps are k(ρ) = R·J₁(πRρ)/(2ρ). Adding a constant and a checkerboard corrects the values at the
+    /// two frequencies with the smallest sum of squares.
     pub fn of_aperture(radius: f64) -> Self {
         let circle = |y: usize, x: usize| match (x * x + y * y) as f64 {
             0.0 => PI * radius * radius / 4.0,
@@ -68,29 +68,29 @@ impl LocalFilter {
     }
 }
 
-/// What a part of a plane is corrected toward.
+/// The target of the correction for a part of a plane.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted<'a> {
-    /// (H, W), as the modulator's field shall be.
+    /// The target field at the modulator, (H, W).
     pub(super) plane: &'a [Complex32],
-    /// 1 over the amplitude that full light stands for.
+    /// The reciprocal of the amplitude that maps to full light.
     pub(super) per_scale: f32,
 }
 
-/// Working memory of a part of a plane.
+/// The working memory of a part of a plane.
 pub(super) struct LocalScratch {
-    /// For each step, the rows of g − L·e in a ring, with REACH empty columns on either side.
+    /// The rows of g − L·e of each step in a ring, with REACH empty columns on either side.
     rings: Vec<Complex32>,
-    /// Sums of the rows 0, 1, 2, 3 above and below.
+    /// Sums of the rows 0, 1, 2 and 3 above and below.
     sums: Vec<Complex32>,
-    /// The start's row, and a step's.
+    /// A row of the starting field or of a step.
     row: Vec<Complex32>,
-    /// The light on a row.
+    /// The light that falls on a row.
     light: Vec<f32>,
 }
 
 impl LocalScratch {
-    /// For `steps` ≥ 1 of rows of `width`.
+    /// Creates working memory for `steps` ≥ 1 with rows of `width`.
     pub(super) fn new(steps: usize, width: usize) -> Self {
         let padded = width + 2 * REACH;
         LocalScratch {
@@ -103,8 +103,8 @@ impl LocalScratch {
 }
 
 impl LocalFilter {
-    /// Corrects rows `rows` of a plane that begins as `start`, and hands each to `then`: its index and the field whose
-    /// phase is shown.
+    /// Corrects the rows `rows` of a plane that begins as `start`. Calls `then` with the index of each row and the
+    /// field whose phase is displayed.
     pub(super) fn correct(
         &self,
         rows: Range<usize>,
@@ -137,7 +137,7 @@ impl LocalFilter {
                 mirror_ends(to);
             }
             for step in 1..=steps {
-                // What the rows that are asked for need of this step.
+                // The distance from the requested rows within which this step's rows are needed.
                 let reach = REACH * (steps - step);
                 let Some(y) = front.checked_sub(REACH * step) else {
                     break;
@@ -166,8 +166,8 @@ impl LocalFilter {
         }
     }
 
-    /// z = g − d + B∗d of a row, d = g − L·e being that of the row and of those around it: [above, below], the nearest
-    /// first.
+    /// Computes z = g − d + B∗d for a row, where d = g − L·e. `own` is d of the row; `around` is d of the rows [above,
+    /// below], nearest first.
     #[inline(always)]
     fn draw(
         &self,
@@ -211,14 +211,14 @@ impl LocalFilter {
     }
 }
 
-/// The pixel of `count` that stands for `at`, which may lie outside: mirrored about the first and the last.
+/// Returns the pixel of `count` for position `at`, mirrored about the first and last pixel if it is outside.
 fn mirrored(at: isize, count: usize) -> usize {
     let period = 2 * (count as isize - 1).max(1);
     let at = at.rem_euclid(period);
     at.min(period - at).min(count as isize - 1) as usize
 }
 
-/// Fills the columns outside of a row.
+/// Fills the padding columns of a row by mirroring.
 fn mirror_ends(row: &mut [Complex32]) {
     let width = row.len() - 2 * REACH;
     for i in 0..REACH as isize {
@@ -229,7 +229,8 @@ fn mirror_ends(row: &mut [Complex32]) {
     }
 }
 
-/// g − L·e of a row whose phasors are those of double phase: (f/|f|)·(c ± i·√(1 − c²)), c = |f| over the scale.
+/// Computes g − L·e for a row of double phase, whose phasors are (f/|f|)·(c ± i·√(1 − c²)) with c = |f| divided by the
+/// scale.
 #[inline(always)]
 fn begin(field: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32, sign: f32, to: &mut [Complex32]) {
     const RUN: usize = 16;
@@ -252,14 +253,14 @@ fn begin(field: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32,
     }
 }
 
-/// What is missing at a pixel. Where that is no number nothing is, so that its neighbours are corrected all the same.
+/// Returns the difference at a pixel, or 0 if it is not finite, so that the pixel's neighbours are still corrected.
 #[inline(always)]
 fn counted(re: f32, im: f32) -> Complex32 {
     let is = re * re + im * im < f32::INFINITY;
     Complex32::new(if is { re } else { 0.0 }, if is { im } else { 0.0 })
 }
 
-/// g − L·z/|z| of a row.
+/// Computes g − L·z/|z| for a row.
 #[inline(always)]
 fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f32, to: &mut [Complex32]) {
     let values = drawn.iter().zip(goal).zip(light);
@@ -270,9 +271,9 @@ fn project(drawn: &[Complex32], goal: &[Complex32], light: &[f32], per_scale: f3
     }
 }
 
-/// The same by sums over whole planes in f64: the oracle. `start`, (H, W), is what double phase begins with, divided by
-/// the light; `goal` is what shall be shown, both over the scale; `light` falls on each pixel. Gives z of the last
-/// step.
+/// Computes the correction in f64 with sums over whole planes, as the oracle for tests. `start`, (H, W), is the input
+/// of double phase divided by the light, and `goal` is the target field, both divided by the scale. `light` falls on
+/// each pixel. Returns z of the last step.
 pub fn reference(
     filter: &LocalFilter,
     (height, width): (usize, usize),
@@ -329,7 +330,7 @@ mod tests {
         }
     }
 
-    /// Its taps are those of the circle, apart from what makes the two frequencies right.
+    /// Checks that the taps are those of the circle apart from the correction of the two frequencies.
     #[test]
     fn the_filter_is_the_circle_in_few_taps() {
         let taps = LocalFilter::of_aperture(1.0).taps;

@@ -1,14 +1,14 @@
-//! Correction of a phase map at the midpoint: the displayed wave is taken there, drawn toward the wanted field, and
-//! taken back. Four transforms a colour and step. In video a pixel whose field stands still goes on from the frame
-//! before, so that one step a frame comes to where many lead.
+//! Correction of phases at the midpoint. Each step propagates the displayed wave to the midpoint, moves it toward the
+//! target field and propagates it back, with four transforms for each colour. In video, a pixel whose field did not
+//! change continues from the previous frame, so one step for each frame converges like many steps.
 //!
-//! With e the phasors that the modulator shows, L the light that falls on it, K the way to the midpoint (the aperture,
-//! and propagation back over the offset) and T the wanted field there over the scale, a step is
+//! Let e be the displayed phasors, L the light that falls on the modulator, K the path to the midpoint (the aperture
+//! and propagation back over the offset), and T the target field at the midpoint divided by the scale. A step computes
 //!
 //!   u = K·L·e,  r = λ·T + (1 − λ)·|T|·u/|u| − u,  z = L·e + γ·Kᴴ·r,  e' = z/|z|.
 //!
-//! λ = 0 asks for the amplitude alone, as Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
-//! focus; λ = 1 asks for the wave, whose phase the eye does not see.
+//! λ = 0 corrects only the amplitude, as in Gerchberg and Saxton (Optik 35, 237, 1972), and leaves other depths out of
+//! focus. λ = 1 corrects the whole wave, including the phase, which the eye does not see.
 
 use crate::display::illumination::Illumination;
 use crate::display::target::Target;
@@ -21,35 +21,34 @@ use num_complex::{Complex32, Complex64};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// The wave's share of what is asked for, the rest being the amplitude's. Chosen on validation scenes by the focal
-/// stack.
+/// λ, the weight of the wave against the amplitude alone. Chosen on validation scenes by the focal stack.
 pub const WAVE: f32 = 0.5;
-/// How far a step goes.
+/// γ, the length of a step.
 pub const GAIN: f32 = 1.5;
-/// A pixel stands still whose field changes by up to so much, of full light.
+/// The largest change of a pixel's field, as a share of full light, at which the pixel counts as unchanged.
 pub const STILL: f32 = 0.1;
-/// Most steps. After the third they bring little.
+/// The largest number of steps. Steps after the third bring little gain.
 pub(super) const MAX_STEPS: usize = 100;
 
-/// A plan for one shape and target. Immutable; shared between threads.
+/// A plan for one shape and target. It is immutable and can be shared between threads.
 pub struct MidpointSteps {
     height: usize,
     width: usize,
     steps: usize,
     aperture_radius: f64,
-    /// From the modulator to the midpoint, and to the modulator.
+    /// The propagation from the modulator to the midpoint, and from there to the modulator.
     back: Vec<Propagator>,
     forth: Vec<Propagator>,
-    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, (usize, usize))>,
 }
 
-/// Working memory of [`MidpointSteps`] for one call at a time.
+/// The working memory of [`MidpointSteps`] for one call at a time.
 pub struct MidpointScratch {
     wave: ConvolveScratch,
-    /// The field at the modulator, all colours: of this frame or, between frames, of the one before.
+    /// The field at the modulator in all colours, of this frame or, between frames, of the previous one.
     field: Vec<Complex32>,
-    /// The phases of the frame before, all colours: NaN where there is none that this one can begin with.
+    /// The phases of the previous frame in all colours. NaN where this frame cannot start from them.
     before: Vec<f32>,
     /// T of one colour.
     wanted: Vec<Complex32>,
@@ -63,21 +62,21 @@ pub struct MidpointScratch {
 }
 
 impl MidpointScratch {
-    /// Has steps end where `cancel` is requested.
+    /// Makes the steps stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
     }
 }
 
 impl MidpointSteps {
-    /// Plans `steps` for (C, H, W) = `shape` fields at the modulator of `target`.
+    /// Plans `steps` for fields of (C, H, W) = `shape` at the modulator of `target`.
     ///
     /// # Errors
-    /// An offset or correction that cannot be planned.
+    /// Returns an error if the offset or correction cannot be planned.
     pub fn new(shape: (usize, usize), target: &Target, steps: usize) -> Result<Self> {
         let offset_m = target.display.offset_m();
         let reversed = target.correction.as_ref().map(Aberration::reversed);
-        // Where there is nothing to do the aperture still is.
+        // A path without offset and correction still has the aperture.
         let ways = |distance_m: f64, correction: Option<&Aberration>| match target
             .propagators(shape, 1, distance_m, correction)?
         {
@@ -98,17 +97,17 @@ impl MidpointSteps {
         })
     }
 
-    /// From the modulator to the midpoint, each colour.
+    /// Returns the propagation from the modulator to the midpoint for each colour.
     pub fn back(&self) -> &[Propagator] {
         &self.back
     }
 
-    /// From the midpoint to the modulator, each colour.
+    /// Returns the propagation from the midpoint to the modulator for each colour.
     pub fn forth(&self) -> &[Propagator] {
         &self.forth
     }
 
-    /// Working memory for one call at a time, for the threads of the current pool.
+    /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> MidpointScratch {
         let plane = || vec![Complex32::ZERO; self.height * self.width];
         let values = self.back.len() * self.height * self.width;
@@ -124,11 +123,11 @@ impl MidpointSteps {
         }
     }
 
-    /// Keeps `field`, (C, H, W) at the modulator, neither filtered nor scaled: what [`Self::correct`] corrects toward.
-    /// Of a frame that follows one of scale `past`, pixels that stand still will begin with the phases they had.
+    /// Stores `field`, (C, H, W) at the modulator, neither filtered nor scaled, as the target of [`Self::correct`]. If
+    /// the frame follows one of scale `past`, its unchanged pixels start from their previous phases.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values.
+    /// Panics if `field` does not have C·H·W values.
     pub fn keep(&self, field: &[Complex32], past: Option<f32>, scratch: &mut MidpointScratch) {
         assert_eq!(field.len(), scratch.field.len());
         let bound = past.map_or(-1.0, |scale| (STILL * scale).powi(2));
@@ -144,16 +143,16 @@ impl MidpointSteps {
         });
     }
 
-    /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the field that was kept, of which amplitude `scale` stands for
-    /// full light. A colour whose field has values that are no numbers is left as it is. Allocates nothing.
+    /// Corrects `phases`, (C, H, W) in \[0, 2π), toward the stored field. `scale` is the amplitude that maps to full
+    /// light. A colour whose field contains NaN or infinity stays unchanged. Allocates nothing.
     ///
     /// # Panics
-    /// If `phases` has not C·H·W values.
+    /// Panics if `phases` does not have C·H·W values.
     pub fn correct(&self, scale: f32, phases: &mut [f32], scratch: &mut MidpointScratch) {
         assert_eq!(phases.len(), scratch.field.len());
         if scale <= 0.0 {
             scratch.before.fill(f32::NAN);
-            return; // In darkness there is nothing to correct.
+            return; // Darkness needs no correction.
         }
         let rows = phases
             .par_chunks_exact_mut(self.width)
@@ -188,7 +187,7 @@ impl MidpointSteps {
         wanted.copy_from_slice(&field[colour * phases.len()..][..phases.len()]);
         self.back[colour].propagate(wanted, wave);
         if !wanted.par_iter().all(|value| value.is_finite()) {
-            return; // Transforms would spread it over the frame.
+            return; // A transform would spread such a value over the whole frame.
         }
         let rows =
             (shown.par_chunks_exact_mut(width).zip(phases.par_chunks_exact(width))).zip(light.par_chunks_exact(width));
@@ -215,7 +214,7 @@ impl MidpointSteps {
     }
 }
 
-/// r in the place of u.
+/// Replaces u by r.
 #[inline(always)]
 fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
     for (u, wanted) in u.iter_mut().zip(wanted) {
@@ -228,7 +227,7 @@ fn missing_of(u: &mut [Complex32], wanted: &[Complex32], per_scale: f32) {
     }
 }
 
-/// L·e' in the place of L·e.
+/// Replaces L·e by L·e'.
 #[inline(always)]
 fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
     for ((shown, missing), light) in shown.iter_mut().zip(missing).zip(light) {
@@ -239,8 +238,8 @@ fn step_on(shown: &mut [Complex32], missing: &[Complex32], light: &[f32]) {
     }
 }
 
-/// The same in f64, value by value: the oracle. `to_midpoint` is K and `to_modulator` Kᴴ; `wanted` is T; `shown` is L·e
-/// of the start, `light` L. Gives L·e of the last step.
+/// Computes the correction in f64, value by value, as the oracle for tests. `to_midpoint` is K and `to_modulator` is
+/// Kᴴ; `wanted` is T, `shown` the initial L·e and `light` L. Returns L·e of the last step.
 pub fn reference(
     to_midpoint: impl Fn(&[Complex64]) -> Vec<Complex64>,
     to_modulator: impl Fn(&[Complex64]) -> Vec<Complex64>,

@@ -1,5 +1,5 @@
-//! What double phase begins with, row by row: the field with its dark drawn to the real axis, blurred, divided by the
-//! light.
+//! The input of double phase, computed row by row: the field with the dark threshold applied, blurred and divided by
+//! the light.
 
 use super::anti_alias::AntiAlias;
 use super::dark_threshold::DarkThreshold;
@@ -7,26 +7,26 @@ use crate::display::illumination::Illumination;
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 
-/// One plane of a field and what is done to it.
+/// One plane of a field and the operations on it.
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
-    /// (H, W).
+    /// The plane, (H, W).
     pub(super) plane: &'a [Complex32],
     pub(super) height: usize,
-    /// 0 red, 1 green, 2 blue; of one laser 0.
+    /// 0 red, 1 green, 2 blue. 0 for one laser.
     pub(super) colour: usize,
     pub(super) dark_threshold: Option<DarkThreshold>,
     pub(super) blur: Option<&'a AntiAlias>,
-    /// The light, with (H, W) of the modulator.
+    /// The light and the modulator's (H, W).
     pub(super) light: Option<(&'a Illumination, (usize, usize))>,
 }
 
-/// Working memory of the rows of a part of a plane.
+/// The working memory for the rows of a part of a plane.
 pub(super) struct StartScratch {
-    /// Rows blurred along themselves, in a ring.
+    /// A ring of rows that are blurred along themselves.
     ring: Vec<Complex32>,
     damped: Vec<Complex32>,
-    /// The next row to be blurred along itself.
+    /// The next row to blur along itself.
     next: usize,
 }
 
@@ -40,14 +40,14 @@ impl StartScratch {
         }
     }
 
-    /// Before rows from `first` on.
+    /// Prepares for rows starting at `first`.
     pub(super) fn begin(&mut self, start: &Start<'_>, first: usize) {
         self.next = first.saturating_sub(start.blur.map_or(0, AntiAlias::half));
     }
 }
 
 impl Start<'_> {
-    /// Row `y` into `out`. Rows are asked for in order.
+    /// Writes row `y` into `out`. Rows must be requested in order.
     pub(super) fn row(&self, y: usize, out: &mut [Complex32], scratch: &mut StartScratch) {
         let width = out.len();
         let source = |y: usize| &self.plane[y * width..][..width];
@@ -76,7 +76,7 @@ impl Start<'_> {
         }
     }
 
-    /// The light that falls on row `y`.
+    /// Writes the light that falls on row `y` into `row`.
     pub(super) fn light_row(&self, y: usize, row: &mut [f32]) {
         if let Some((light, modulator)) = self.light {
             light.light_row(row, self.colour * self.height + y, self.height, modulator);

@@ -1,53 +1,53 @@
-//! Colour images as cameras give them: formats, and what a whole image of each is.
+//! Camera colour images: their formats and the check that an image is complete.
 //!
-//! How they become amplitudes is [`super::convert`]'s.
+//! [`super::convert`] converts them to amplitudes.
 
 use super::plane::Plane;
 use crate::runtime::error::{Error, Result};
 
-/// Most pixels of a camera image: over this it is refused rather than slow. 4K video and 12-megapixel stills are
-/// under it, 8K is over.
+/// The largest number of pixels of a camera image. Larger images are refused because they would be slow. 4K video and
+/// 12-megapixel stills are below the limit, 8K is above it.
 pub const MAX_SOURCE_PIXELS: usize = 1 << 24;
 
-/// The matrix between luma, chroma and colour.
+/// The matrix that converts luma and chroma to colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum YuvMatrix {
-    /// ITU-R BT.601: standard definition, JPEG, most Android cameras.
+    /// ITU-R BT.601, for standard definition, JPEG and most Android cameras.
     #[default]
     Bt601,
-    /// ITU-R BT.709: high definition.
+    /// ITU-R BT.709, for high definition.
     Bt709,
 }
 
-/// What the numbers of luma and chroma mean.
+/// The encoding of luma and chroma.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct YuvEncoding {
-    /// The matrix.
+    /// The conversion matrix.
     pub matrix: YuvMatrix,
-    /// Whether luma runs over 16..=235 and chroma over 16..=240 ("video range"), not both over 0..=255.
+    /// Whether luma spans 16..=235 and chroma 16..=240 ("video range") instead of 0..=255 for both.
     pub video_range: bool,
 }
 
-/// How a camera image lies in memory. Each plane has its own strides.
+/// The memory layout of a camera image. Each plane has its own strides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ColourFormat {
-    /// One plane; bytes red, green, blue, alpha (which is not looked at).
+    /// One plane with the bytes red, green, blue, alpha. Alpha is ignored.
     Rgba,
-    /// One plane; bytes blue, green, red, alpha (which is not looked at). iOS' 32BGRA.
+    /// One plane with the bytes blue, green, red, alpha, as in iOS' 32BGRA. Alpha is ignored.
     Bgra,
-    /// One plane; bytes red, green, blue.
+    /// One plane with the bytes red, green, blue.
     Rgb,
-    /// Two planes: luma; and at half the resolution, rounded up, blue and red chroma side by side. iOS' 420f (full
+    /// Two planes: luma, and interleaved blue and red chroma at half the resolution, rounded up. On iOS, 420f (full
     /// range) and 420v (video range).
     Nv12(YuvEncoding),
-    /// Three planes: luma, and at half the resolution, rounded up, blue chroma (U, Cb) and red chroma (V, Cr).
-    /// Android's YUV_420_888 with any pixel strides, NV21 and I420 among them.
+    /// Three planes: luma, and at half the resolution, rounded up, blue chroma (U, Cb) and red chroma (V, Cr). On
+    /// Android, YUV_420_888 with any pixel strides, which includes NV21 and I420.
     Yuv420(YuvEncoding),
 }
 
 impl ColourFormat {
-    /// How many planes an image has.
+    /// Returns the number of planes of an image.
     pub fn planes(self) -> usize {
         match self {
             ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => 1,
@@ -56,7 +56,8 @@ impl ColourFormat {
         }
     }
 
-    /// The names of the planes in errors, the bytes of a pixel in each, and how many pixels share one.
+    /// Returns for each plane its name in errors, its bytes per pixel, and the number of image pixels, along each axis,
+    /// that share one of its pixels.
     #[doc(hidden)]
     pub fn layout(self) -> &'static [(&'static str, usize, usize)] {
         match self {
@@ -69,7 +70,7 @@ impl ColourFormat {
     }
 }
 
-/// A camera image, borrowed.
+/// A borrowed camera image.
 #[derive(Debug, Clone, Copy)]
 pub struct ColourImage<'a> {
     format: ColourFormat,
@@ -79,7 +80,7 @@ pub struct ColourImage<'a> {
 }
 
 impl<'a> ColourImage<'a> {
-    /// An image of `width` × `height` pixels in `planes`.
+    /// Creates an image of `width` × `height` pixels in `planes`.
     ///
     /// ```
     /// use phasefront::input::{ColourFormat, ColourImage, Plane, YuvEncoding};
@@ -92,8 +93,8 @@ impl<'a> ColourImage<'a> {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Frame`] that names an empty or too large image, another number of planes than the format has, a
-    /// stride that is too small, or a plane with too few bytes.
+    /// Returns [`Error::Frame`] if the image is empty or too large, the number of planes does not match the format, a
+    /// stride is too small, or a plane has too few bytes.
     pub fn new(format: ColourFormat, width: usize, height: usize, planes: &[Plane<'a>]) -> Result<Self> {
         check_size("colour", width, height)?;
         let layout = format.layout();
@@ -118,17 +119,17 @@ impl<'a> ColourImage<'a> {
         })
     }
 
-    /// How it lies in memory.
+    /// Returns the memory layout.
     pub fn format(&self) -> ColourFormat {
         self.format
     }
 
-    /// (H, W) as the sensor gives it.
+    /// Returns (H, W) in the sensor's orientation.
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// The planes, as many as the format has.
+    /// Returns the planes of the format.
     pub fn planes(&self) -> &[Plane<'a>] {
         &self.planes[..self.format.planes()]
     }

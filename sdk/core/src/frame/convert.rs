@@ -1,5 +1,5 @@
-//! Camera images to amplitudes at the display's resolution: turned upright, cropped, resized and converted in one
-//! pass over the image. [`super::reference`] is its oracle.
+//! Conversion of camera images to amplitudes at the display's resolution. Images are turned upright, cropped, resized
+//! and converted in one pass. Tests compare the results with [`super::reference`].
 
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix, check_size};
 use super::plane::View;
@@ -9,17 +9,19 @@ use crate::runtime::error::{Error, Result};
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// Bands of rows for each thread, so that a delayed thread leaves the others work to take.
+/// The number of bands of rows for each thread. More than one lets other threads take over the work of a delayed
+/// thread.
 const BANDS_PER_THREAD: usize = 4;
 
-/// A plan for one image format and size, orientation and output shape. Immutable; shared between threads.
+/// A plan for one image format and size, orientation and output shape. It is immutable and can be shared between
+/// threads.
 pub struct ColourPlan {
     format: ColourFormat,
     sensor: (usize, usize),
     orientation: Orientation,
     out: (usize, usize),
     luma: Axes,
-    /// None where every channel has every pixel.
+    /// The axes of subsampled chroma, or `None` if all channels have full resolution.
     chroma: Option<Axes>,
 }
 
@@ -28,13 +30,13 @@ struct Axes {
     y: Axis,
 }
 
-/// Working memory of a [`ColourPlan`] for one call at a time.
+/// The working memory of a [`ColourPlan`] for one call at a time.
 pub struct ColourScratch {
     rows: Vec<f32>,
     bands: usize,
 }
 
-/// Where one channel lies: its plane, the byte of a pixel in it, and how it is resampled.
+/// The location of one channel (its plane and its byte in a pixel) and its resampling.
 struct Channel<'a> {
     plane: Plane<'a>,
     byte: usize,
@@ -43,19 +45,19 @@ struct Channel<'a> {
 }
 
 impl ColourPlan {
-    /// Plans the way of images as `image`, turned by `orientation`, to (`height`, `width`) amplitudes, which show
-    /// [`Crop::cover`] of it.
+    /// Plans the conversion of images like `image`, turned by `orientation`, to (`height`, `width`) amplitudes of the
+    /// part [`Crop::cover`].
     ///
     /// # Errors
-    /// An empty output.
+    /// Returns an error if the output is empty.
     pub fn new(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Result<Self> {
         Self::for_format(image.format(), image.shape(), orientation, height, width)
     }
 
-    /// [`ColourPlan::new`] for images of that `format` and (H, W).
+    /// Plans the conversion of images with this `format` and (H, W) = `sensor`, like [`ColourPlan::new`].
     ///
     /// # Errors
-    /// An empty or too large image, or an empty output.
+    /// Returns an error if the image is empty or too large, or the output is empty.
     pub fn for_format(
         format: ColourFormat,
         sensor: (usize, usize),
@@ -73,8 +75,8 @@ impl ColourPlan {
         let crop = Crop::cover(upright, (height, width));
         let chroma = format.layout().get(1).map(|(_, _, share)| {
             let half = |n: usize| n.div_ceil(*share);
-            // Of an odd side the last chroma sample reaches beyond the picture, at its far end or, flipped, at its
-            // near.
+            // If a side is odd, the last chroma sample extends beyond the image, at its far end or, if flipped, at its
+            // near end.
             let from = |from: f64, side: usize, flipped: bool| {
                 from / 2.0
                     + match flipped {
@@ -103,23 +105,23 @@ impl ColourPlan {
         })
     }
 
-    /// Whether the plan is for images as `image` turned by `orientation`. Strides do not matter.
+    /// Returns whether the plan fits images like `image` turned by `orientation`. Strides may differ.
     pub fn fits(&self, image: &ColourImage<'_>, orientation: Orientation) -> bool {
         (self.format, self.sensor, self.orientation) == (image.format(), image.shape(), orientation)
     }
 
-    /// (H, W) of the amplitudes.
+    /// Returns (H, W) of the amplitudes.
     pub fn shape(&self) -> (usize, usize) {
         self.out
     }
 
-    /// How the first channel is resampled along x and along y, and how the other two are.
+    /// Returns the resampling along x and y of the first channel, then of the other two channels.
     pub fn axes(&self) -> [&Axis; 4] {
         let chroma = self.chroma.as_ref().unwrap_or(&self.luma);
         [&self.luma.x, &self.luma.y, &chroma.x, &chroma.y]
     }
 
-    /// Of each channel of `image`: its plane, and where the upright picture's bytes of it lie there.
+    /// Returns for each channel of `image` its plane and the location of the upright image's bytes in it.
     pub fn views(&self, image: &ColourImage<'_>) -> [(usize, View); 3] {
         let planes = match self.format {
             ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => [0; 3],
@@ -135,7 +137,7 @@ impl ColourPlan {
         })
     }
 
-    /// Working memory for one call at a time, sized for the current thread pool.
+    /// Allocates working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> ColourScratch {
         let bands = match rayon::current_num_threads() {
             1 => 1,
@@ -151,13 +153,13 @@ impl ColourPlan {
         self.chroma.as_ref().map_or(0, |axes| axes.x.needed().len())
     }
 
-    /// The amplitudes of `image` into `rgb`, (3, H, W) in \[0, 1], on the current thread pool. Allocates nothing.
+    /// Converts `image` to amplitudes in `rgb`, (3, H, W) in \[0, 1], on the current thread pool. Does not allocate.
     ///
     /// # Errors
-    /// An image that the plan does not fit.
+    /// Returns an error if the plan does not fit the image.
     ///
     /// # Panics
-    /// If `rgb` has not 3·H·W values.
+    /// Panics if `rgb` does not have 3·H·W values.
     pub fn convert(&self, image: &ColourImage<'_>, rgb: &mut [f32], scratch: &mut ColourScratch) -> Result<()> {
         if !self.fits(image, self.orientation) {
             return Err(Error::Frame(format!(
@@ -198,7 +200,7 @@ impl ColourPlan {
         Ok(())
     }
 
-    /// Red, green, blue or Y, U, V of `image`.
+    /// Returns the channels red, green, blue or Y, U, V of `image`.
     fn channels<'a>(&'a self, image: &ColourImage<'a>) -> [Channel<'a>; 3] {
         let bytes = match self.format {
             ColourFormat::Rgba | ColourFormat::Rgb => [(0, 0), (0, 1), (0, 2)],
@@ -224,7 +226,7 @@ impl ColourPlan {
 }
 
 impl Channel<'_> {
-    /// Output row `y` of the channel into `out`, 0..=255, by way of `row`.
+    /// Resamples output row `y` of the channel to `out`, 0..=255. `row` is working memory.
     fn row(&self, y: usize, orientation: Orientation, row: &mut [f32], out: &mut [f32]) {
         let view = orientation.view(&self.plane, self.sensor);
         let needed = self.axes.x.needed();
@@ -251,7 +253,7 @@ fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [
         for (sum, pixel) in sum.iter_mut().zip(pixels) {
             *sum += weight * f32::from(pixel[0]);
         }
-        // Behind the last sample the memory may end.
+        // The memory may end after the last sample.
         let end = match sum.len() < pixels.len() {
             true => pixels[sum.len()][0],
             false => rest[0],
@@ -273,11 +275,11 @@ fn add_samples(bytes: &[u8], first: usize, step: isize, weight: f32, sum: &mut [
     }
 }
 
-/// The amplitudes of one laser, (H, W), that shows the luminance of `rgb`, (3, H, W): √(Σ w·a²) with the weights of
-/// Rec. 709, for light is the square of amplitude. Allocates nothing.
+/// Computes the amplitudes for one laser, (H, W), from the luminance of `rgb`, (3, H, W): √(Σ w·a²) with the weights of
+/// Rec. 709, because light is the square of the amplitude. Does not allocate.
 ///
 /// # Panics
-/// If `rgb` has not three times as many values.
+/// Panics if `rgb` does not have three times as many values as `amplitude`.
 pub fn luminance(rgb: &[f32], amplitude: &mut [f32]) {
     const WEIGHTS: [f32; 3] = [0.2126, 0.7152, 0.0722];
     const PART: usize = 1 << 14;
@@ -298,7 +300,8 @@ pub fn luminance(rgb: &[f32], amplitude: &mut [f32]) {
         });
 }
 
-/// Luma's and chroma's offset and factor to 0..=1 and −½..=½, and the matrix's red-V, green-U, green-V and blue-U.
+/// Returns the offsets and factors that scale luma to 0..=1 and chroma to −½..=½, and the matrix coefficients red-V,
+/// green-U, green-V and blue-U.
 pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
     let (kr, kb) = match encoding.matrix {
         YuvMatrix::Bt601 => (0.299f32, 0.114f32),
@@ -320,7 +323,7 @@ pub fn yuv_constants(encoding: YuvEncoding) -> ([f32; 4], [f32; 4]) {
     )
 }
 
-/// Rows of red, green, blue or Y, U, V, 0..=255, to amplitudes in \[0, 1].
+/// Converts rows of red, green, blue or Y, U, V in 0..=255 to amplitudes in \[0, 1].
 fn to_amplitude(format: ColourFormat, [first, second, third]: [&mut [f32]; 3]) {
     match format {
         ColourFormat::Rgba | ColourFormat::Bgra | ColourFormat::Rgb => {

@@ -1,20 +1,20 @@
-//! A plane of samples in a camera's memory, and how the picture in it must be turned to stand upright.
+//! Planes of samples in a camera's memory, and the orientation of the image in them.
 
 use crate::runtime::error::{Error, Result};
 
-/// One plane of a camera image, as the platform's API hands it out; borrowed, never copied here.
+/// One plane of a camera image, as the platform's API provides it. It is borrowed, not copied.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Plane<'a> {
-    /// The memory, from the first pixel of the first row on. What lies behind the last pixel may be missing.
+    /// The memory, starting at the first pixel of the first row. It may end after the last pixel.
     pub bytes: &'a [u8],
-    /// Bytes from one row to the next.
+    /// The number of bytes from one row to the next.
     pub row_stride: usize,
-    /// Bytes from one pixel to the next in a row.
+    /// The number of bytes from one pixel to the next in a row.
     pub pixel_stride: usize,
 }
 
 impl<'a> Plane<'a> {
-    /// A plane of rows `row_stride` bytes apart, pixels `pixel_stride` bytes apart.
+    /// Creates a plane with rows `row_stride` bytes apart and pixels `pixel_stride` bytes apart.
     pub fn new(bytes: &'a [u8], row_stride: usize, pixel_stride: usize) -> Self {
         Plane {
             bytes,
@@ -23,7 +23,7 @@ impl<'a> Plane<'a> {
         }
     }
 
-    /// Checks that (`height`, `width`) pixels of `pixel_bytes` lie in it.
+    /// Checks that the plane holds (`height`, `width`) pixels of `pixel_bytes` bytes.
     pub fn check(&self, what: &str, width: usize, height: usize, pixel_bytes: usize) -> Result<()> {
         if self.pixel_stride < pixel_bytes {
             return Err(Error::Frame(format!(
@@ -52,42 +52,42 @@ impl<'a> Plane<'a> {
     }
 }
 
-/// How far a sensor's picture must be turned clockwise to stand upright.
+/// The clockwise rotation that turns a sensor's image upright.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Rotation {
-    /// Not at all.
+    /// No rotation.
     #[default]
     Upright,
     /// A quarter turn.
     Clockwise90,
     /// Half a turn.
     Half,
-    /// Three quarters.
+    /// Three quarters of a turn.
     Clockwise270,
 }
 
-/// How a sensor's picture becomes the one that is shown: turned, then mirrored.
+/// The transformation from a sensor's image to the upright image: a rotation, then mirroring.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Orientation {
-    /// The turn.
+    /// The rotation.
     pub rotation: Rotation,
-    /// Whether left and right are exchanged after the turn, as front cameras need.
+    /// Whether left and right are exchanged after the rotation, as front cameras need.
     pub mirrored: bool,
 }
 
-/// Where the pixels of an upright picture lie in a plane's memory.
+/// The location of an upright image's pixels in a plane's memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct View {
-    /// The byte of the upright picture's first pixel.
+    /// The byte offset of the upright image's first pixel.
     pub origin: usize,
-    /// Bytes to the next pixel to the right.
+    /// The number of bytes to the next pixel on the right.
     pub step_x: isize,
-    /// Bytes to the next pixel below.
+    /// The number of bytes to the next pixel below.
     pub step_y: isize,
 }
 
 impl View {
-    /// The first byte of pixel (x, y).
+    /// Returns the offset of the first byte of pixel (x, y).
     pub fn at(&self, x: usize, y: usize) -> usize {
         self.origin
             .wrapping_add_signed(self.step_x * x as isize)
@@ -96,7 +96,7 @@ impl View {
 }
 
 impl Orientation {
-    /// The upright picture's (H, W) of a sensor's (`height`, `width`).
+    /// Returns (H, W) of the upright image of a sensor of (`height`, `width`).
     pub fn upright_shape(self, height: usize, width: usize) -> (usize, usize) {
         match self.rotation {
             Rotation::Upright | Rotation::Half => (height, width),
@@ -104,7 +104,7 @@ impl Orientation {
         }
     }
 
-    /// Whether the upright picture runs against the sensor along x and along y.
+    /// Returns whether the upright image runs opposite to the sensor along x and along y.
     #[doc(hidden)]
     pub fn flips(self) -> (bool, bool) {
         let (x, y) = match self.rotation {
@@ -116,7 +116,7 @@ impl Orientation {
         (x != self.mirrored, y)
     }
 
-    /// The sensor's pixel (x, y) that upright pixel (`x`, `y`) shows, for a sensor of (`height`, `width`).
+    /// Returns the sensor pixel (x, y) at upright pixel (`x`, `y`), for a sensor of (`height`, `width`).
     #[doc(hidden)]
     pub fn sensor_pixel(self, x: usize, y: usize, (height, width): (usize, usize)) -> (usize, usize) {
         let (_, upright_width) = self.upright_shape(height, width);
@@ -129,7 +129,7 @@ impl Orientation {
         }
     }
 
-    /// The upright picture of `plane`, which holds a sensor's (`height`, `width`).
+    /// Returns the view of the upright image in `plane`, which holds a sensor's (`height`, `width`) pixels.
     #[doc(hidden)]
     pub fn view(self, plane: &Plane<'_>, (height, width): (usize, usize)) -> View {
         let at = |(x, y): (usize, usize)| (y * plane.row_stride + x * plane.pixel_stride) as isize;
@@ -149,7 +149,7 @@ impl Orientation {
 mod tests {
     use super::*;
 
-    /// A picture 1 2 3 / 4 5 6 in every orientation, by the view's steps and by the sensor's pixels.
+    /// Checks the image 1 2 3 / 4 5 6 in several orientations, by the view's steps and the sensor's pixels.
     #[test]
     fn pictures_stand_upright() {
         let bytes = [1, 0, 2, 0, 3, 0, 9, 4, 0, 5, 0, 6];
@@ -186,7 +186,7 @@ mod tests {
             let refused = Plane::new(&bytes, row, pixel).check("colour", width, height, 4);
             assert!(refused.is_err_and(|e| e.to_string().contains(word)), "{word}");
         }
-        // The last row ends with its last pixel; one row needs no stride.
+        // The last row ends with its last pixel, and a single row needs no stride.
         assert!(Plane::new(&bytes, 60, 4).check("colour", 10, 2, 4).is_ok());
         assert!(Plane::new(&bytes, 0, 4).check("colour", 25, 1, 4).is_ok());
     }

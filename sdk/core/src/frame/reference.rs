@@ -1,13 +1,14 @@
-//! The conversion of camera images, naively: every output pixel by itself, in f64, from the definition. The oracle of
-//! `convert`.
+//! The definition of the conversion of camera images. It computes each output pixel separately in f64. Tests compare
+//! `convert` with it.
 
 use super::colour::{ColourFormat, ColourImage, YuvEncoding, YuvMatrix};
 use super::plane::Orientation;
 use super::resample::Crop;
 
-/// The amplitudes, (3, H, W), that (`height`, `width`) shows of `image` turned by `orientation`: [`Crop::cover`] of
-/// it, each pixel the mean of the image's under a triangle as wide as itself (at least as wide as a sample). A chroma
-/// sample lies in the middle of its four pixels.
+/// Converts `image`, turned by `orientation`, to amplitudes (3, H, W) with (H, W) = (`height`, `width`).
+///
+/// The output covers [`Crop::cover`] of the image. Each pixel is the mean of the image under a triangle as wide as the
+/// pixel, but at least as wide as a sample. A chroma sample lies in the middle of its four pixels.
 pub fn convert(image: &ColourImage<'_>, orientation: Orientation, height: usize, width: usize) -> Vec<f32> {
     let upright = orientation.upright_shape(image.shape().0, image.shape().1);
     let crop = Crop::cover(upright, (height, width));
@@ -34,8 +35,8 @@ pub fn convert(image: &ColourImage<'_>, orientation: Orientation, height: usize,
     rgb
 }
 
-/// The mean under the triangle around `centre`, in upright pixels, of one byte of a plane each of whose samples stands
-/// for `share` × `share` pixels.
+/// Returns the mean of one byte of a plane under the triangle around `centre`, in upright pixels. Each sample of the
+/// plane covers `share` × `share` pixels.
 fn mean(
     image: &ColourImage<'_>,
     orientation: Orientation,
@@ -51,7 +52,7 @@ fn mean(
     let (mut sum, mut weights) = (0.0, 0.0);
     for row in 0..height.div_ceil(share) {
         for column in 0..width.div_ceil(share) {
-            // Where the sample's middle lies in the sensor's picture, and in the upright one.
+            // The middle of the sample in the sensor's image, then in the upright image.
             let x = (column as f64 + 0.5) * share as f64 / width as f64;
             let y = (row as f64 + 0.5) * share as f64 / height as f64;
             let (x, y) = turn(orientation, x, y);
@@ -66,7 +67,7 @@ fn mean(
     sum / weights
 }
 
-/// A point of the sensor's picture, its sides 0..1, in the upright one.
+/// Converts a point of the sensor's image to the upright image. Both have sides of length 1.
 fn turn(orientation: Orientation, x: f64, y: f64) -> (f64, f64) {
     use super::plane::Rotation;
     let (x, y) = match orientation.rotation {
@@ -78,7 +79,8 @@ fn turn(orientation: Orientation, x: f64, y: f64) -> (f64, f64) {
     (if orientation.mirrored { 1.0 - x } else { x }, y)
 }
 
-/// ITU-R BT.601 and BT.709: Y = Kr·R + Kg·G + Kb·B, U = (B − Y)/(2 − 2Kb), V = (R − Y)/(2 − 2Kr), solved for colour.
+/// Converts ITU-R BT.601 or BT.709 to colour by solving Y = Kr·R + Kg·G + Kb·B, U = (B − Y)/(2 − 2Kb), V = (R − Y)/(2 −
+/// 2Kr).
 fn rgb_of_yuv([y, u, v]: [f64; 3], encoding: YuvEncoding) -> [f64; 3] {
     let (kr, kb) = match encoding.matrix {
         YuvMatrix::Bt601 => (0.299, 0.114),

@@ -1,21 +1,22 @@
-//! Resampling along one axis: what a camera's picture covers of the display's, and the taps of each pixel.
+//! Resampling along one axis: the part of a camera image that the display covers, and the taps of each output sample.
 
-/// The part of an upright picture that is shown: the largest of the display's aspect ratio, in the middle.
-/// In pixels of the picture; (0, 0) is the top left corner of its first pixel.
+/// The displayed part of an upright image: the largest centred rectangle with the display's aspect ratio.
+///
+/// The unit is a pixel of the image, and (0, 0) is the top left corner of its first pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Crop {
-    /// Left edge.
+    /// The left edge.
     pub x: f64,
-    /// Upper edge.
+    /// The upper edge.
     pub y: f64,
-    /// Width.
+    /// The width.
     pub width: f64,
-    /// Height.
+    /// The height.
     pub height: f64,
 }
 
 impl Crop {
-    /// What (`out_height`, `out_width`) shows of (`height`, `width`).
+    /// Returns the part of a (`height`, `width`) image that covers (`out_height`, `out_width`).
     pub fn cover((height, width): (usize, usize), (out_height, out_width): (usize, usize)) -> Self {
         let (h, w) = (height as f64, width as f64);
         let scale = (w / out_width as f64).min(h / out_height as f64);
@@ -28,7 +29,7 @@ impl Crop {
         }
     }
 
-    /// The same part of a picture of the same field of view at `x` and `y` times the resolution.
+    /// Returns the same part of an image with the same field of view at `x` and `y` times the resolution.
     pub fn scaled(self, x: f64, y: f64) -> Self {
         Crop {
             x: self.x * x,
@@ -39,18 +40,20 @@ impl Crop {
     }
 }
 
-/// The taps of each output sample along one axis: a triangle as wide as an output sample, at least as wide as an input
-/// sample, so that shrinking averages and enlarging interpolates.
+/// The taps of each output sample along one axis.
+///
+/// The taps form a triangle as wide as an output sample, but at least as wide as an input sample, so that shrinking
+/// averages and enlarging interpolates.
 pub struct Axis {
-    /// Of each output sample, its first input sample.
+    /// The first input sample of each output sample.
     start: Vec<u32>,
-    /// Of each output sample, `taps` weights that sum to 1.
+    /// The weights of each output sample: `taps` weights that sum to 1.
     weights: Vec<f32>,
     taps: usize,
 }
 
 impl Axis {
-    /// `out` samples over `from`..`from` + `length` of `source` samples.
+    /// Plans `out` samples over the interval `from`..`from` + `length` of `source` samples.
     pub fn new(source: usize, from: f64, length: f64, out: usize) -> Self {
         let scale = length / out as f64;
         let support = scale.max(1.0);
@@ -64,7 +67,7 @@ impl Axis {
                 let mut weights: Vec<f64> = (first..=last)
                     .map(|i| (1.0 - (i as f64 - centre).abs() / support).max(0.0))
                     .collect();
-                // A centre beyond the edge by more than the triangle takes the edge.
+                // If the centre lies beyond the edge by more than the triangle, the edge sample is used.
                 if weights.iter().all(|w| *w <= 0.0) {
                     weights.fill(1.0);
                 }
@@ -73,7 +76,8 @@ impl Axis {
                 (first, weights)
             })
             .collect();
-        // Weights of rounding's size at the ends are none: a picture that is not resized has one tap.
+        // Weights at the ends that are only rounding errors are dropped, so that an image that is not resized has one
+        // tap.
         for (first, weights) in &mut rows {
             while weights.len() > 1 && weights[weights.len() - 1] < 1e-9 {
                 weights.pop();
@@ -90,7 +94,7 @@ impl Axis {
             taps,
         };
         for (o, (first, weights)) in rows.into_iter().enumerate() {
-            // All samples have as many taps, so the last ones start earlier.
+            // All output samples have the same number of taps, so the last ones start earlier.
             let start = first.min(source - taps.min(source));
             axis.start.push(start as u32);
             for (k, weight) in weights.into_iter().enumerate() {
@@ -100,7 +104,7 @@ impl Axis {
         axis
     }
 
-    /// The input samples and weights of output sample `o`.
+    /// Returns the input samples and weights of output sample `o`.
     pub fn taps(&self, o: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
         let start = self.start[o] as usize;
         (self.weights[o * self.taps..][..self.taps].iter())
@@ -108,19 +112,20 @@ impl Axis {
             .map(move |(k, w)| (start + k, *w))
     }
 
-    /// Of each output sample, its first input sample; of each, as many weights as are returned third.
+    /// Returns the first input sample of each output sample, the weights, and the number of weights for each output
+    /// sample.
     pub fn tables(&self) -> (&[u32], &[f32], usize) {
         (&self.start, &self.weights, self.taps)
     }
 
-    /// Input samples that are needed: from the first to behind the last.
+    /// Returns the range of needed input samples.
     pub fn needed(&self) -> std::ops::Range<usize> {
         let first = self.start.iter().min().copied().unwrap_or(0);
         let last = self.start.iter().max().copied().unwrap_or(0);
         first as usize..last as usize + self.taps
     }
 
-    /// Resamples `row`, which begins with input sample `first`, into `out`.
+    /// Resamples `row`, which begins with input sample `first`, to `out`.
     pub fn apply(&self, row: &[f32], first: usize, out: &mut [f32]) {
         match self.taps {
             1 => {

@@ -1,10 +1,11 @@
-//! The hologram network: loaded from ONNX, checked to be the paper's residual chain, run on frames of any size.
+//! The hologram network. It is loaded from ONNX, checked to be the paper's residual chain, and run on frames of any
+//! size.
 //!
-//! [`Network`] says what a file holds; [`Network::plan`] prepares it for one frame size; [`NetworkPlan::field`] takes
-//! rows of a [`Source`] to rows of a complex field; [`NetworkPlan::run`] takes planes to planes, which [`Head::field`]
-//! turns into a field. What the chain is, stands
-//! in [`chain`]; [`mod@reference`] runs it naively and is the oracle of every fast path. The fast path is the crate
-//! `phasefront-kernels`; chains that it does not take run on stock tract, and [`NetworkPlan::engine`] says so.
+//! [`Network`] describes a file. [`Network::plan`] prepares it for one frame size. [`NetworkPlan::field`] turns the
+//! rows of a [`Source`] into rows of a complex field. [`NetworkPlan::run`] turns input planes into output planes, which
+//! [`Head::field`] turns into a field. [`chain`] defines the chain; [`mod@reference`] runs it naively and is the oracle
+//! of every fast path. The fast path is the crate `phasefront-kernels`. Chains that it does not support run on stock
+//! tract; [`NetworkPlan::engine`] reports the path.
 
 pub mod bounds;
 pub mod chain;
@@ -41,20 +42,21 @@ use prost::Message;
 #[cfg(feature = "tract")]
 use stock::StockPlan;
 
-/// Most pixels of a frame on tract, which holds several layers at once: some 500 bytes a pixel.
+/// The largest number of pixels of a frame on tract, which keeps several layers in memory at once: about 500 bytes for
+/// each pixel.
 #[cfg(feature = "tract")]
 const MAX_STOCK_PIXELS: usize = 1 << 24;
-/// Most pixels of a frame at all.
+/// The largest number of pixels of a frame on any path.
 pub const MAX_PIXELS: usize = 1 << 28;
 
-/// Planes that a network reads, a run of a row's pixels at a time: they need not lie in memory as the network takes
-/// them.
+/// Input planes of a network, read in runs of a row's pixels. Their layout in memory can differ from the network's.
 pub trait Source: Sync {
-    /// Writes pixels of `row` of `plane`, from column `from` on, into `into`; planes as [`InputKind`] counts them.
+    /// Writes pixels of `row` of `plane`, starting at column `from`, into `into`. Planes are numbered as in
+    /// [`InputKind`].
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]);
 }
 
-/// What a network reads of another display: depth, which comes minus ½, times a scale.
+/// The input planes for another display: depth, from which ½ is already subtracted, is multiplied by a scale.
 struct Stretched<'a, S: ?Sized> {
     source: &'a S,
     input: InputKind,
@@ -71,7 +73,7 @@ impl<S: Source + ?Sized> Source for Stretched<'_, S> {
     }
 }
 
-/// A network read from an ONNX file: its chain, what it takes and gives, and the display it was trained for.
+/// A network read from an ONNX file, with its chain, its input and output formats, and the display it was trained for.
 pub struct Network {
     chain: Chain,
     input: InputKind,
@@ -91,12 +93,12 @@ impl std::fmt::Debug for Network {
 }
 
 impl Network {
-    /// Reads an ONNX file's bytes and checks that they hold a hologram network: the residual chain of [`chain`], in
-    /// f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata.
+    /// Reads the bytes of an ONNX file and checks that they hold a hologram network: the residual chain of [`chain`],
+    /// in f32 or quantised to int8 with QuantizeLinear/DequantizeLinear pairs, with `phasefront.*` metadata.
     ///
     /// # Errors
-    /// [`Error::Network`] naming the node, tensor or metadata that is not so, and what would be right; a file of over
-    /// 2²⁸ bytes or 2¹⁷ parts. What is allocated is at most 4 times the file and 200 MB.
+    /// Returns [`Error::Network`] with the name of the wrong node, tensor or metadata and the expected value, or if the
+    /// file has more than 2²⁸ bytes or 2¹⁷ parts. Reading allocates at most 4 times the file size plus 200 MB.
     pub fn from_onnx(bytes: &[u8]) -> Result<Network> {
         bounds::check(bytes)?;
         let model = proto::Model::decode(bytes)
@@ -154,94 +156,97 @@ impl Network {
         })
     }
 
-    /// The chain itself: layers, filters, weights, quantisation.
+    /// Returns the chain: layers, filters, weights, quantisation.
     #[doc(hidden)]
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
 
-    /// How many convolutions.
+    /// Returns the number of convolutions.
     pub fn layers(&self) -> usize {
         self.chain.layers.len()
     }
 
-    /// Filters of each hidden layer.
+    /// Returns the number of filters of each hidden layer.
     pub fn filters(&self) -> usize {
         self.chain.filters()
     }
 
-    /// The numbers that the file's layers compute in.
+    /// Returns the number format of the file's layers.
     #[doc(hidden)]
     pub fn precision(&self) -> Precision {
         self.chain.precision
     }
 
-    /// What the input planes are.
+    /// Returns the kind of the input planes.
     #[doc(hidden)]
     pub fn input(&self) -> InputKind {
         self.input
     }
 
-    /// What the output planes are.
+    /// Returns the kind of the output planes.
     #[doc(hidden)]
     pub fn head(&self) -> Head {
         self.head
     }
 
-    /// The display it was trained for; another needs another network.
+    /// Returns the display that the network was trained for.
     #[doc(hidden)]
     pub fn display(&self) -> &TrainedDisplay {
         &self.display
     }
 
-    /// What depths of frames for `display` are stretched by about the middle of the volume for this network to give
-    /// their hologram, from 0 to 1: (λ·V/p²) over that of the display it was trained for. To the paraxial order a
-    /// hologram without its carrier depends on λ·z/p² alone.
+    /// Returns the factor, from 0 to 1, by which depths of frames for `display` are stretched about the middle of the
+    /// volume so that this network computes their hologram. It is λ·V/p² divided by that of the trained display. To
+    /// paraxial order, a hologram without its carrier depends on λ·z/p² alone.
     ///
     /// # Errors
-    /// [`Error::Network`] for a display of a larger λ·V/p², or one whose lasers differ by over 5 % from one stretch.
+    /// Returns [`Error::Network`] if the display has a larger λ·V/p², or if the factors of its lasers differ by more
+    /// than 5 %.
     #[doc(hidden)]
     pub fn depth_scale(&self, display: &Display) -> Result<f32> {
         Ok(depth_scale(self.display.serve(display)?))
     }
 
-    /// The colour whose output is the field of a `display` of one laser, 0 red, 1 green, 2 blue: the nearest of those
-    /// whose depths were trained as far as the display's reach. None for a display of three.
+    /// Returns the output colour that is the field of a `display` with one laser: 0 red, 1 green, 2 blue. It is the
+    /// nearest colour whose trained depths cover the display's range. Returns `None` for a display with three lasers.
     ///
     /// # Errors
-    /// As [`Self::depth_scale`].
+    /// Returns the same errors as [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn colour(&self, display: &Display) -> Result<Option<usize>> {
         Ok(self.display.serve(display)?.colour)
     }
 
-    /// Checks that it serves `display`.
+    /// Checks that the network supports `display`.
     ///
     /// # Errors
-    /// As [`Self::depth_scale`].
+    /// Returns the same errors as [`Self::depth_scale`].
     pub fn check_display(&self, display: &Display) -> Result<()> {
         self.depth_scale(display).map(|_| ())
     }
 
-    /// Checks that this pre-filter serves `display`, its offset included: λ·offset/p² is the one it was trained for.
+    /// Checks that this pre-filter supports `display` and its offset, for which λ·offset/p² must equal the trained
+    /// value.
     ///
     /// # Errors
-    /// As [`Self::depth_scale`], or an offset that differs by over 20 µm at the pitch it was trained for.
+    /// Returns the same errors as [`Self::depth_scale`], and an error if the offset differs by more than 20 µm at the
+    /// trained pitch.
     #[doc(hidden)]
     pub fn check_prefilter(&self, display: &Display) -> Result<()> {
         self.display.check_offset(display)
     }
 
-    /// Planes of the sweep whose field a seeded network was trained to correct, where its file says so.
+    /// Returns the number of planes of the sweep that a seeded network was trained to correct, if its file gives it.
     pub fn seed_planes(&self) -> Option<usize> {
         self.seed_planes
     }
 
-    /// [`Self::plan`] for frames whose depth is for `display`, and for its colours: for one laser the network reads its
-    /// amplitude as red, green and blue, and [`Self::colour`] is kept of what it gives.
+    /// Plans like [`Self::plan`] for the depths and colours of `display`. For one laser, the network reads its
+    /// amplitude as red, green and blue, and only the output of [`Self::colour`] is kept.
     ///
     /// # Errors
-    /// As [`Self::plan`] and [`Self::depth_scale`].
+    /// Returns the same errors as [`Self::plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn plan_for(&self, height: usize, width: usize, display: &Display) -> Result<NetworkPlan> {
         let served = self.display.serve(display)?;
@@ -252,11 +257,12 @@ impl Network {
         })
     }
 
-    /// Prepares the network for frames of `height` × `width` pixels, whose depth is for the display it was trained for,
-    /// on the fastest path that runs it.
+    /// Prepares the network for frames of `height` × `width` pixels whose depth is for the trained display, on the
+    /// fastest path that supports the network.
     ///
     /// # Errors
-    /// [`Error::Setting`] for an empty frame or one too large; [`Error::Network`] when the path refuses the graph.
+    /// Returns [`Error::Setting`] if a frame is empty or too large, and [`Error::Network`] if the path rejects the
+    /// graph.
     #[doc(hidden)]
     pub fn plan(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         match FusedChain::new(&self.chain, None) {
@@ -277,7 +283,8 @@ impl Network {
     /// Prepares the network on the kernels of one instruction set.
     ///
     /// # Errors
-    /// As [`Network::plan`]; [`Error::Setting`] where this processor or those kernels cannot.
+    /// Returns the same errors as [`Network::plan`], and [`Error::Setting`] if the processor or the kernels do not
+    /// support it.
     #[doc(hidden)]
     pub fn plan_on(&self, isa: Isa, height: usize, width: usize) -> Result<NetworkPlan> {
         let chain = FusedChain::new(&self.chain, Some(isa));
@@ -303,12 +310,12 @@ impl Network {
         })
     }
 
-    /// Prepares a network for fields to be run in place on (3, `height`, `width`) ones, on the fastest kernels. A blur
-    /// that it asks for ([`InputKind::is_blurred`]) is the caller's.
+    /// Prepares a network that filters fields of (3, `height`, `width`) in place, on the fastest kernels. The caller
+    /// applies the blur that the input may require ([`InputKind::is_blurred`]).
     ///
     /// # Errors
-    /// [`Error::Network`] for a network that takes no field or that the kernels do not take; [`Error::Setting`] for an
-    /// empty field or one too large.
+    /// Returns [`Error::Network`] if the network does not take a field or the kernels do not support it, and
+    /// [`Error::Setting`] if a field is empty or too large.
     #[doc(hidden)]
     pub fn filter_plan(&self, height: usize, width: usize) -> Result<FilterPlan> {
         if !self.input.is_field() {
@@ -330,11 +337,11 @@ impl Network {
         })
     }
 
-    /// [`Self::filter_plan`] for the colours of `display`: for one laser in place on a (1, `height`, `width`) field, as
-    /// [`Self::plan_for`].
+    /// Plans like [`Self::filter_plan`] for the colours of `display`. For one laser the field is (1, `height`,
+    /// `width`), handled as in [`Self::plan_for`].
     ///
     /// # Errors
-    /// As [`Self::filter_plan`] and [`Self::depth_scale`].
+    /// Returns the same errors as [`Self::filter_plan`] and [`Self::depth_scale`].
     #[doc(hidden)]
     pub fn filter_plan_for(&self, height: usize, width: usize, display: &Display) -> Result<FilterPlan> {
         Ok(FilterPlan {
@@ -362,21 +369,21 @@ impl Network {
         }
     }
 
-    /// The network as a tract graph of any frame size, its chain one fused operator: for graphs built around it.
-    /// [`Network::plan`] runs the same kernels on the caller's memory, without tract's copies.
+    /// Returns the network as a tract graph for any frame size, with its chain as one fused operator, for use in larger
+    /// graphs. [`Network::plan`] runs the same kernels on the caller's memory, without tract's copies.
     ///
     /// # Errors
-    /// [`Error::Network`] when the kernels do not take the chain, or tract refuses the graph.
+    /// Returns [`Error::Network`] if the kernels do not support the chain or tract rejects the graph.
     #[cfg(feature = "tract")]
     pub fn tract_model(&self) -> Result<tract_onnx::prelude::TypedModel> {
         let chain = FusedChain::new(&self.chain, None).map_err(Error::Network)?;
         operator::model(&self.input.to_string(), chain, self.chain.inputs)
     }
 
-    /// Prepares the network on stock tract whatever the fast path could do: the independent check of that path.
+    /// Prepares the network on stock tract even if the fast path supports it, as an independent check of that path.
     ///
     /// # Errors
-    /// As [`Network::plan`].
+    /// Returns the same errors as [`Network::plan`].
     #[cfg(feature = "tract")]
     pub fn plan_on_stock_tract(&self, height: usize, width: usize) -> Result<NetworkPlan> {
         check_size(height, width, MAX_STOCK_PIXELS)?;
@@ -403,12 +410,12 @@ impl Network {
     }
 }
 
-/// What depths are stretched by: a little over the trained range is taken as that.
+/// Returns the factor that stretches depths. A value slightly above the trained range becomes 1.
 fn depth_scale(served: Served) -> f32 {
     served.scale.min(1.0) as f32
 }
 
-/// Refuses an empty frame, and one of more than `most` pixels.
+/// Checks that a frame is not empty and has at most `most` pixels.
 pub fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
     match height.checked_mul(width) {
         Some(0) => Err(Error::Setting(format!(
@@ -421,14 +428,14 @@ pub fn check_size(height: usize, width: usize, most: usize) -> Result<()> {
     }
 }
 
-/// Which path runs a plan, and why that one.
+/// The path that runs a plan, and the reason for the choice.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Engine {
-    /// The kernels' name, or "tract".
+    /// The name of the kernels, or "tract".
     pub name: &'static str,
-    /// The instruction set; none on tract.
+    /// The instruction set. `None` on tract.
     pub isa: Option<Isa>,
-    /// Why this path was taken.
+    /// The reason for the choice.
     pub why: String,
 }
 
@@ -438,13 +445,13 @@ enum Path {
     Stock(StockPlan),
 }
 
-/// A network prepared for one frame size. Immutable; one plan serves many threads, each with its own scratch.
+/// A network prepared for one frame size. It is immutable. Threads can share one plan, each with its own scratch.
 pub struct NetworkPlan {
     input: InputKind,
     head: Head,
-    /// What depths are stretched by about the middle.
+    /// The factor that stretches depths about the middle of the volume.
     depth_scale: f32,
-    /// Of a display of one laser, the output that is its field.
+    /// The output that is the field of a display with one laser.
     colour: Option<usize>,
     height: usize,
     width: usize,
@@ -452,24 +459,24 @@ pub struct NetworkPlan {
     engine: Engine,
 }
 
-/// Working memory of [`NetworkPlan::run`], from [`NetworkPlan::scratch`].
+/// The working memory of [`NetworkPlan::run`], from [`NetworkPlan::scratch`].
 ///
-/// It is filled in the first frame, a few megabytes for each thread of the pool and independent of the frame's height.
+/// The first frame fills it. It takes a few megabytes for each thread of the pool, whatever the frame's height.
 #[derive(Debug, Default)]
 pub struct NetworkScratch {
     fused: FusedScratch,
-    /// Input and output as planes, for stock tract.
+    /// Input and output planes for stock tract.
     #[cfg(feature = "tract")]
     planes: [Vec<f32>; 2],
 }
 
 impl NetworkScratch {
-    /// Has runs end where `cancel` is requested; those on tract go on to their end.
+    /// Makes runs stop early once `cancel` is requested. Runs on tract always finish.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.fused.cancel = cancel.clone();
     }
 
-    /// Bytes held between frames.
+    /// Returns the number of bytes held between frames.
     pub fn bytes(&self) -> usize {
         #[cfg(feature = "tract")]
         let planes: usize = self.planes.iter().map(Vec::capacity).sum();
@@ -480,22 +487,22 @@ impl NetworkScratch {
 }
 
 impl NetworkPlan {
-    /// Working memory for one run at a time.
+    /// Returns working memory for one run at a time.
     pub fn scratch(&self) -> NetworkScratch {
         NetworkScratch::default()
     }
 
-    /// The frame's height and width in pixels.
+    /// Returns the frame's height and width in pixels.
     pub fn size(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// Channels of the input and of the output.
+    /// Returns the number of input channels and of output channels.
     pub fn channels(&self) -> (usize, usize) {
         (self.input.channels(), phasefront_kernels::OUTPUTS)
     }
 
-    /// Which path runs this plan, and why.
+    /// Returns the path that runs this plan and the reason for the choice.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
@@ -503,10 +510,11 @@ impl NetworkPlan {
     /// Runs the network on one frame, on the current rayon pool. After the first frame the fused path allocates
     /// nothing.
     ///
-    /// `input` is planar (C, H, W), RGB-D minus 0.5; `output` receives (6, H, W) as [`Head::field`] reads it.
+    /// `input` is planar (C, H, W), RGB-D minus 0.5; `output` receives (6, H, W) in the format that [`Head::field`]
+    /// reads.
     ///
     /// # Errors
-    /// [`Error::Frame`] when a length is wrong.
+    /// Returns [`Error::Frame`] if a length is wrong.
     pub fn run(&self, input: &[f32], output: &mut [f32], scratch: &mut NetworkScratch) -> Result<()> {
         let (inputs, outputs) = self.channels();
         self.check("input", input.len(), inputs)?;
@@ -521,12 +529,12 @@ impl NetworkPlan {
         }
     }
 
-    /// Runs the network on the rows of `source` and writes the complex field that its head makes of them, (C, H, W), on
-    /// the current rayon pool. On the fused path neither input nor output lies in memory as planes, and after the first
-    /// frame nothing is allocated.
+    /// Runs the network on the rows of `source` and writes the complex field of its head, (C, H, W), on the current
+    /// rayon pool. The fused path stores neither input nor output as planes and allocates nothing after the first
+    /// frame.
     ///
     /// # Errors
-    /// [`Error::Frame`] when `field` has not C·H·W values.
+    /// Returns [`Error::Frame`] if `field` does not have C·H·W values.
     pub fn field<S: Source + ?Sized>(
         &self,
         source: &S,
@@ -539,7 +547,7 @@ impl NetworkPlan {
         }
     }
 
-    /// The field of some colours of the output.
+    /// Computes the field of some colours of the output.
     fn field_of<S: Source + ?Sized, const C: usize>(
         &self,
         colours: [usize; C],

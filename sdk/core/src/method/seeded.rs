@@ -1,8 +1,9 @@
-//! Seeded networks: the plane sweep's field, corrected by a small network that sees it beside the frame.
+//! Seeded networks. A small network corrects the plane sweep's field and reads it together with the frame.
 //!
-//! The sweep is nearly exact on clean depth, and wrong at edges of noisy or incomplete depth; the network has
-//! learned on both how far to trust it. Its input is RGB-D, each value minus ½, and behind it the seed u: ½(Re u − ½)
-//! of the three colours, then ½ Im u, so that one range of 8 bits holds all. Its head adds the output to u.
+//! The sweep is nearly exact for clean depth, but wrong at edges of noisy or incomplete depth. The network was trained
+//! on both and has learned how far to trust the sweep. Its input is RGB-D, each value minus ½, followed by the seed u:
+//! ½(Re u − ½) of the three colours, then ½ Im u, so that all values share one 8-bit range. Its head adds the output to
+//! u.
 
 use crate::display::Display;
 use crate::frame::RgbdFrame;
@@ -12,8 +13,8 @@ use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use num_complex::Complex32;
 
-/// The sweep whose field `network` was trained to correct: of as many planes as its file says, or else what suits
-/// `display`.
+/// Returns the sweep that `network` was trained to correct. The number of planes is the one in the network's file, or
+/// the default for `display`.
 pub fn seed(network: &Network, display: &Display) -> Sweep {
     match network.seed_planes() {
         Some(planes) => Sweep::of_planes(display, planes),
@@ -21,23 +22,23 @@ pub fn seed(network: &Network, display: &Display) -> Sweep {
     }
 }
 
-/// A plan of a seeded network for one frame shape and display. Immutable; shared between threads.
+/// A plan of a seeded network for one frame shape and display. It is immutable and can be shared between threads.
 pub struct SeededPlan {
     colours: usize,
     sweep: SweepPlan,
     network: NetworkPlan,
 }
 
-/// Working memory of a [`SeededPlan`] for one frame at a time.
+/// The working memory of a [`SeededPlan`] for one frame at a time.
 pub struct SeededScratch {
-    /// (C, H, W).
+    /// The sweep's field, (C, H, W).
     seed: Vec<Complex32>,
     sweep: SweepScratch,
     network: NetworkScratch,
 }
 
 impl SeededScratch {
-    /// Has frames end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.sweep.set_cancel(cancel);
         self.network.set_cancel(cancel);
@@ -45,11 +46,11 @@ impl SeededScratch {
 }
 
 impl SeededPlan {
-    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for (`height`, `width`) frames,
-    /// on the field of its [`seed`] at the midpoint.
+    /// Plans `network`, whose input is [`crate::method::network::InputKind::Seeded`], for frames of (`height`,
+    /// `width`), on the field of its [`seed`] at the midpoint.
     ///
     /// # Errors
-    /// A network or a sweep that cannot be planned.
+    /// Returns an error if the network or the sweep cannot be planned.
     pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
         let sweep = seed(network, display);
         Ok(SeededPlan {
@@ -59,12 +60,12 @@ impl SeededPlan {
         })
     }
 
-    /// What runs the network, and why.
+    /// Returns the engine that runs the network and the reason for the choice.
     pub fn engine(&self) -> &Engine {
         self.network.engine()
     }
 
-    /// Working memory for one frame at a time, for the current thread pool.
+    /// Returns working memory for one frame at a time, sized for the current thread pool.
     pub fn scratch(&self) -> SeededScratch {
         let (height, width) = self.sweep.shape();
         SeededScratch {
@@ -74,11 +75,11 @@ impl SeededPlan {
         }
     }
 
-    /// The midpoint hologram of `frame`, carrier-free, into `field`, (C, H, W). After the first frame nothing is
-    /// allocated.
+    /// Writes the midpoint hologram of `frame`, without the carrier, into `field`, (C, H, W). Allocates nothing after
+    /// the first frame.
     ///
     /// # Errors
-    /// A frame of another shape or of other colours, or a `field` that has not C·H·W values.
+    /// Returns an error if the frame has another shape or other colours, or if `field` does not have C·H·W values.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SeededScratch) -> Result<()> {
         self.sweep.field(frame, &mut scratch.seed, &mut scratch.sweep)?;
         let seeded = SeededFrame {
@@ -89,15 +90,15 @@ impl SeededPlan {
     }
 }
 
-/// A frame and its seed, (C, H, W), as a seeded network reads them.
+/// A frame and its seed, (C, H, W), as the input of a seeded network.
 pub struct SeededFrame<'a> {
     /// The frame.
     pub frame: &'a RgbdFrame,
-    /// The sweep's field of it.
+    /// The sweep's field of the frame.
     pub seed: &'a [Complex32],
 }
 
-/// Planes of RGB-D.
+/// The number of RGB-D planes.
 const RGBD: usize = 4;
 
 impl Source for SeededFrame<'_> {

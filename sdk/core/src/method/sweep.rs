@@ -1,19 +1,21 @@
-//! The plane sweep: holograms of RGB-D frames by waves, without training, for any display.
+//! The plane sweep. It computes holograms of RGB-D frames by wave propagation, without training, for any display.
 //!
-//! As in the silhouette-mask layer-based method (SM-LBM, Eq. 1–4 of the paper) the scene is cut into planes and a wave
-//! carried over them from the back to the front, each plane's silhouette replacing what comes from behind it. What is
-//! new makes it fast and good:
+//! As in the silhouette-mask layer-based method (SM-LBM, Eq. 1–4 of the paper), the scene is cut into planes, and a
+//! wave is carried over them from back to front. Each plane's silhouette replaces the light that comes from behind it.
+//! The following additions improve speed and quality:
 //!
-//! - [`hidden`] adds the surfaces that an RGB-D frame does not show, so that edges are lit from behind;
-//! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)), not a Fourier transform;
-//! - a point that lies between planes is not moved to one: its light is carried there, to first order;
-//! - a tile of the frame does the planes that hold points in it and its halo, and crosses the others in one step;
-//! - the last step goes from the front straight to the midpoint, or on to the display.
+//! - [`hidden`] adds surfaces that an RGB-D frame does not show, so that edges are lit from behind;
+//! - a step between planes is a convolution with a filter of a few pixels ([`fit`](self)) instead of a Fourier
+//!   transform;
+//! - a point between planes is not moved to a plane; its light is carried to the plane, to first order;
+//! - a tile of the frame processes only the planes with points in the tile and its halo, and crosses the others in one
+//!   step;
+//! - the last step goes from the front plane directly to the midpoint, or on to the display.
 //!
-//! Plane k of N lies at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance
-//! s from its point to the plane light u becomes u + i·λs/4π·∇²u to first order. Of that [`CARRIED`] is added: on a
-//! slope, what spreads to farther neighbours would be blocked by points nearer to the plane. [`mod@reference`] is the
-//! naive oracle.
+//! Plane k of N is at z = V/2 − V·(k + ½)/N; a pixel of depth d belongs to plane min(⌊d·N⌋, N − 1). Over the distance s
+//! from its point to the plane, light u becomes u + i·λs/4π·∇²u to first order. The share [`CARRIED`] of the second
+//! term is added: on a slope, points nearer to the plane would block light that spreads to farther neighbours.
+//! [`mod@reference`] is the naive oracle.
 
 mod filters;
 mod fit;
@@ -38,40 +40,40 @@ pub use tile::MARGIN;
 use tile::{Layout, Surfaces, Tile, TileScratch};
 use workers::Workers;
 
-/// Most planes of a sweep.
+/// The largest number of planes of a sweep.
 pub const MAX_PLANES: usize = 1024;
-/// Most taps of a step.
+/// The largest number of taps of a step.
 pub const MAX_TAPS: usize = 63;
-/// The part of a point's first-order spread to its plane that is carried there.
+/// The share of a point's first-order spread to its plane that is applied.
 pub const CARRIED: f64 = 0.5;
-/// Most hidden layers.
+/// The largest number of hidden layers.
 pub const MAX_HIDDEN_LAYERS: usize = 2;
-/// Light that spreads farther than this through the volume, in pixels, is not swept: a tile is swept with a halo as
-/// wide, so that even a small frame would take minutes.
+/// The largest spread of light through the volume, in pixels. A tile's halo is as wide as this spread, so with a larger
+/// one even a small frame would take minutes.
 pub const MAX_REACH: usize = 512;
-/// Light that spreads farther than this from the front of the volume to the hologram, in pixels, is better propagated
-/// from the midpoint by Fourier transforms.
+/// The largest spread of light from the front of the volume to the hologram, in pixels. For a larger one, it is better
+/// to propagate from the midpoint by Fourier transforms.
 pub const MAX_HOME_REACH: usize = 32;
 
-/// How a sweep is done.
+/// The parameters of a plane sweep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sweep {
-    /// Planes that the volume is cut into.
+    /// The number of planes in the volume.
     pub planes: usize,
-    /// Taps of the filter from plane to plane along each axis, an odd number.
+    /// The number of taps of the filter from plane to plane along each axis, which is odd.
     pub taps: usize,
-    /// Hidden layers that are added, 0 to [`MAX_HIDDEN_LAYERS`].
+    /// The number of hidden layers to add, 0 to [`MAX_HIDDEN_LAYERS`].
     pub hidden_layers: usize,
-    /// Whether points may lie between planes, their light being carried to the plane by a first-order step; otherwise
-    /// each is moved to its plane, as in SM-LBM.
+    /// Whether points can be between planes, with their light carried to the plane by a first-order step. Otherwise
+    /// each point is moved to its plane, as in SM-LBM.
     pub between_planes: bool,
-    /// Pixels along each side of a tile, a multiple of 16.
+    /// The number of pixels along each side of a tile, a multiple of 16.
     pub tile: usize,
 }
 
 impl Sweep {
-    /// What suits `display`: planes so near each other that light spreads 3/4 of a pixel from one to the next, as far
-    /// as [`Sweep::DEFAULT_PLANES`] allow, and as many taps as such a step needs.
+    /// Returns parameters that suit `display`: planes so close together that light spreads 3/4 of a pixel from one to
+    /// the next, as far as [`Sweep::DEFAULT_PLANES`] allows, and as many taps as a step needs.
     pub fn for_display(display: &Display) -> Self {
         let reach = reach_px(display, display.volume_depth_m());
         let planes = (reach * 4.0 / 3.0).ceil() as usize;
@@ -79,7 +81,7 @@ impl Sweep {
         Self::of_planes(display, planes)
     }
 
-    /// A sweep of `planes` planes for `display`, with as many taps as its steps need.
+    /// Returns a sweep of `planes` planes for `display`, with as many taps as its steps need.
     pub fn of_planes(display: &Display, planes: usize) -> Self {
         Sweep {
             planes,
@@ -90,13 +92,13 @@ impl Sweep {
         }
     }
 
-    /// Pixels along each side of a tile by default.
+    /// The default number of pixels along each side of a tile.
     pub const TILE: usize = 256;
 
-    /// Planes that [`Sweep::for_display`] chooses from.
+    /// The range of planes that [`Sweep::for_display`] chooses from.
     pub const DEFAULT_PLANES: std::ops::RangeInclusive<usize> = 16..=128;
 
-    /// The taps that a step between `planes` planes needs: light's reach and four more on each side.
+    /// Returns the number of taps that a step between `planes` planes needs: light's reach plus four on each side.
     pub fn taps_for(display: &Display, planes: usize) -> usize {
         let step_m = display.volume_depth_m() / planes.max(1) as f64;
         let radius = reach_px(display, step_m).ceil() as usize + 4;
@@ -146,22 +148,22 @@ impl Sweep {
     }
 }
 
-/// How far light of the longest wavelength spreads over `distance_m`, pixels.
+/// Returns how far light of the longest wavelength spreads over `distance_m`, in pixels.
 fn reach_px(display: &Display, distance_m: f64) -> f64 {
     crate::optics::asm::reach_m(distance_m, display.longest_wavelength_m(), display.pitch_m()) / display.pitch_m()
 }
 
-/// How far a colour's fitted filters are from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that fall
-/// as the spectra of images do; 0 is perfect.
+/// The deviation of a colour's fitted filters from free space: √(Σ w(f)·|H/T − 1|²) along one axis, with weights that
+/// fall like the spectra of images. 0 is perfect.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitError {
-    /// Of one step.
+    /// The error of one step.
     pub step: f64,
-    /// Of all steps through the volume.
+    /// The error of all steps through the volume.
     pub volume: f64,
 }
 
-/// A plan of the sweep for one frame shape and display. Immutable; shared between threads.
+/// A plan of the sweep for one frame shape and display. It is immutable and can be shared between threads.
 pub struct SweepPlan {
     height: usize,
     width: usize,
@@ -173,7 +175,7 @@ pub struct SweepPlan {
     layout: Layout,
 }
 
-/// Working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
+/// The working memory of a [`SweepPlan`] for one frame at a time, for the thread pool in which it was made.
 pub struct SweepScratch {
     planes: Vec<u16>,
     sources: Vec<u32>,
@@ -183,19 +185,19 @@ pub struct SweepScratch {
 }
 
 impl SweepScratch {
-    /// Has frames end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.cancel = cancel.clone();
     }
 }
 
 impl SweepPlan {
-    /// Plans (`height`, `width`) frames for `display`; the hologram stands at `z_m`, 0 being the midpoint. The filters
-    /// are fitted here.
+    /// Plans frames of (`height`, `width`) for `display` with the hologram at `z_m`, where 0 is the midpoint. This fits
+    /// the filters.
     ///
     /// # Errors
-    /// An empty or too large frame, numbers of `sweep` out of their range, or a hologram so far away that light spreads
-    /// over [`MAX_HOME_REACH`] from the front of the volume.
+    /// Returns an error if the frame is empty or too large, a number of `sweep` is out of its range, or the hologram is
+    /// so far away that light spreads over more than [`MAX_HOME_REACH`] from the front of the volume.
     pub fn new(height: usize, width: usize, display: &Display, sweep: Sweep, z_m: f64) -> Result<Self> {
         sweep.check(display)?;
         if height == 0 || width == 0 || height.saturating_mul(width) >= hidden::NOTHING as usize {
@@ -204,7 +206,7 @@ impl SweepPlan {
             )));
         }
         let optics = optics(display, &sweep, z_m)?;
-        // Fitting is the plan's only slow part, and colours do not depend on each other.
+        // Fitting is the only slow part of planning, and colours are independent.
         let filters = optics.par_iter().map(|optics| Filters::new(optics, sweep.taps / 2));
         let filters: Vec<Filters> = filters.collect();
         let way_m = |k: usize| optics[0].home_m.abs() + k as f64 * optics[0].step_m;
@@ -227,43 +229,45 @@ impl SweepPlan {
         })
     }
 
-    /// The same plan on one instruction set; None where this processor lacks it. All give the same bits.
+    /// Returns the same plan on one instruction set, or `None` if this processor lacks it. All instruction sets give
+    /// the same bits.
     pub fn on(self, isa: Isa) -> Option<Self> {
         Fir::new(isa).map(|fir| SweepPlan { fir, ..self })
     }
 
-    /// The same plan with every step between planes by itself, however many are empty: what merging them is worth.
+    /// Returns the same plan with separate steps between all planes, even empty ones, to measure the gain of merging
+    /// them.
     pub fn unmerged(mut self) -> Self {
         self.filters.iter_mut().for_each(Filters::unmerge);
         self
     }
 
-    /// The instruction set that the filters run on.
+    /// Returns the instruction set of the filters.
     pub fn isa(&self) -> Isa {
         self.fir.isa()
     }
 
-    /// (H, W).
+    /// Returns the frame shape (H, W).
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// How it is done.
+    /// Returns the parameters of the sweep.
     pub fn sweep(&self) -> Sweep {
         self.sweep
     }
 
-    /// Where the hologram stands, metres from the midpoint toward the viewer.
+    /// Returns the position of the hologram in metres from the midpoint toward the viewer.
     pub fn z_m(&self) -> f64 {
         self.z_m
     }
 
-    /// The filters of each colour.
+    /// Returns the filters of each colour.
     pub fn filters(&self) -> &[Filters] {
         &self.filters
     }
 
-    /// How well the filters of each colour fit.
+    /// Returns the fit errors of each colour's filters.
     pub fn fit_errors(&self) -> Vec<FitError> {
         let of = |filters: &Filters| FitError {
             step: filters.errors[0],
@@ -272,7 +276,7 @@ impl SweepPlan {
         self.filters.iter().map(of).collect()
     }
 
-    /// Working memory for one frame at a time, for the current thread pool.
+    /// Returns working memory for one frame at a time, sized for the current thread pool.
     pub fn scratch(&self) -> SweepScratch {
         let size = self.height * self.width;
         let layers = self.sweep.hidden_layers;
@@ -290,13 +294,14 @@ impl SweepPlan {
         }
     }
 
-    /// The hologram of `frame`, carrier-free, at [`SweepPlan::z_m`], into `field`, (C, H, W). Allocates nothing.
+    /// Writes the hologram of `frame`, without the carrier, at [`SweepPlan::z_m`] into `field`, (C, H, W). Allocates
+    /// nothing.
     ///
     /// # Errors
-    /// A frame of another shape or of other colours.
+    /// Returns an error if the frame has another shape or other colours.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values or `scratch` is another plan's.
+    /// Panics if `field` does not have C·H·W values or `scratch` belongs to another plan.
     pub fn field(&self, frame: &RgbdFrame, field: &mut [Complex32], scratch: &mut SweepScratch) -> Result<()> {
         frame.check(self.shape(), self.filters.len())?;
         let size = self.height * self.width;
@@ -323,7 +328,7 @@ impl SweepPlan {
             width: self.width,
         };
         let mut planes = field.chunks_exact_mut(size);
-        // As many as there may be, for nothing is allocated here.
+        // An array of the largest number of planes avoids an allocation.
         let planes: [_; 3] = std::array::from_fn(|_| Mutex::new(planes.next().unwrap_or_default()));
         let (down, across) = self.layout.count(self.height, self.width);
         (0..down * across).into_par_iter().with_max_len(1).for_each(|index| {
@@ -344,22 +349,22 @@ impl SweepPlan {
     }
 }
 
-/// The plane of a pixel of depth `d` among `planes`, 0 the nearest.
+/// Returns the plane of a pixel of depth `d` among `planes`, where 0 is the nearest.
 pub fn plane_of_depth(d: f32, planes: usize) -> usize {
     ((f64::from(d) * planes as f64) as usize).min(planes - 1)
 }
 
-/// How far hidden surfaces are searched for: as far as light spreads through the volume.
+/// Returns how far to search for hidden surfaces: as far as light spreads through the volume.
 pub fn hidden_reach(display: &Display) -> usize {
     (reach_px(display, display.volume_depth_m()).ceil() as usize).max(1)
 }
 
-/// Whether a sweep can end at `z_m`: not farther from the front of the volume than short filters reach.
+/// Returns whether a sweep can end at `z_m`, that is, whether short filters reach it from the front of the volume.
 pub fn reaches(display: &Display, z_m: f64) -> bool {
     reach_px(display, z_m.abs() + display.volume_depth_m() / 2.0) <= MAX_HOME_REACH as f64
 }
 
-/// The optics of each colour between the planes of `sweep` and to `z_m`.
+/// Returns the optics of each colour between the planes of `sweep` and from plane 0 to `z_m`.
 pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>> {
     if !z_m.is_finite() {
         return Err(Error::Setting(format!(
@@ -369,7 +374,7 @@ pub fn optics(display: &Display, sweep: &Sweep, z_m: f64) -> Result<Vec<Optics>>
     let step_m = display.volume_depth_m() / sweep.planes as f64;
     let home_m = z_m - (display.volume_depth_m() - step_m) / 2.0;
     let reach = reach_px(display, home_m);
-    // The volume itself may be wide; what ends at the midpoint is always served.
+    // The volume itself may be wide, so a sweep that ends at the midpoint is always accepted.
     if z_m != 0.0 && !reaches(display, z_m) {
         return Err(Error::Setting(format!(
             "sweep: light spreads {reach:.0} pixels from the front of the volume to z = {:.3} mm, more than {MAX_HOME_REACH}; end at the midpoint and propagate from there",

@@ -1,35 +1,37 @@
-//! The circular aperture in the Fourier plane, Eq. 8–9: it lets the first diffraction order pass
-//! and turns a double-phase pattern back into a complex field.
+//! The circular aperture in the Fourier plane, Eq. 8–9. It passes the first diffraction order and turns a double-phase
+//! pattern back into a complex field.
 
 use super::fft::{ConvolveScratch, Fft2};
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 
-/// Whether the aperture passes the frequency (`fx`, `fy`), in cycles a pixel: fx² + fy² ≤ (radius/2)².
+/// Returns whether the aperture passes the frequency (`fx`, `fy`), in cycles per pixel: fx² + fy² ≤ (radius/2)².
 ///
-/// `radius` 1 reaches the Nyquist frequency ½, which is the paper's r of half the image
-/// resolution. The circle is round in frequency, so for a frame that is not square it is an
-/// ellipse in DFT bins, as a round hole in the Fourier plane is.
+/// A `radius` of 1 reaches the Nyquist frequency ½, the paper's r of half the image resolution. The aperture is a
+/// circle in frequency, like a round hole in the Fourier plane, and therefore an ellipse in DFT bins if the frame is
+/// not square.
 pub fn passes(fx: f64, fy: f64, radius: f64) -> bool {
     fx * fx + fy * fy <= 0.25 * radius * radius
 }
 
-/// A round hole in the Fourier plane.
+/// A round aperture in the Fourier plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Opening {
-    /// 1 reaches the Nyquist frequency.
+    /// The radius; 1 reaches the Nyquist frequency.
     pub radius: f64,
-    /// How far its centre lies beside the optical axis along x, of the Nyquist frequency; 0 for one that is adjusted.
+    /// The shift of its centre from the optical axis along x, as a share of the Nyquist frequency; 0 if the aperture is
+    /// adjusted.
     pub shift: f64,
 }
 
 impl Opening {
-    /// One of `radius` on the axis.
+    /// Creates an aperture of `radius` on the axis.
     pub fn centred(radius: f64) -> Self {
         Opening { radius, shift: 0.0 }
     }
 
-    /// What passes it of column `kx` of a spectrum of (H', W') = `shape` that is stored column by column.
+    /// Zeroes the blocked frequencies of column `kx` of a spectrum of (H', W') = `shape` that is stored column by
+    /// column.
     pub(crate) fn stop(self, kx: usize, (height, width): (usize, usize), column: &mut [Complex32]) {
         let signed = if 2 * kx > width {
             kx as f64 - width as f64
@@ -37,7 +39,7 @@ impl Opening {
             kx as f64
         };
         let fx = signed / width as f64 - 0.5 * self.shift;
-        // Rows pass up to one frequency.
+        // The passing rows are those up to one frequency.
         let passing = (0..=height / 2).take_while(|ky| passes(fx, *ky as f64 / height as f64, self.radius));
         let passing = passing.count();
         let negative = (height + 1 - passing).clamp(passing, height);
@@ -55,7 +57,7 @@ impl Opening {
     }
 }
 
-/// A plan for one shape and opening. Immutable; shared between threads.
+/// A plan for one shape and opening. It is immutable and can be shared between threads.
 pub struct Aperture {
     fft: Fft2,
     opening: Opening,
@@ -65,7 +67,7 @@ impl Aperture {
     /// Plans the filtering of (`height`, `width`) planes, periodic as in Eq. 8, by `opening`.
     ///
     /// # Errors
-    /// A radius that is not positive, or an empty plane.
+    /// Returns an error if the radius is not positive or the plane is empty.
     pub fn new(height: usize, width: usize, opening: Opening) -> Result<Self> {
         opening.check()?;
         if height == 0 || width == 0 {
@@ -79,15 +81,15 @@ impl Aperture {
         })
     }
 
-    /// Working memory for one call at a time.
+    /// Allocates working memory for one call at a time.
     pub fn scratch(&self) -> ConvolveScratch {
         self.fft.convolve_scratch()
     }
 
-    /// Replaces `plane`, (H, W), by F⁻¹(F(plane)·M). Allocates nothing.
+    /// Replaces `plane`, (H, W), by F⁻¹(F(plane)·M). Does not allocate.
     ///
     /// # Panics
-    /// If `plane` has not H·W values or `scratch` is another plan's.
+    /// Panics if `plane` does not have H·W values or `scratch` belongs to another plan.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         let shape = self.fft.padded_shape();
         let scale = 1.0 / (shape.0 * shape.1) as f32;

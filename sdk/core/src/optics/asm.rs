@@ -1,14 +1,12 @@
-//! The angular spectrum method, Eq. 2 of the paper: the field at a distance s from a plane.
+//! The angular spectrum method, Eq. 2 of the paper, which computes the field at a distance s from a plane.
 //!
-//! ASM(u, s) = F⁻¹(F(u) · exp(+i2πs·√(λ⁻² − µ² − ν²))), s positive toward the viewer; the
-//! evanescent part is zero. It is a linear convolution: the frame is padded with zeros and the
-//! result cropped to it.
+//! ASM(u, s) = F⁻¹(F(u) · exp(+i2πs·√(λ⁻² − µ² − ν²))), with s positive toward the viewer. The evanescent part is zero.
+//! The convolution is linear: the frame is padded with zeros, and the result is cropped.
 //!
-//! The carrier exp(i2πs/λ) is left out of the exponent, as
-//! √(λ⁻² − f²) − λ⁻¹ = −λf²/(1 + √(1 − λ²f²)), f² = µ² + ν². At 20 mm and 450 nm the carrier is
-//! 2.8·10⁵ rad: with it an f32 phase would be worth 0.03 rad; without it only what bends the
-//! wave is left, computed in f64. Points that start with the phase 2πz/λ of Eq. 1 start with
-//! phase zero here, and both agree at z = 0.
+//! The exponent leaves out the carrier exp(i2πs/λ) by using √(λ⁻² − f²) − λ⁻¹ = −λf²/(1 + √(1 − λ²f²)), f² = µ² + ν².
+//! At 20 mm and 450 nm the carrier is 2.8·10⁵ rad, and an f32 phase that includes it is only accurate to 0.03 rad.
+//! Without it, only the part that bends the wave remains, which is computed in f64. Points with the initial phase 2πz/λ
+//! in Eq. 1 have the initial phase zero here; the two conventions agree at z = 0.
 
 use super::aperture::Opening;
 use super::aperture::passes;
@@ -20,39 +18,41 @@ use phasefront_kernels::wide;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// The most values a padded plane may hold: 1 GiB of complex numbers.
+/// The largest number of values in a padded plane: 1 GiB of complex numbers.
 pub const MAX_PADDED_VALUES: usize = 1 << 27;
 
-/// How far a frame is padded with zeros before its transform.
+/// The amount of zero padding of a frame before its transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Padding {
-    /// As far as light diffracted at the pitch can reach from the distance, see [`reach_m`].
+    /// Padding by the reach of light diffracted at the pitch over the distance, see [`reach_m`].
     Reach,
-    /// To twice the size, whatever the distance; beyond the distance that this can hold, the band
-    /// limit of Matsushima and Shimobaba keeps the kernel from wrapping around (Opt. Express 17,
-    /// 19662, 2009). The oracle of [`Padding::Reach`].
+    /// Padding to twice the size at any distance. Tests compare [`Padding::Reach`] with it.
+    ///
+    /// At distances whose kernel does not fit, the band limit of Matsushima and Shimobaba (Opt. Express 17, 19662,
+    /// 2009) keeps the kernel from wrapping around.
     Double,
-    /// Not at all: the plane is periodic.
+    /// No padding. The plane is periodic.
     Circular,
 }
 
-/// How far sideways light of `wavelength_m` can travel over `distance_m` when diffracted by pixels
-/// of `pitch_m`: |s|·tan(asin(λ/2p)), metres.
+/// Returns the distance in metres, |s|·tan(asin(λ/2p)), that light of `wavelength_m` diffracted by pixels of `pitch_m`
+/// can travel sideways over `distance_m`.
 pub fn reach_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
     distance_m.abs() * (wavelength_m / (2.0 * pitch_m)).asin().tan()
 }
 
-/// The carrier that fields here leave out: exp(i2πs/λ), its phase reduced in f64.
+/// Returns the carrier exp(i2πs/λ) that the fields here leave out. Its phase is reduced in f64.
 pub fn carrier(distance_m: f64, wavelength_m: f64) -> Complex32 {
     let turns = (distance_m / wavelength_m).fract();
     let phase = Complex64::from_polar(1.0, 2.0 * PI * turns);
     Complex32::new(phase.re as f32, phase.im as f32)
 }
 
-/// The padded shape (H', W') in which a (`height`, `width`) frame moves by up to `distance_m`.
+/// Returns the padded shape (H', W') in which a (`height`, `width`) frame propagates by up to `distance_m`.
 ///
 /// # Errors
-/// A distance that is not finite, or whose padded plane would exceed [`MAX_PADDED_VALUES`].
+/// Returns an error if the frame is empty, the distance is not finite, or the padded plane would exceed
+/// [`MAX_PADDED_VALUES`].
 pub fn padded_shape(
     height: usize,
     width: usize,
@@ -93,10 +93,10 @@ pub fn padded_shape(
     })
 }
 
-/// The transfer function of one distance on a padded plane: one quadrant of it where it is even in both
-/// frequencies, as free space is.
+/// The transfer function of one distance on a padded plane. If it is even in both frequencies, as in free space, only
+/// one quadrant is stored.
 pub struct Transfer {
-    /// (W'/2 + 1, H'/2 + 1), or (W', H') where it is not even; scaled by 1/(H'·W') for the unnormalized
+    /// The factors, (W'/2 + 1, H'/2 + 1) if even, else (W', H'). They include 1/(H'·W') for the unnormalized
     /// transforms.
     factors: Vec<Complex32>,
     even: bool,
@@ -104,8 +104,8 @@ pub struct Transfer {
     padded_width: usize,
 }
 
-/// The exponent of free space at the frequency (`mu`, `nu`), cycles a metre, without the carrier, radians;
-/// None where the wave is evanescent.
+/// Returns the exponent of free space at the frequency (`mu`, `nu`), in cycles per metre, without the carrier, in
+/// radians, or `None` if the wave is evanescent.
 fn free_space(mu: f64, nu: f64, wavelength_m: f64, distance_m: f64) -> Option<f64> {
     let f2 = mu * mu + nu * nu;
     let cosine2 = 1.0 - wavelength_m * wavelength_m * f2;
@@ -113,8 +113,8 @@ fn free_space(mu: f64, nu: f64, wavelength_m: f64, distance_m: f64) -> Option<f6
 }
 
 impl Transfer {
-    /// H(µ, ν) of `distance_m` on a padded plane (H', W'), zero where `keep` says no to |µ|, |ν| (cycles
-    /// a metre) and where the wave is evanescent.
+    /// Computes H(µ, ν) of `distance_m` on a padded plane (H', W'). It is zero if `keep` returns false for |µ|, |ν|, in
+    /// cycles per metre, or if the wave is evanescent.
     pub fn new(
         (padded_height, padded_width): (usize, usize),
         pitch_m: f64,
@@ -143,8 +143,8 @@ impl Transfer {
         }
     }
 
-    /// H(µ, ν)·exp(i·`phase`(µ, ν)) of `distance_m` on a padded plane (H', W'), µ and ν signed: free space and
-    /// a correction in the pupil. Four times the memory of [`Self::new`].
+    /// Computes H(µ, ν)·exp(i·`phase`(µ, ν)) of `distance_m` on a padded plane (H', W'), with signed µ and ν: free
+    /// space and a correction in the pupil. Takes four times the memory of [`Self::new`].
     pub fn corrected(
         (padded_height, padded_width): (usize, usize),
         pitch_m: f64,
@@ -176,12 +176,12 @@ impl Transfer {
         }
     }
 
-    /// The factors, one quadrant of them, (W'/2 + 1, H'/2 + 1), where they are even, else (W', H').
+    /// Returns the factors: one quadrant, (W'/2 + 1, H'/2 + 1), if they are even, else (W', H').
     pub fn factors(&self) -> &[Complex32] {
         &self.factors
     }
 
-    /// [`Self::factors`] behind an aperture of `radius`, 1 reaching the Nyquist frequency.
+    /// Returns [`Self::factors`] behind an aperture of `radius`, where 1 reaches the Nyquist frequency.
     pub fn factors_through(&self, radius: f64) -> Vec<Complex32> {
         let (width, height) = (self.padded_width, self.padded_height);
         let rows = if self.even { height / 2 + 1 } else { height };
@@ -225,14 +225,14 @@ impl Transfer {
     }
 }
 
-/// `scale`·exp(i·`phase`), the angle in f64.
+/// Returns `scale`·exp(i·`phase`), with the angle in f64.
 fn polar(scale: f64, phase: f64) -> Complex32 {
     let (sin, cos) = phase.sin_cos();
     Complex32::new((cos * scale) as f32, (sin * scale) as f32)
 }
 
-/// What [`Transfer::new`] is to keep under `padding`: everything, or the frequencies under the
-/// band limit where the doubled plane cannot hold the kernel.
+/// Returns the predicate `keep` of [`Transfer::new`] for `padding`. It keeps all frequencies, or only those under the
+/// band limit if the doubled plane cannot hold the kernel.
 fn band_limit(
     (padded_height, padded_width): (usize, usize),
     pitch_m: f64,
@@ -240,7 +240,7 @@ fn band_limit(
     distance_m: f64,
     padding: Padding,
 ) -> impl Fn(f64, f64) -> bool {
-    // Matsushima's limit 1/(λ√((2s·Δf)² + 1)) with Δf the sampling of the spectrum.
+    // Matsushima's limit 1/(λ√((2s·Δf)² + 1)), where Δf is the sampling interval of the spectrum.
     let limit = |n: usize| match padding {
         Padding::Double => {
             let df = 1.0 / (n as f64 * pitch_m);
@@ -252,7 +252,7 @@ fn band_limit(
     move |mu, nu| mu <= limit_x && nu <= limit_y
 }
 
-/// A plan for one shape, wavelength and distance. Immutable; shared between threads.
+/// A plan for one shape, wavelength and distance. It is immutable and can be shared between threads.
 ///
 /// ```
 /// use num_complex::Complex32;
@@ -275,7 +275,7 @@ impl Propagator {
     /// Plans ASM(·, `distance_m`) of (`height`, `width`) planes.
     ///
     /// # Errors
-    /// As [`padded_shape`].
+    /// Returns an error if [`padded_shape`] does.
     pub fn new(
         height: usize,
         width: usize,
@@ -293,11 +293,11 @@ impl Propagator {
         })
     }
 
-    /// A plan for each wavelength, which share one padded shape (that of the longest, the widest) and so
-    /// one [`ConvolveScratch`].
+    /// Creates a plan for each wavelength. The plans share the padded shape of the longest wavelength, which is the
+    /// largest, and can therefore share one [`ConvolveScratch`].
     ///
     /// # Errors
-    /// As [`padded_shape`].
+    /// Returns an error if [`padded_shape`] does.
     pub fn for_colours(
         height: usize,
         width: usize,
@@ -320,11 +320,12 @@ impl Propagator {
         Ok(wavelengths_m.iter().map(plan).collect())
     }
 
-    /// [`Self::for_colours`] padded by the reach of light, each colour with the correction of `aberration`, which is
-    /// that of a modulator of `modulator_pitch_m`, on its way.
+    /// Creates plans like [`Self::for_colours`] with [`Padding::Reach`], which also apply the correction `aberration`
+    /// of a modulator of `modulator_pitch_m` to each colour.
     ///
     /// # Errors
-    /// As [`padded_shape`], the light that the correction moves counted in; a correction of other colours.
+    /// Returns an error if [`padded_shape`] does for planes padded by the reach of the correction too, or if the
+    /// correction has another number of colours.
     pub fn for_colours_corrected(
         height: usize,
         width: usize,
@@ -359,39 +360,39 @@ impl Propagator {
         Ok(wavelengths_m.iter().enumerate().map(plan).collect())
     }
 
-    /// (H, W).
+    /// Returns (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.shape
     }
 
-    /// (H', W').
+    /// Returns (H', W').
     pub fn padded_shape(&self) -> (usize, usize) {
         self.fft.padded_shape()
     }
 
-    /// The transfer function.
+    /// Returns the transfer function.
     pub fn transfer(&self) -> &Transfer {
         &self.transfer
     }
 
-    /// Working memory for one call at a time, sized for the current thread pool.
+    /// Allocates working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> ConvolveScratch {
         self.fft.convolve_scratch()
     }
 
-    /// Replaces `plane`, (H, W), by the field at the planned distance. Allocates nothing.
+    /// Replaces `plane`, (H, W), by the field at the planned distance. Does not allocate.
     ///
     /// # Panics
-    /// If `plane` has not H·W values or `scratch` is another plan's.
+    /// Panics if `plane` does not have H·W values or `scratch` belongs to another plan.
     pub fn propagate(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         self.fft
             .convolve(plane, |x, column| self.transfer.apply(x, column), scratch);
     }
 
-    /// [`Self::propagate`] through an aperture of `radius`, 1 reaching the Nyquist frequency.
+    /// Propagates like [`Self::propagate`] through an aperture of `radius`, where 1 reaches the Nyquist frequency.
     ///
     /// # Panics
-    /// As [`Self::propagate`].
+    /// Panics in the cases of [`Self::propagate`].
     pub fn propagate_through(&self, plane: &mut [Complex32], radius: f64, scratch: &mut ConvolveScratch) {
         let (shape, opening) = (self.padded_shape(), Opening::centred(radius));
         let filter = |x: usize, column: &mut [Complex32]| {

@@ -1,11 +1,11 @@
-//! A filter in the Fourier domain of a zero-padded plane.
+//! Filtering in the Fourier domain of a zero-padded plane.
 //!
-//! [`Fft2::convolve`] is the whole of it, three sweeps through memory. Who wants the spectrum itself, or several
-//! filters of one plane, takes the passes one by one: [`Fft2::rows_forward`], [`Fft2::columns`],
-//! [`Fft2::rows_inverse`]. Neither transforms rows or columns that hold only padding.
+//! [`Fft2::convolve`] filters a plane in three sweeps through memory. Code that needs the spectrum itself, or several
+//! filters of one plane, calls the passes separately: [`Fft2::rows_forward`], [`Fft2::columns`],
+//! [`Fft2::rows_inverse`]. Neither way transforms rows or columns that hold only padding.
 //!
-//! The 1D transforms are rustfft's: any length, mixed radix. Transforms here are unnormalized; a filter carries the
-//! 1/(H·W).
+//! The 1D transforms are rustfft's: any length, mixed radix. Transforms are unnormalized; the filter includes the
+//! factor 1/(H·W).
 
 mod convolve;
 mod passes;
@@ -18,10 +18,12 @@ pub use size::fast_size;
 use rustfft::{Fft, FftPlanner};
 use std::sync::Arc;
 
-/// Parts of a pass for each thread, so that a delayed thread leaves the others work to take.
+/// The number of parts of a pass for each thread. More than one lets other threads take over the work of a delayed
+/// thread.
 const PARTS_PER_THREAD: usize = 4;
 
-/// The transforms of an (H, W) frame inside a padded (H', W') plane. Immutable; share it freely.
+/// The transforms of an (H, W) frame inside a padded (H', W') plane. They are immutable and can be shared between
+/// threads.
 pub struct Fft2 {
     height: usize,
     width: usize,
@@ -31,7 +33,7 @@ pub struct Fft2 {
     column: [Arc<dyn Fft<f32>>; 2],
 }
 
-/// Parts of a pass on the current thread pool.
+/// Returns the number of parts of a pass on the current thread pool.
 fn parts() -> usize {
     match rayon::current_num_threads() {
         1 => 1,
@@ -40,8 +42,8 @@ fn parts() -> usize {
 }
 
 impl Fft2 {
-    /// Plans the transforms of a (`height`, `width`) frame in a plane of (`padded_height`,
-    /// `padded_width`), the frame at its top left.
+    /// Plans the transforms of a (`height`, `width`) frame at the top left of a plane of (`padded_height`,
+    /// `padded_width`).
     pub fn new(height: usize, width: usize, padded_height: usize, padded_width: usize) -> Self {
         assert!(0 < height && height <= padded_height && 0 < width && width <= padded_width);
         let mut planner = FftPlanner::new();
@@ -61,12 +63,12 @@ impl Fft2 {
         }
     }
 
-    /// (H', W').
+    /// Returns (H', W').
     pub fn padded_shape(&self) -> (usize, usize) {
         (self.padded_height, self.padded_width)
     }
 
-    /// What one 1D transform works in.
+    /// Returns the number of scratch values of one 1D transform.
     fn work_values(&self) -> usize {
         (self.row.iter().chain(&self.column))
             .map(|fft| fft.get_inplace_scratch_len())

@@ -1,12 +1,11 @@
-//! The angular spectrum method as the equation has it: naive sums in f64. The oracle of
-//! [`super::asm`].
+//! The definition of the angular spectrum method as direct sums in f64. Tests compare [`super::asm`] with it.
 
 use ndarray::Array2;
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// ASM(`field`, `distance_m`) in a plane padded with zeros to `padded` (H', W') and cropped again,
-/// Eq. 2 with the carrier exp(i2πs/λ) left in. Two passes of direct Fourier sums: O(H'W'(H'+W')).
+/// Computes ASM(`field`, `distance_m`) in a plane padded with zeros to `padded` (H', W') and crops it, following Eq. 2
+/// with the carrier exp(i2πs/λ). It uses two passes of direct Fourier sums: O(H'W'(H'+W')).
 pub fn propagate(
     field: &Array2<Complex64>,
     pitch_m: f64,
@@ -32,13 +31,13 @@ pub fn propagate(
     out.slice(ndarray::s![..h, ..w]).to_owned()
 }
 
-/// Frequency of bin `k` of `n`, in cycles a sample, within [−½, ½).
+/// Returns the frequency of bin `k` of `n`, in cycles per sample, within [−½, ½).
 fn frequency(k: usize, n: usize) -> f64 {
     let k = k as f64;
     (if 2.0 * k < n as f64 { k } else { k - n as f64 }) / n as f64
 }
 
-/// The 2D discrete Fourier sum with exponent `sign`·i2πkx/n, unnormalized.
+/// Computes the unnormalized 2D discrete Fourier sum with exponent `sign`·i2πkx/n.
 pub fn dft(plane: &Array2<Complex64>, sign: f64) -> Array2<Complex64> {
     let matrix = |n: usize| {
         Array2::from_shape_fn((n, n), |(k, x)| {

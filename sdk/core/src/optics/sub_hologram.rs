@@ -1,13 +1,14 @@
 //! Sub-holograms that focus a plane wave, with and without a correction, Eq. 19.
 //!
 //! # Sub-holograms and the corrected transfer function
-//! The paper puts the terms on the sub-hologram φ⁰ that focuses a plane wave to the distance d (Eq. 19), takes it
-//! to its focus, and calls the Fourier transform of what it finds there Φ. The light that leaves the
-//! sub-hologram at (x, y) arrives with the frequency −(x, y)/(λd), so its pupil is ours, turned by π where
-//! d > 0. As its aperture grows Φ becomes exp(i·terms), [`Aberration::phase`](super::zernike::Aberration::phase): that
-//! is what is used, for every d, 0 included, where a sub-hologram has no size; and |Φ| is 1 where diffraction at the
-//! rim of a sub-hologram ripples it. [`sub_hologram`] and [`corrected_transfer_function`] are the paper's way: the one
-//! for captures of a focused spot, the other as the oracle.
+//! The paper adds the terms to the sub-hologram φ⁰, which focuses a plane wave at the distance d (Eq. 19), propagates
+//! it to its focus, and defines Φ as the Fourier transform of the result. Light that leaves the sub-hologram at (x, y)
+//! arrives with the frequency −(x, y)/(λd), so the paper's pupil is the one used here, rotated by π if d > 0.
+//!
+//! As the aperture grows, Φ approaches exp(i·terms), [`Aberration::phase`](super::zernike::Aberration::phase). This
+//! limit is used for every d, including 0, where a sub-hologram has no size. Its magnitude is 1, without the ripples of
+//! diffraction at the rim of a sub-hologram. [`sub_hologram`] and [`corrected_transfer_function`] follow the paper. The
+//! first serves captures of a focused spot, and tests check the transfer function against the second.
 
 use super::asm::{Padding, Propagator};
 use super::reference;
@@ -17,17 +18,17 @@ use ndarray::Array2;
 use num_complex::{Complex32, Complex64};
 use std::f64::consts::PI;
 
-/// How far from its centre a sub-hologram reaches that focuses to `distance_m`, metres: |d|·tan(asin(λ/2p)).
+/// Returns the radius of a sub-hologram that focuses at `distance_m`, |d|·tan(asin(λ/2p)), in metres.
 pub fn sub_hologram_radius_m(distance_m: f64, wavelength_m: f64, pitch_m: f64) -> f64 {
     super::asm::reach_m(distance_m, wavelength_m, pitch_m)
 }
 
-/// The corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of (`height`, `width`) pixels: amplitude 1 in its
-/// circle, where it bends a plane wave to a focus at the signed `distance_m` (positive toward the viewer),
-/// with the correction `a` on it; 0 outside.
+/// Computes the corrected sub-hologram φ_d of Eq. 19 in the middle of a plane of (`height`, `width`) pixels. In its
+/// circle, the amplitude is 1, and it focuses a plane wave at the signed `distance_m` (positive toward the viewer) with
+/// the correction `a`. Outside, it is 0.
 ///
 /// # Errors
-/// A distance of 0 or one that is not finite, or an aperture that does not fit into the plane.
+/// Returns an error if the distance is 0 or not finite, or if the aperture does not fit into the plane.
 pub fn sub_hologram(
     height: usize,
     width: usize,
@@ -55,7 +56,7 @@ pub fn sub_hologram(
                 plane.push(Complex32::ZERO);
                 continue;
             }
-            // The conjugate of the wave that a point at the focus would send here.
+            // The conjugate of the wave from a point at the focus.
             let path = square / (distance_m.abs() + (distance_m * distance_m + square).sqrt());
             let lens = -2.0 * PI / wavelength_m * path * distance_m.signum();
             let side = -distance_m.signum() / pixels;
@@ -66,12 +67,13 @@ pub fn sub_hologram(
     Ok(plane)
 }
 
-/// Φ_d = F(ASM(φ_d, d)), the paper's way, (H, W), frequencies in the order of the discrete Fourier transform and phases
-/// against the centre of the sub-hologram; scaled so that the uncorrected one has a mean magnitude of 1 over
-/// half the pupil. Naive sums: for small planes.
+/// Computes Φ_d = F(ASM(φ_d, d)) as in the paper, (H, W), by direct sums for small planes.
+///
+/// Frequencies are in the order of the discrete Fourier transform. Phases are relative to the centre of the
+/// sub-hologram. The scale gives the uncorrected function a mean magnitude of 1 over half the pupil.
 ///
 /// # Errors
-/// As [`sub_hologram`].
+/// Returns an error if [`sub_hologram`] does.
 pub fn corrected_transfer_function(
     height: usize,
     width: usize,
@@ -85,7 +87,7 @@ pub fn corrected_transfer_function(
         let padding = Padding::Reach;
         let plan = Propagator::new(height, width, pitch_m, wavelength_m, distance_m, padding)?;
         plan.propagate(&mut plane, &mut plan.scratch());
-        // The centre comes to the corner, so that Φ says nothing of where the sub-hologram stood.
+        // The centre moves to the corner, so that Φ does not depend on the position of the sub-hologram.
         let (cy, cx) = ((height - 1) / 2, (width - 1) / 2);
         let spot = Array2::from_shape_fn((height, width), |(y, x)| {
             let v = plane[(y + cy) % height * width + (x + cx) % width];
@@ -100,7 +102,7 @@ pub fn corrected_transfer_function(
         fx * fx + fy * fy < 0.25 * 0.25
     });
     let (sum, count) = inner.fold((Complex64::ZERO, 0), |(sum, n), (_, v)| (sum + v, n + 1));
-    // A converging wave is also turned by a constant, which is no aberration.
+    // A converging wave also has a constant phase, which is not an aberration.
     Ok(spectrum(a)? / (sum / f64::from(count)))
 }
 
@@ -113,7 +115,7 @@ mod tests {
     const PITCH: f64 = 8e-6;
     const GREEN: f64 = 520e-9;
 
-    /// The paper's Φ of a sub-hologram has the phase that is used, before and behind the modulator.
+    /// The paper's Φ of a sub-hologram must have the phase of `Aberration::phase`, on both sides of the modulator.
     #[test]
     fn the_sub_hologram_has_the_transfer_function() {
         let n = 128;
@@ -130,7 +132,7 @@ mod tests {
                     continue;
                 }
                 let expected = aberration.phase(1, fx / PITCH, fy / PITCH, PITCH);
-                // Against the uncorrected one: rim and lens are alike in both.
+                // The ratio to the uncorrected function cancels the rim and the lens, which are the same in both.
                 let apart = (value / ideal[(ky, kx)] * Complex64::from_polar(1.0, -expected)).arg();
                 square += apart * apart;
                 count += 1.0;

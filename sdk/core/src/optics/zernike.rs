@@ -1,15 +1,13 @@
-//! Aberrations and their correction, Eq. 14–19: five Zernike terms over the pupil, per colour and per
-//! distance.
+//! Aberrations and their correction, Eq. 14–19: five Zernike terms over the pupil, for each colour and distance.
 //!
 //! # The pupil
-//! Its coordinates are those of frequency: ρ·(cos θ, sin θ) = (µ, ν)/f₁ with f₁ = 1/(2·pitch), the Nyquist
-//! frequency, so that the paper's aperture is ρ ≤ 1. The five terms, in radians, with x = ρ cos θ
-//! and y = ρ sin θ:
+//! The pupil's coordinates are frequencies: ρ·(cos θ, sin θ) = (µ, ν)/f₁, where f₁ = 1/(2·pitch) is the Nyquist
+//! frequency, so that the paper's aperture is ρ ≤ 1. The five terms, in radians, with x = ρ cos θ and y = ρ sin θ:
 //!
 //! a₃(2ρ² − 1) + a₄(x² − y²) + 2a₅xy + (3ρ² − 2)(a₆x + a₇y)
 //!
-//! A coefficient is that of the *correction*: what makes the wave come to a tight focus. The aberration of
-//! the display has the other sign. Beyond ρ = 1 the polynomials go on, as a lens does.
+//! The coefficients describe the *correction*, which focuses the wave tightly. The aberration of the display has the
+//! opposite sign. Beyond ρ = 1 the polynomials continue, as a lens does.
 
 use crate::runtime::error::{Error, Result};
 use std::f64::consts::PI;
@@ -23,13 +21,13 @@ pub const TERMS: [&str; 5] = [
     "vertical coma",
 ];
 
-/// The coefficients a₃ to a₇ of one colour, radians.
+/// The coefficients a₃ to a₇ of one colour, in radians.
 pub type Coefficients = [f64; 5];
 
-/// The most that a coefficient may be, radians: beyond it no padding holds the light.
+/// The largest magnitude of a coefficient, in radians. Beyond it, no padding holds the light.
 const MOST: f64 = 1e4;
 
-/// Eq. 14–18 summed, radians, at (`x`, `y`) of the pupil, both 1 at its rim.
+/// Returns the sum of Eq. 14–18, in radians, at (`x`, `y`) of the pupil, whose rim has radius 1.
 pub fn terms(a: &Coefficients, x: f64, y: f64) -> f64 {
     let square = x * x + y * y;
     a[0] * (2.0 * square - 1.0)
@@ -38,24 +36,24 @@ pub fn terms(a: &Coefficients, x: f64, y: f64) -> f64 {
         + (3.0 * square - 2.0) * (a[3] * x + a[4] * y)
 }
 
-/// The correction of one distance: coefficients of each colour.
+/// The correction at one distance, with coefficients for each colour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aberration {
     coefficients: Vec<Coefficients>,
 }
 
 impl Aberration {
-    /// Nothing to correct in so many colours.
+    /// Creates a zero correction for `colours` colours.
     pub fn none(colours: usize) -> Self {
         Aberration {
             coefficients: vec![[0.0; 5]; colours],
         }
     }
 
-    /// From the coefficients a₃ to a₇ of red, green and blue or of the one laser, radians.
+    /// Creates a correction from the coefficients a₃ to a₇, in radians, of red, green and blue or of the single laser.
     ///
     /// # Errors
-    /// Neither three colours nor one; a coefficient that is not finite or beyond ±10⁴.
+    /// Returns an error if there are neither three colours nor one, or if a coefficient is not finite or exceeds ±10⁴.
     pub fn new(coefficients: impl Into<Vec<[f64; 5]>>) -> Result<Self> {
         let coefficients = coefficients.into();
         if ![1, 3].contains(&coefficients.len()) {
@@ -72,22 +70,22 @@ impl Aberration {
         }
     }
 
-    /// The coefficients of each colour, radians.
+    /// Returns the coefficients of each colour, in radians.
     pub fn coefficients(&self) -> &[[f64; 5]] {
         &self.coefficients
     }
 
-    /// The phase of Φ at the frequency (`mu`, `nu`), cycles a metre, radians.
+    /// Returns the phase of Φ, in radians, at the frequency (`mu`, `nu`), in cycles per metre.
     pub fn phase(&self, colour: usize, mu: f64, nu: f64, pitch_m: f64) -> f64 {
         let rim = 1.0 / (2.0 * pitch_m);
         terms(&self.coefficients[colour], mu / rim, nu / rim)
     }
 
-    /// How far sideways the correction moves light, at most, metres: the slope of the phase over 2π, over the
-    /// whole square of frequencies.
+    /// Returns the largest sideways shift of light by the correction, in metres: the maximum slope of the phase over
+    /// the whole square of frequencies, divided by 2π.
     pub fn reach_m(&self, pitch_m: f64) -> f64 {
         let slope = |a: &Coefficients| {
-            // |∂/∂x| and |∂/∂y| of the terms on |x|, |y| ≤ 1, each bounded by its parts.
+            // Bounds |∂/∂x| and |∂/∂y| of each term on |x|, |y| ≤ 1.
             let x = 4.0 * a[0].abs() + 2.0 * a[1].abs() + 2.0 * a[2].abs();
             x + 10.0 * a[3].abs().max(a[4].abs()) + 6.0 * a[3].abs().min(a[4].abs())
         };
@@ -95,14 +93,14 @@ impl Aberration {
         steepest / (2.0 * PI) * 2.0 * pitch_m
     }
 
-    /// What this corrects: the aberration itself.
+    /// Returns the aberration that this correction compensates.
     pub fn reversed(&self) -> Self {
         Aberration {
             coefficients: self.coefficients.iter().map(|a| a.map(|a| -a)).collect(),
         }
     }
 
-    /// `1 − t` of this one and `t` of `other`, which is of the same colours.
+    /// Returns `1 − t` of this correction plus `t` of `other`, which must have the same colours.
     pub fn mix(&self, other: &Self, t: f64) -> Self {
         let colours = self.coefficients.iter().zip(&other.coefficients);
         let mix = |(a, b): (&Coefficients, &Coefficients)| std::array::from_fn(|j| a[j] + (b[j] - a[j]) * t);
@@ -112,18 +110,20 @@ impl Aberration {
     }
 }
 
-/// Corrections at calibrated distances; between two they are interpolated linearly, beyond the ends the last
-/// one holds.
+/// Corrections at calibrated distances. Between two distances they are interpolated linearly; beyond the ends, the
+/// first or the last applies.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Aberrations {
     at: Vec<(f64, Aberration)>,
 }
 
 impl Aberrations {
-    /// From the corrections at z against the midpoint, metres, positive toward the viewer.
+    /// Creates the corrections from pairs of z and correction. z is relative to the midpoint, in metres, positive
+    /// toward the viewer.
     ///
     /// # Errors
-    /// None at all, z that are not finite or do not ascend, or corrections of different numbers of colours.
+    /// Returns an error if there is no correction, if a z is not finite or they do not ascend, or if the numbers of
+    /// colours differ.
     pub fn new(at: Vec<(f64, Aberration)>) -> Result<Self> {
         if at.is_empty() {
             return Err(Error::Setting(
@@ -145,12 +145,12 @@ impl Aberrations {
         Ok(Aberrations { at })
     }
 
-    /// The calibrated distances, metres, and their corrections.
+    /// Returns the calibrated distances, in metres, and their corrections.
     pub fn calibrated(&self) -> &[(f64, Aberration)] {
         &self.at
     }
 
-    /// The correction at `z_m`.
+    /// Returns the correction at `z_m`.
     pub fn at(&self, z_m: f64) -> Aberration {
         let next = self.at.partition_point(|(z, _)| *z <= z_m);
         match (next.checked_sub(1), self.at.get(next)) {
@@ -163,7 +163,8 @@ impl Aberrations {
         }
     }
 
-    /// The correction, where it is one for all depths: what a phone can undo on the way to the modulator.
+    /// Returns the correction if it is the same at all depths. A phone can then apply it during the propagation to the
+    /// modulator.
     pub fn constant(&self) -> Option<Aberration> {
         let first = &self.at[0].1;
         self.at.iter().all(|(_, a)| a == first).then(|| first.clone())

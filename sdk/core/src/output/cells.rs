@@ -1,5 +1,5 @@
-//! Modulators of moving mirrors, whose pixels are memory cells: a level is a pattern of bits in the 2×2 cells below a
-//! pixel, and a frame of 24 bits carries 24 such patterns, one after another in time.
+//! Moving-mirror modulators whose pixels are memory cells. A level is a pattern of bits in the 2×2 cells below a pixel.
+//! A frame of 24 bits carries 24 patterns, displayed one after another.
 //!
 //! Plane n of a frame is bit n mod 8 of red (n < 8), green (n < 16) or blue.
 
@@ -7,10 +7,10 @@ use super::flip;
 use crate::runtime::error::{Error, Result};
 use rayon::prelude::*;
 
-/// Planes of a frame.
+/// The number of planes in a frame.
 const PLANES: usize = 24;
 
-/// How a level becomes the bits of its pixel's cells.
+/// The mapping from a level to the bits of its pixel's cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cells {
     memory: Vec<u8>,
@@ -18,11 +18,12 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// `memory`: of each level, the number that its cells hold; `layout`: of each cell, rows from above, which bit of
-    /// that number.
+    /// Creates a mapping. `memory` gives the number that the cells hold for each level. `layout` gives the bit of that
+    /// number for each cell, by rows from the top.
     ///
     /// # Errors
-    /// Other than 2, 4, 8 or 16 levels, numbers that are not 0, 1, 2 … each once, or bits over 3 or twice.
+    /// Returns an error if the number of levels is not 2, 4, 8 or 16, the numbers are not 0, 1, 2, … each once, or a
+    /// bit is above 3 or repeated.
     pub fn new(memory: &[u8], layout: [[u8; 2]; 2]) -> Result<Self> {
         let refuse = |what: &str| Err(Error::Setting(format!("a modulator's cells: {what}")));
         let once = |values: &[u8]| {
@@ -42,39 +43,38 @@ impl Cells {
         })
     }
 
-    /// Levels of a pixel.
+    /// Returns the number of levels of a pixel.
     pub fn levels(&self) -> usize {
         self.memory.len()
     }
 
-    /// Whether each cell is set for `level`.
+    /// Returns whether each cell is set for `level`.
     fn bits(&self, level: usize) -> [[bool; 2]; 2] {
         let memory = self.memory[level];
         self.layout.map(|row| row.map(|bit| (memory >> bit) & 1 == 1))
     }
 }
 
-/// A plan for frames of (H, W) pixels. Immutable; shared between threads.
+/// A plan for frames of (H, W) pixels. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub struct BitPlanes {
     levels: usize,
     shape: (usize, usize),
     flip_x: bool,
     flip_y: bool,
-    /// Of each level the four cells' bits as they stand in the frame, in the lowest bit of a byte each: upper left,
-    /// upper right, lower left, lower right.
+    /// The four cells' bits of each level in the frame's order: upper left, upper right, lower left, lower right. Each
+    /// is the lowest bit of a byte.
     spread: [u32; 16],
-    /// The same of two levels of neighbouring planes, the later in the upper four bits of the index and in the second
-    /// bit of each byte: looking up is what takes the time.
+    /// The cells' bits of two levels in neighbouring planes. The later level is the upper four bits of the index and
+    /// the second bit of each byte. Two levels share a lookup because lookups take most of the time.
     pairs: Box<[u32; 256]>,
 }
 
 impl BitPlanes {
-    /// Plans frames of the 2·H×2·W cells of `shape` = (H, W) pixels, left and right, top and bottom exchanged where
-    /// asked for: cells and pixels alike.
+    /// Plans frames of 2·H×2·W cells for `shape` = (H, W) pixels. The flips apply to both cells and pixels.
     pub fn new(cells: &Cells, shape: (usize, usize), flip_x: bool, flip_y: bool) -> Self {
         let spread: [u32; 16] = std::array::from_fn(|level| {
-            // Bits above a level's mean nothing.
+            // Ignores bits above those of a level.
             let bits = cells.bits(level % cells.levels());
             let cell = |n: usize| bits[flip(n / 2, 2, flip_y)][flip(n % 2, 2, flip_x)];
             (0..4).fold(0, |all, n| all | u32::from(cell(n)) << (8 * n))
@@ -89,24 +89,25 @@ impl BitPlanes {
         }
     }
 
-    /// (H, W) of a frame: two cells for each pixel along each axis.
+    /// Returns the shape (H, W) of a frame, which has two cells for each pixel along each axis.
     pub fn frame_shape(&self) -> (usize, usize) {
         (2 * self.shape.0, 2 * self.shape.1)
     }
 
-    /// Bytes of a frame, red, green and blue of each cell.
+    /// Returns the number of bytes of a frame, with red, green and blue for each cell.
     pub fn frame_bytes(&self) -> usize {
         12 * self.shape.0 * self.shape.1
     }
 
-    /// A frame of `maps` of levels, (H, W) each, shown one after another for the same time: of N maps plane n shows map
-    /// ⌊n·N/24⌋. Three maps are one in each of red, green and blue; one map is shown all the time. Allocates nothing.
+    /// Packs `maps` of levels, (H, W) each, into `frame`. The maps are displayed one after another for equal times:
+    /// with N maps, plane n displays map ⌊n·N/24⌋. Three maps therefore fill red, green and blue, and a single map
+    /// fills the whole frame. Allocates nothing.
     ///
     /// # Errors
-    /// A number of maps that does not divide 24.
+    /// Returns an error if the number of maps does not divide 24.
     ///
     /// # Panics
-    /// If a map or `frame` has another length than planned.
+    /// Panics if a map or `frame` does not have the planned length.
     pub fn pack(&self, maps: &[&[u8]], frame: &mut [u8]) -> Result<()> {
         let (height, width) = self.shape;
         let count = maps.len();
@@ -128,7 +129,7 @@ impl BitPlanes {
         Ok(())
     }
 
-    /// Two rows of a frame from one row of pixels.
+    /// Packs one row of pixels into two rows of a frame.
     fn pack_row(&self, planes: &[&[u8]; PLANES], rows: &mut [u8]) {
         const RUN: usize = 64;
         let width = planes[0].len();
@@ -156,13 +157,13 @@ impl BitPlanes {
         }
     }
 
-    /// The inverse: the levels of plane `plane` of `frame`, into `levels`, (H, W).
+    /// Reads the levels of plane `plane` of `frame` into `levels`, (H, W). This is the inverse of [`Self::pack`].
     ///
     /// # Errors
-    /// A plane beyond the 24, or cells that are no level's.
+    /// Returns an error if the frame has no such plane or the cells match no level.
     ///
     /// # Panics
-    /// If `frame` or `levels` has another length than planned.
+    /// Panics if `frame` or `levels` does not have the planned length.
     pub fn unpack(&self, frame: &[u8], plane: usize, levels: &mut [u8]) -> Result<()> {
         let (height, width) = self.shape;
         assert!(frame.len() == self.frame_bytes() && levels.len() == height * width);
@@ -196,7 +197,7 @@ mod tests {
 
     const MEMORY: [u8; 16] = [3, 2, 1, 7, 0, 6, 5, 4, 11, 10, 9, 8, 15, 14, 13, 12];
 
-    /// Levels that differ between maps, rows and columns.
+    /// Returns levels that differ between maps, rows and columns.
     fn map(n: usize, (height, width): (usize, usize)) -> Vec<u8> {
         (0..height * width)
             .map(|at| ((at / width * 5 + at % width * 3 + n * 7) % 16) as u8)

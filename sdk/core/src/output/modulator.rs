@@ -1,5 +1,5 @@
-//! Modulators that can be bought: their size, pitch and bits, the phases of their levels, and how their input takes a
-//! frame. Each is a TOML file; those in `sdk/core/devices` are bundled, and users add their own.
+//! Commercial modulators: size, pitch and bits, the phases of the levels, and the input format. Each modulator is
+//! described by a TOML file. The files in `sdk/core/devices` are bundled; users can add their own.
 //!
 //! ```
 //! use phasefront::output::ModulatorSpec;
@@ -22,37 +22,38 @@ use std::collections::BTreeMap;
 /// A modulator as its file describes it.
 #[derive(Debug, Clone)]
 pub struct ModulatorSpec {
-    /// What it is called.
+    /// The name of the modulator.
     pub name: String,
-    /// The physics; what the file leaves out has the value of [`Display::default`].
+    /// The physical parameters. Those that the file omits have the values of [`Display::default`].
     pub display: Display,
-    /// How its input takes a hologram.
+    /// The packing of a hologram for the modulator's input.
     pub packing: Packing,
-    /// Whether left and right are exchanged, of the whole frame.
+    /// Whether the whole frame is flipped left to right.
     pub flip_x: bool,
-    /// Whether top and bottom are exchanged, of the whole frame.
+    /// Whether the whole frame is flipped top to bottom.
     pub flip_y: bool,
-    /// The phase that each level shows, in turns of 2π, from 0 on; None where they are even over one turn.
+    /// The phase of each level in turns of 2π, starting with level 0. `None` if the levels are evenly spaced over one
+    /// turn.
     pub levels_turns: Option<Vec<f64>>,
-    /// Frames that it shows in a second.
+    /// The frame rate in hertz.
     pub rate_hz: Option<f64>,
-    /// Where a figure is from, by its key in the file.
+    /// The source of each figure, by its key in the file.
     pub sources: BTreeMap<String, String>,
-    /// Figures that no document of the maker's confirms, with what they rest on.
+    /// The basis of each figure that no document of the manufacturer confirms, by its key.
     pub unconfirmed: BTreeMap<String, String>,
 }
 
-/// How a modulator's input takes a hologram.
+/// A packing of a hologram for a modulator's input.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Packing {
-    /// All colours in one image, or one colour after another.
+    /// All colours in one image, or one image after another for each colour.
     Images(Layout),
-    /// Memory cells of moving mirrors, 24 maps a frame.
+    /// Memory cells of moving mirrors, with 24 maps in each frame.
     BitPlanes(Cells),
 }
 
-/// The file's keys beside those of [`Display`].
+/// The file's keys in addition to those of [`Display`].
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ModulatorToml {
@@ -87,7 +88,7 @@ enum PackingToml {
     },
 }
 
-/// The names of the packings that need no figures.
+/// The names of the packings that need no parameters.
 const NAMED: [(&str, Layout); 3] = [
     ("rgb", Layout::Rgb),
     ("grey", Layout::Grey),
@@ -112,15 +113,15 @@ fn refuse(what: impl std::fmt::Display) -> Error {
 }
 
 impl ModulatorSpec {
-    /// The names of the bundled devices.
+    /// Returns the names of the bundled devices.
     pub fn names() -> impl Iterator<Item = &'static str> {
         SHIPPED.iter().map(|(name, _)| *name)
     }
 
-    /// The bundled device called `name`.
+    /// Returns the bundled device called `name`.
     ///
     /// # Errors
-    /// A name that none has.
+    /// Returns an error if no bundled device has this name.
     pub fn shipped(name: &str) -> Result<Self> {
         let (_, text) = SHIPPED.iter().find(|(known, _)| *known == name).ok_or_else(|| {
             let all: Vec<_> = Self::names().collect();
@@ -129,19 +130,19 @@ impl ModulatorSpec {
         Self::from_toml(text)
     }
 
-    /// Reads the TOML form.
+    /// Parses a device from TOML.
     ///
     /// # Errors
-    /// Text that is not TOML, an unknown key, or what cannot be.
+    /// Returns an error if the text is not TOML, a key is unknown or a value is impossible.
     pub fn from_toml(text: &str) -> Result<Self> {
         let table = toml::from_str(text).map_err(|e| refuse(keys::message(&e)))?;
         Self::from_table(table)
     }
 
-    /// [`Self::from_toml`] of a table that was read.
+    /// Reads a device from a parsed table, like [`Self::from_toml`].
     ///
     /// # Errors
-    /// An unknown key, or what cannot be.
+    /// Returns an error if a key is unknown or a value is impossible.
     #[doc(hidden)]
     pub fn from_table(mut table: toml::Table) -> Result<Self> {
         keys::check(&table, &[&keys::DISPLAY[..], &keys::DEVICE].concat())?;
@@ -182,10 +183,10 @@ impl ModulatorSpec {
         })
     }
 
-    /// What a hologram for it is made for: its levels show what it says.
+    /// Returns the target for holograms on this modulator, with the phases of its levels.
     ///
     /// # Errors
-    /// Levels of over 8 bits that are not even over one turn.
+    /// Returns an error if levels of more than 8 bits are not evenly spaced over one turn.
     pub fn target(&self) -> Result<Target> {
         let target = Target::from(&self.display);
         match &self.levels_turns {
@@ -202,7 +203,7 @@ impl ModulatorSpec {
     }
 }
 
-/// The phase of each level in turns, where they are not even over one turn.
+/// Returns the phase of each level in turns, or `None` if the levels are evenly spaced over one turn.
 fn levels(of: &ModulatorToml, display: &Display) -> Result<Option<Vec<f64>>> {
     let count = 1usize << display.bits();
     let turns = match (&of.levels_turns, of.range_turns) {
@@ -245,7 +246,7 @@ impl PackingToml {
 }
 
 impl From<Display> for ModulatorSpec {
-    /// One whose input takes all colours in one image, or one grey image of one laser's levels.
+    /// Creates a modulator whose input takes all colours in one image, or one grey image for one laser.
     fn from(display: Display) -> Self {
         ModulatorSpec {
             name: String::new(),
@@ -262,7 +263,7 @@ impl From<Display> for ModulatorSpec {
 }
 
 impl Packing {
-    /// The packing if a file names none.
+    /// Returns the packing for files that name none.
     fn default_for(display: &Display) -> Self {
         Packing::Images(match (display.bits(), display.colours()) {
             (0..=8, 1) => Layout::Grey,
@@ -271,8 +272,10 @@ impl Packing {
         })
     }
 
+    /// Checks whether the display's levels fit the packing.
+    ///
     /// # Errors
-    /// Levels that do not fit.
+    /// Returns an error if they do not fit.
     fn check(&self, display: &Display) -> Result<()> {
         let (bits, place) = match self {
             Packing::Images(layout) => (display.bits(), layout.place_bits()),
@@ -301,7 +304,7 @@ mod tests {
     use super::*;
     use crate::output::BitPlanes;
 
-    /// Levels as the lowest digits of a text, one for each of 256 steps of 2π.
+    /// Returns the levels in `text`, one hexadecimal digit for each of 256 steps of 2π.
     fn digits(text: &str) -> Vec<u8> {
         text.chars().map(|c| c.to_digit(16).unwrap() as u8).collect()
     }
@@ -327,8 +330,8 @@ mod tests {
         }
     }
 
-    /// Of `PLM.quantize` of Texas Instruments' package ti-plm 1.1.0, for the phases 2πi/256; the second with the levels
-    /// of our p67.
+    /// Compares with the output of `PLM.quantize` in Texas Instruments' package ti-plm 1.1.0 for the phases 2πi/256.
+    /// The second file uses the levels of our p67.
     #[test]
     fn levels_are_those_of_the_makers_package() {
         for (name, golden) in [
@@ -341,7 +344,7 @@ mod tests {
             };
             let turns = ModulatorSpec::shipped(name).unwrap().levels_turns.unwrap();
             for (step, (level, golden)) in level.iter().zip(digits(golden.trim())).enumerate() {
-                // Half-way between two levels the package's rounding decides: at step 111 of p47.
+                // Halfway between two levels, at step 111 of p47, the rounding of the package decides.
                 let apart = |level: u8| (turns[usize::from(level)] - step as f64 / 256.0).abs();
                 let tie = level.abs_diff(golden) == 1 && (apart(*level) - apart(golden)).abs() < 1e-12;
                 assert!(
@@ -352,7 +355,8 @@ mod tests {
         }
     }
 
-    /// Of `PLM.electrode_map` of the same package, for the levels 0 to 15 in two rows; one map is shown all the time.
+    /// Compares with the output of `PLM.electrode_map` in the same package for the levels 0 to 15 in two rows. One map
+    /// fills the whole frame.
     #[test]
     fn frames_are_those_of_the_makers_package() {
         let p47 = "0000001000101010 1101101100011000 0101010111111111 1101100011011000";

@@ -1,23 +1,24 @@
-//! Levels of more bits than a byte, spread over the red, green and blue of one pixel.
+//! Levels with more bits than a byte, distributed over the red, green and blue bytes of one pixel.
 
 use crate::runtime::error::{Error, Result};
 
-/// Which bit of a level each bit of a pixel's red, green and blue is.
+/// The assignment of a level's bits to the bits of a pixel's red, green and blue bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Split {
-    /// Of each byte, from its highest bit on; [`NOTHING`] where it is always 0.
+    /// The level's bit for each bit of each byte, from the highest down, or [`NOTHING`] if it is always 0.
     bits: [[u8; 8]; 3],
-    /// Bits of a level.
+    /// The number of bits of a level.
     count: u32,
 }
 
 const NOTHING: u8 = u8::MAX;
 
 impl Split {
-    /// The bits of a level that red, green and blue hold, from each byte's highest bit on; bits below them are 0.
+    /// Creates a split from the level's bits in red, green and blue, each listed from the byte's highest bit down. The
+    /// remaining lower bits are 0.
     ///
     /// # Errors
-    /// More than 8 in a byte, or bits that are not 0, 1, 2 … up to 15, each once.
+    /// Returns an error if a byte has more than 8 bits, or if the bits are not 0, 1, 2, … up to at most 15, each once.
     pub fn new(bytes: [&[u8]; 3]) -> Result<Self> {
         let refuse = |what: String| Err(Error::Setting(format!("a level's bits in red, green and blue: {what}")));
         let mut bits = [[NOTHING; 8]; 3];
@@ -39,12 +40,12 @@ impl Split {
         })
     }
 
-    /// Bits of a level.
+    /// Returns the number of bits of a level.
     pub fn bits(&self) -> u32 {
         self.count
     }
 
-    /// Red, green and blue of `level`.
+    /// Returns the red, green and blue bytes of `level`.
     pub fn pixel(&self, level: u16) -> [u8; 3] {
         self.bits.map(|byte| {
             let set = |bit: u8| bit != NOTHING && (level >> bit) & 1 == 1;
@@ -52,7 +53,7 @@ impl Split {
         })
     }
 
-    /// The level of red, green and blue: the inverse.
+    /// Returns the level of a pixel. This is the inverse of [`Self::pixel`].
     pub fn level(&self, pixel: [u8; 3]) -> u16 {
         let mut level = 0;
         for (byte, value) in self.bits.iter().zip(pixel) {
@@ -75,7 +76,7 @@ mod tests {
         let santec = Split::new([&[9, 8, 7], &[6, 5, 4], &[3, 2, 1, 0]]).unwrap();
         assert_eq!(santec.pixel(0b10_1110_0110), [0b1010_0000, 0b1100_0000, 0b0110_0000]);
         assert_eq!(santec.pixel(1023), [0b1110_0000, 0b1110_0000, 0b1111_0000]);
-        // Meadowlark: 8 high bits in red, 2 low ones in blue.
+        // Meadowlark: the 8 high bits in red, the 2 low bits in blue.
         let meadowlark = Split::new([&[9, 8, 7, 6, 5, 4, 3, 2], &[], &[1, 0]]).unwrap();
         assert_eq!(meadowlark.pixel(0b10_1110_0110), [0b1011_1001, 0, 0b1000_0000]);
         for split in [santec, meadowlark] {

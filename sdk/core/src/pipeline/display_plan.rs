@@ -1,7 +1,7 @@
-//! From the midpoint hologram to the modulator's levels: offset, correction of what the display does to the
-//! wave, phase encoding, look-up table.
+//! Turns a midpoint hologram into the modulator's levels: propagation over the offset, correction of the display's
+//! wavefront errors, phase encoding and look-up table.
 //!
-//! Where the midpoint hologram comes from, a network or the laboratory, is not known here.
+//! This module does not depend on how the midpoint hologram was made.
 
 use crate::display::panel::PanelPlan;
 use crate::display::registration::RegistrationPlan;
@@ -20,12 +20,12 @@ use phasefront_kernels::wide;
 use rayon::prelude::*;
 use std::time::Duration;
 
-/// A plan for one shape, target and encoding. Immutable; shared between threads.
+/// A plan for one shape, target and encoding. It is immutable and can be shared between threads.
 pub struct DisplayPlan {
     colours: usize,
     height: usize,
     width: usize,
-    /// None where the field stands at the modulator and there is nothing to correct.
+    /// `None` if the field is already at the modulator and needs no correction.
     offset: Option<Vec<Propagator>>,
     registration: Option<RegistrationPlan>,
     encoder: Encoder,
@@ -36,21 +36,21 @@ pub struct DisplayPlan {
     brightness: Brightness,
 }
 
-/// Working memory of a [`DisplayPlan`] for one call at a time.
+/// The working memory of a [`DisplayPlan`] for one call at a time.
 pub struct DisplayScratch {
     propagation: Option<ConvolveScratch>,
-    /// A plane, where colours are moved.
+    /// A plane for registration. Empty if no colour is moved.
     moved: Vec<Complex32>,
     encoder: EncoderScratch,
     midpoint: Option<MidpointScratch>,
-    /// Where phases lie in memory before they become levels.
+    /// Phases in memory before they are converted to levels.
     phases: Vec<f32>,
     percentile: Percentile,
     cancel: Cancel,
 }
 
 impl DisplayScratch {
-    /// Has fields end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.encoder.set_cancel(cancel);
         if let Some(midpoint) = &mut self.midpoint {
@@ -60,30 +60,30 @@ impl DisplayScratch {
     }
 }
 
-/// What became of a field on the modulator.
+/// The result of encoding a field for the modulator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Modulation {
-    /// The amplitude that full light stands for.
+    /// The amplitude that maps to full light.
     pub scale: f32,
-    /// Time from the field to levels.
+    /// The time from the field to levels.
     pub encode: Duration,
 }
 
 impl DisplayPlan {
-    /// Plans the way of (C, H, W) = `shape` midpoint holograms to `target`. The correction of an aberration is part of
-    /// the offset's transfer function, so that it costs nothing beside it.
+    /// Plans the path of midpoint holograms of (C, H, W) = `shape` to `target`. The correction of an aberration is part
+    /// of the offset's transfer function, so it costs no extra time.
     ///
     /// # Errors
-    /// A shape, offset or correction that cannot be planned, a scale that is not positive, a pre-filter for another
-    /// display or offset, or a table for another modulator.
+    /// Returns an error if the shape, offset or correction cannot be planned, a scale is not positive, the pre-filter
+    /// is for another display or offset, or a table is for another modulator.
     pub fn new(shape: (usize, usize), target: &Target, options: &EncoderOptions) -> Result<Self> {
         Self::from_z(shape, 0.0, target, options)
     }
 
-    /// The same for fields at `z_m`.
+    /// Plans the path of fields at `z_m` to `target`.
     ///
     /// # Errors
-    /// As [`Self::new`].
+    /// Returns the same errors as [`Self::new`].
     pub fn from_z(shape: (usize, usize), z_m: f64, target: &Target, options: &EncoderOptions) -> Result<Self> {
         if let Encoding::Deep(network) = &options.encoding {
             network.check_prefilter(&target.display)?;
@@ -108,23 +108,23 @@ impl DisplayPlan {
         })
     }
 
-    /// Whether the encoding was trained on the phase that a network's field has, so that [`remove_mean_phase`] would
-    /// take from it what it knows.
+    /// Returns whether the encoding was trained on the phase of a network's field, which [`remove_mean_phase`] would
+    /// change.
     pub fn keeps_phase(&self) -> bool {
         self.keeps_phase
     }
 
-    /// How many colours it is for.
+    /// Returns the number of colours.
     pub fn colours(&self) -> usize {
         self.colours
     }
 
-    /// (H, W).
+    /// Returns the shape (H, W).
     pub fn shape(&self) -> (usize, usize) {
         (self.height, self.width)
     }
 
-    /// Working memory for one call at a time.
+    /// Returns working memory for one call at a time.
     pub fn scratch(&self) -> DisplayScratch {
         DisplayScratch {
             propagation: self.offset.as_ref().map(|plans| plans[0].scratch()),
@@ -143,10 +143,10 @@ impl DisplayPlan {
         }
     }
 
-    /// Takes `field`, (C, H, W), to the modulator, in place. Allocates nothing.
+    /// Propagates `field`, (C, H, W), to the modulator in place. Allocates nothing.
     ///
     /// # Panics
-    /// If `scratch` is another plan's, or `field` has not C·H·W values.
+    /// Panics if `scratch` belongs to another plan or `field` does not have C·H·W values.
     pub fn propagate(&self, field: &mut [Complex32], scratch: &mut DisplayScratch) {
         if let (Some(plans), Some(waves)) = (&self.offset, &mut scratch.propagation) {
             for (plan, plane) in plans.iter().zip(field.chunks_exact_mut(self.height * self.width)) {
@@ -164,17 +164,17 @@ impl DisplayPlan {
         }
     }
 
-    /// Encodes a field at the modulator, (C, H, W), into `levels`. `field` is worked on: what it holds afterwards means
-    /// nothing. Allocates nothing.
+    /// Encodes a field at the modulator, (C, H, W), into `levels`. Afterwards the contents of `field` are unspecified.
+    /// Allocates nothing.
     ///
     /// # Panics
-    /// If `field` or `levels` has not C·H·W values.
+    /// Panics if `field` or `levels` does not have C·H·W values.
     pub fn modulate(&self, field: &mut [Complex32], levels: &mut [u8], scratch: &mut DisplayScratch) -> Modulation {
         self.modulate_after(None, field, levels, scratch)
     }
 
-    /// [`Self::modulate`] of a frame that follows another: smoothed brightness comes from `past`, and steps at the
-    /// midpoint go on where the frame before ended.
+    /// Works like [`Self::modulate`] for a frame that follows another. Smoothed brightness starts from `past`, and the
+    /// steps at the midpoint continue from the result of the previous frame.
     pub fn modulate_after(
         &self,
         past: Option<Past>,
@@ -203,11 +203,10 @@ impl DisplayPlan {
         }
     }
 
-    /// [`Self::modulate`] to levels of the display's bits that do not fit bytes. `phases` is worked on and holds the
-    /// phases in the end.
+    /// Works like [`Self::modulate`] for levels that have more bits than a byte. Afterwards `phases` holds the phases.
     ///
     /// # Panics
-    /// If `field`, `phases` or `words` has not C·H·W values.
+    /// Panics if `field`, `phases` or `words` does not have C·H·W values.
     pub fn modulate_words(
         &self,
         field: &mut [Complex32],
@@ -218,7 +217,7 @@ impl DisplayPlan {
         self.modulate_words_after(None, field, phases, words, scratch)
     }
 
-    /// [`Self::modulate_words`] of a frame that follows another, as [`Self::modulate_after`].
+    /// Works like [`Self::modulate_words`] for a frame that follows another, as in [`Self::modulate_after`].
     pub fn modulate_words_after(
         &self,
         past: Option<Past>,
@@ -236,7 +235,7 @@ impl DisplayPlan {
         }
     }
 
-    /// Phases in \[0, 2π), and the amplitude that full light stands for.
+    /// Writes phases in \[0, 2π) and returns the amplitude that maps to full light.
     fn phases(
         &self,
         past: Option<Past>,
@@ -261,8 +260,8 @@ impl DisplayPlan {
     }
 }
 
-/// Turns each of the `colours` planes of `field`, (C, H, W), by its mean phase arg Σu, so that its phase is centred on
-/// 0: a network's constant phase is arbitrary, and double phase wraps least around 0.
+/// Rotates each of the `colours` planes of `field`, (C, H, W), by its mean phase arg Σu, so that its phase is centred
+/// on 0. A network's constant phase is arbitrary, and double phase wraps least around 0.
 pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
     let size = field.len() / colours;
     if size == 0 {
@@ -281,10 +280,10 @@ pub fn remove_mean_phase(field: &mut [Complex32], colours: usize) {
     }
 }
 
-/// Values of a part that one thread takes.
+/// The number of values that one thread sums at a time.
 const PART: usize = 1 << 14;
 
-/// The sum of `values`, halved again and again at fixed places: the same bits on any number of threads.
+/// Sums `values` by repeated halving at fixed places, so that the result has the same bits on any number of threads.
 fn sum(values: &[Complex32]) -> Complex64 {
     if values.len() > PART {
         let (first, second) = values.split_at(values.len().div_ceil(PART).div_ceil(2) * PART);

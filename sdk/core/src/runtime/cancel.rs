@@ -1,25 +1,25 @@
-//! Giving a frame up while it is computed. Long loops ask once a row, tile or plane; what they leave undone is
-//! rubbish, which whoever gave the frame up throws away.
+//! Cancellation of a frame during its computation. Long loops check for it once per row, tile or plane. The results of
+//! a cancelled frame are incomplete and must be discarded.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Shared by those who compute a frame and those who may give it up.
+/// A cancellation flag shared by the code that computes a frame and the code that may cancel it.
 #[derive(Debug, Clone, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Asks whoever computes the frame to give it up.
+    /// Requests cancellation of the frame.
     pub fn request(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// A new frame begins.
+    /// Clears the request for a new frame.
     pub fn clear(&self) {
         self.0.store(false, Ordering::Relaxed);
     }
 
-    /// Whether the frame is to be given up.
+    /// Returns whether cancellation was requested.
     pub fn requested(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }

@@ -1,10 +1,10 @@
-//! Panics made values.
+//! Conversion of panics to values.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// What `work` gives, or what a panic in it said, in one line. The panic's payload ends here, whatever its own end
-/// does.
+/// Runs `work` and returns its result, or the message of its panic in one line. Also handles a panic in the drop of the
+/// payload.
 pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     catch_unwind(AssertUnwindSafe(work)).map_err(|payload| {
         let message = (payload.downcast_ref::<&str>().map(|s| (*s).to_owned()))
@@ -16,7 +16,7 @@ pub fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// Drops `payload`. If that panics, the second payload is leaked: its end could panic as well.
+/// Drops `payload`. If the drop panics, the second payload is leaked, because its drop could panic as well.
 fn discard(payload: Box<dyn Any + Send>) {
     if let Err(second) = catch_unwind(AssertUnwindSafe(|| drop(payload))) {
         std::mem::forget(second);
@@ -32,7 +32,7 @@ mod tests {
 
     impl Drop for Bomb {
         fn drop(&mut self) {
-            // The payload of this panic is one more.
+            // The payload of this panic is another bomb.
             if !std::thread::panicking() {
                 resume_unwind(Box::new(Bomb));
             }

@@ -1,4 +1,4 @@
-//! The clock that stages are timed by: the system's, or a browser's, which the standard library does not know.
+//! The clock that times stages: the system's, or the browser's, which the standard library does not support.
 
 #[cfg(not(all(target_arch = "wasm32", target_os = "unknown")))]
 pub use std::time::Instant;

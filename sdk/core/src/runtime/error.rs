@@ -1,54 +1,54 @@
-//! The one error type of the core. Each message is one line that names what is wrong and what would be right, of at
-//! most 600 characters and none that controls a terminal, whatever stands in the file that it quotes.
+//! The error type of the core. Each message is one line that states what is wrong and what would be right. It has at
+//! most 600 characters and no terminal control characters, even if it quotes a file.
 
 use std::fmt::{Display, Formatter, Write};
 use std::sync::Arc;
 
-/// Why the core refused to go on.
+/// An error of the core.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A display whose physics is impossible or out of range.
     #[error("display: {}", Line(.0))]
     Display(String),
-    /// A frame, plane or stack of the wrong shape or with unusable values.
+    /// A frame, plane or stack with the wrong shape or unusable values.
     #[error("frame: {}", Line(.0))]
     Frame(String),
-    /// A setting or an argument that cannot be meant or planned for: a distance, a size, a parameter.
+    /// An invalid setting or argument, such as a distance, a size or a parameter.
     #[error("{}", Line(.0))]
     Setting(String),
     /// An ONNX file that is not a hologram network.
     #[error("network: {}", Line(.0))]
     Network(String),
-    /// A call that a session cannot answer in its mode or state.
+    /// A call that a session does not support in its mode or state.
     #[error("session: {}", Line(.0))]
     Session(String),
-    /// Threads of a session that the system does not start.
+    /// The system could not start the threads of a session.
     #[error("session: its threads cannot be started: {}", Line(&.0.to_string()))]
     Threads(#[source] Arc<dyn std::error::Error + Send + Sync>),
-    /// A frame that is not later than the last one. It is refused; what follows is not harmed.
+    /// A frame that is not later than the last one. It is refused; later frames are not affected.
     #[error(
         "timestamp: {given_ns} ns is not after {last_ns} ns, the last one taken; timestamps must rise, or the session be reset"
     )]
     Timestamp {
-        /// The frame's.
+        /// The timestamp of the frame.
         given_ns: u64,
-        /// The last one that was taken.
+        /// The timestamp of the last accepted frame.
         last_ns: u64,
     },
-    /// A frame that went with the GPU that was computing it. What follows is not harmed.
+    /// A frame that was lost with the GPU that computed it. Later frames are not affected.
     #[error("{}", Line(.0))]
     Lost(String),
-    /// A panic inside; a fault of this library. The frame is lost, the session goes on.
+    /// A panic inside this library, which is a bug. The frame is lost, and the session continues.
     #[error("internal error: {}; please report it", Line(.0))]
     Internal(String),
 }
 
-/// The core's result.
+/// The result type of the core.
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// The same of one part of what was given, which `part` names.
+    /// Returns this error with its message prefixed by `part`, the name of the faulty part of the input.
     #[doc(hidden)]
     pub fn of(self, part: &str) -> Self {
         let named = |why: String| format!("{part}: {why}");
@@ -60,11 +60,11 @@ impl Error {
     }
 }
 
-/// Characters of a message that are shown at its beginning and at its end, which says what would be right.
+/// The number of characters kept at the beginning and at the end of a message. The end says what would be right.
 const BEGINNING: usize = 350;
 const END: usize = 200;
 
-/// A message on one line: control characters escaped, the middle left out where it is too long.
+/// A message on one line, with control characters replaced and the middle of a long message left out.
 pub struct Line<'a>(pub &'a str);
 
 impl Display for Line<'_> {
@@ -75,7 +75,7 @@ impl Display for Line<'_> {
             match character {
                 _ if cut && i == BEGINNING => f.write_str(" … ")?,
                 _ if cut && i > BEGINNING && i < count - END => {}
-                // Marks that turn the direction of what follows are not control characters by name.
+                // Marks that change the text direction are not control characters to `is_control`.
                 c if c.is_control() || matches!(c, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}') => {
                     f.write_char('\u{fffd}')?;
                 }

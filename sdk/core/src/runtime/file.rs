@@ -1,26 +1,26 @@
-//! Files that others name. Only regular files are opened, and only up to a size: a path from outside may lead to a
-//! device that never ends, to a pipe that waits, or to a file that memory does not hold.
+//! Bounded reading of files. Only regular files up to a maximum size are opened, because a path from outside may lead
+//! to an endless device, a blocking pipe, or a file larger than memory.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
 
-/// Most bytes of a network's file.
+/// The maximum size of a network file, in bytes.
 pub const MOST_NETWORK: u64 = 1 << 28;
-/// Most bytes of a calibration: its tables for the largest modulator fit.
+/// The maximum size of a calibration file, in bytes. It fits the tables of the largest modulator.
 pub const MOST_TARGET: u64 = 1 << 30;
-/// Most bytes of a text that people write, as a display's TOML.
+/// The maximum size of a text file written by hand, such as a display's TOML, in bytes.
 pub const MOST_TEXT: u64 = 1 << 24;
 
 /// Opens a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// What the system says; another kind of file; a larger one.
+/// Returns an error if the system does, the file is not regular, or the file is larger.
 pub fn open(path: &Path, most: u64) -> Result<File> {
-    // Before it is opened: opening a pipe waits for its writer.
+    // The check precedes the opening because opening a pipe waits for its writer.
     check(&std::fs::metadata(path)?, most)?;
     let file = File::open(path)?;
-    // Once more, of what was opened: the name may lead elsewhere now.
+    // The opened file is checked again because the name may lead elsewhere now.
     check(&file.metadata()?, most)?;
     Ok(file)
 }
@@ -42,14 +42,14 @@ fn too_large(bytes: &str, most: u64) -> Error {
     )
 }
 
-/// The bytes of a regular file of at most `most` bytes.
+/// Reads a regular file of at most `most` bytes.
 ///
 /// # Errors
-/// As [`open`].
+/// Returns an error if [`open`] does, or if the file grows too large during the read.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     let file = open(path, most)?;
     let mut bytes = Vec::with_capacity(file.metadata()?.len() as usize);
-    // Files of `/proc` say that they have no bytes, and others may still grow.
+    // Files in `/proc` report a length of 0, and other files may still grow.
     file.take(most + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most {
         return Err(too_large(&format!("over {most}"), most));
@@ -57,10 +57,10 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The text of a regular file of at most [`MOST_TEXT`] bytes.
+/// Reads the text of a regular file of at most [`MOST_TEXT`] bytes.
 ///
 /// # Errors
-/// As [`open`]; bytes that are not UTF-8.
+/// Returns an error if [`open`] does, if the file grows too large during the read, or if the bytes are not UTF-8.
 pub fn read_text(path: &Path) -> Result<String> {
     String::from_utf8(read(path, MOST_TEXT)?).map_err(|_| Error::new(ErrorKind::InvalidData, "it is not text in UTF-8"))
 }
@@ -70,7 +70,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A name in the folder for temporary files that no other process takes.
+    /// Returns a path in the temporary folder that no other process uses.
     fn place(name: &str) -> std::path::PathBuf {
         std::env::temp_dir().join(format!("phasefront-file-{}-{name}", std::process::id()))
     }
@@ -96,7 +96,7 @@ mod tests {
     fn devices_and_files_without_a_length_are_bounded() {
         let why = read(Path::new("/dev/zero"), 4).unwrap_err().to_string();
         assert!(why.contains("not a regular file"), "{why}");
-        // It says that it has 0 bytes.
+        // The file reports a length of 0.
         let why = read(Path::new("/proc/cpuinfo"), 4).unwrap_err().to_string();
         assert_eq!(why, "it has over 4 bytes; 4 are the most");
     }

@@ -1,4 +1,4 @@
-//! The keys of a display's file, and messages about keys that are none: the nearest known key is named.
+//! The keys of display files, and messages that name the nearest known key for an unknown one.
 
 use crate::runtime::error::{Error, Result};
 
@@ -14,7 +14,7 @@ pub const DISPLAY: [&str; 8] = [
     "aperture_radius",
 ];
 
-/// The keys of a [`crate::output::modulator::ModulatorSpec`] beside [`DISPLAY`].
+/// The keys that a [`crate::output::modulator::ModulatorSpec`] has in addition to [`DISPLAY`].
 pub const DEVICE: [&str; 9] = [
     "name",
     "packing",
@@ -30,7 +30,7 @@ pub const DEVICE: [&str; 9] = [
 /// Checks that every key of `table` is one of `known`.
 ///
 /// # Errors
-/// The first that is not, with the nearest that is.
+/// Returns an error that names the first unknown key and the nearest known keys.
 pub fn check(table: &toml::Table, known: &[&str]) -> Result<()> {
     match table.keys().find(|key| !known.contains(&key.as_str())) {
         None => Ok(()),
@@ -38,7 +38,7 @@ pub fn check(table: &toml::Table, known: &[&str]) -> Result<()> {
     }
 }
 
-/// What an error of the TOML reader says, in one line; for an unknown key the nearest known one instead of all.
+/// Returns the message of a TOML error in one line. For an unknown key, it names the nearest known keys instead of all.
 pub fn message(error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', " ");
     let message = message.trim_start_matches("display: ");
@@ -47,12 +47,12 @@ pub fn message(error: &toml::de::Error) -> String {
         .and_then(|rest| rest.rsplit_once("`, expected "));
     match parts {
         None => message.to_owned(),
-        // Of "one of `a`, `b`" every second part is a key.
+        // In "one of `a`, `b`", every second part is a key.
         Some((key, known)) => unknown(key, &known.split('`').skip(1).step_by(2).collect::<Vec<_>>()),
     }
 }
 
-/// That `key` is none of `known`, and which it could be.
+/// Returns a message that `key` is not one of `known`, with the nearest known keys.
 fn unknown(key: &str, known: &[&str]) -> String {
     let mut nearest: Vec<_> = known.iter().map(|other| (distance(key, other), *other)).collect();
     nearest.sort();
@@ -68,7 +68,8 @@ fn unknown(key: &str, known: &[&str]) -> String {
     }
 }
 
-/// Characters that must be put in, left out or changed to make `b` of `a`; 1 where one of them holds the other.
+/// Returns the number of characters to insert, delete or replace to turn `a` into `b`, ignoring case; 1 if one contains
+/// the other.
 fn distance(a: &str, b: &str) -> usize {
     let [a, b] = [a, b].map(str::to_lowercase);
     if a.len().min(b.len()) >= 3 && (a.contains(&b) || b.contains(&a)) {

@@ -1,11 +1,10 @@
-//! One stage of a frame: a span for traces, and the time it took.
+//! One stage of a frame, with a trace span and its duration.
 
 use crate::runtime::clock::Instant;
 use std::time::Duration;
 use tracing::span::EnteredSpan;
 
-/// A stage that is under way on this thread. Its span ends when it is dropped. Without a listener a span costs
-/// some 20 ns.
+/// A running stage on this thread. Its span ends on drop. Without a listener, a span costs about 20 ns.
 pub struct Stage {
     start: Instant,
     _span: EnteredSpan,
@@ -20,13 +19,13 @@ impl Stage {
         }
     }
 
-    /// Ends it, and says how long it took.
+    /// Ends the stage and returns its duration.
     pub fn end(self) -> Duration {
         self.start.elapsed()
     }
 }
 
-/// Begins a stage: its name, and fields of its span.
+/// Starts a stage with a name and the fields of its span.
 #[macro_export]
 macro_rules! stage {
     ($name:literal $(, $field:ident = $value:expr)*) => {

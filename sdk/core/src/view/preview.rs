@@ -1,10 +1,10 @@
-//! A small view of a hologram, cheap enough for every frame: what an eye focused at z sees, as an RGBA image of a
-//! screen's size. [`crate::view::refocus`] looks at all of it.
+//! A small view of a hologram that is cheap enough for every frame: the image for an eye focused at z, as RGBA of a
+//! screen's size. [`crate::view::refocus`] computes the view at full resolution.
 //!
-//! The light of `factor` × `factor` modulator pixels is averaged into one, which keeps the middle of the Fourier plane
-//! as the aperture does and takes the checkerboard of double phase away; the small field is then propagated.
-//! Frequencies over 1/(2·`factor`) cycles a pixel are lost, so fine detail far from focus is blurred less than it would
-//! be.
+//! The light of `factor` × `factor` modulator pixels is averaged into one value. Like the aperture, this keeps the
+//! middle of the Fourier plane and removes the checkerboard of double phase. The small field is then propagated.
+//! Frequencies above 1/(2·`factor`) cycles per pixel are lost, so fine detail far from focus appears less blurred than
+//! it should.
 
 use crate::display::illumination::Illumination;
 use crate::display::panel::PanelPlan;
@@ -18,20 +18,20 @@ use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-/// Most pixels of an image.
+/// The largest number of pixels of an image.
 pub const MOST_PIXELS: usize = 1 << 26;
-/// Most pixels along a side of one.
+/// The largest number of pixels along a side of an image.
 const MOST_SIDE: usize = 1 << 14;
 
-/// A plan for one hologram shape, z and screen size. Immutable; shared between threads.
+/// A plan for one hologram shape, z and screen size. It is immutable and can be shared between threads.
 pub struct Preview {
     colours: usize,
     hologram: (usize, usize),
     small: (usize, usize),
     factor: usize,
-    /// None where the hologram stands at z.
+    /// `None` if the hologram is already at z.
     propagators: Option<Vec<Propagator>>,
-    /// With (H, W) of the modulator, in whose middle the hologram stands.
+    /// The illumination and the modulator's (H, W). The hologram is in the middle of the modulator.
     illumination: Option<(Illumination, (usize, usize))>,
     response: Response,
     panel: Option<PanelPlan>,
@@ -40,10 +40,10 @@ pub struct Preview {
     y: Axis,
 }
 
-/// Checks that an image of `screen` (H, W) is one for a screen, before there is memory for it.
+/// Checks that the (H, W) of `screen` is small enough, before memory is allocated for the image.
 ///
 /// # Errors
-/// One over [`MOST_PIXELS`], or over 2¹⁴ pixels a side.
+/// Returns an error if the image has more than [`MOST_PIXELS`] in all or more than 2¹⁴ pixels along a side.
 pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
     if height.max(width) > MOST_SIDE || height * width > MOST_PIXELS {
         return Err(Error::Setting(format!(
@@ -53,7 +53,7 @@ pub fn check_screen((height, width): (usize, usize)) -> Result<()> {
     Ok(())
 }
 
-/// Working memory of a [`Preview`] for one call at a time.
+/// The working memory of a [`Preview`] for one call at a time.
 pub struct PreviewScratch {
     field: Vec<Complex32>,
     amplitude: Vec<f32>,
@@ -61,11 +61,12 @@ pub struct PreviewScratch {
 }
 
 impl Preview {
-    /// Plans views at `z_m` of (H, W) holograms for `target`, through what it corrects, as images of `screen` (H, W).
+    /// Plans views at `z_m` of holograms of (H, W) for `target`, through the optics that it corrects, as images of
+    /// `screen` (H, W).
     ///
     /// # Errors
-    /// A hologram under 2 pixels a side, an empty screen or one over [`MOST_PIXELS`], a z too far away, or a table for
-    /// another modulator.
+    /// Returns an error if the hologram has fewer than 2 pixels along a side, the screen is empty or has more than
+    /// [`MOST_PIXELS`], z is too far away, or a table is for another modulator.
     pub fn new((height, width): (usize, usize), target: &Target, z_m: f64, screen: (usize, usize)) -> Result<Self> {
         if height < 2 || width < 2 || screen.0 == 0 || screen.1 == 0 {
             return Err(Error::Setting(format!(
@@ -74,7 +75,7 @@ impl Preview {
             )));
         }
         check_screen(screen)?;
-        // Even, so that both colours of the checkerboard weigh alike.
+        // An even factor weights both colours of the checkerboard equally.
         let ratio = (height as f64 / screen.0 as f64).min(width as f64 / screen.1 as f64);
         let factor = ((ratio / 2.0) as usize * 2).clamp(2, 8);
         let factor = factor.min(height.min(width) / 2 * 2);
@@ -98,17 +99,17 @@ impl Preview {
         })
     }
 
-    /// Modulator pixels, along each side, whose light is averaged.
+    /// Returns the number of modulator pixels along each side whose light is averaged.
     pub fn factor(&self) -> usize {
         self.factor
     }
 
-    /// (H, W) of the image.
+    /// Returns the shape (H, W) of the image.
     pub fn screen(&self) -> (usize, usize) {
         self.screen
     }
 
-    /// Working memory for one call at a time, sized for the current thread pool.
+    /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> PreviewScratch {
         let size = self.small.0 * self.small.1;
         PreviewScratch {
@@ -118,11 +119,11 @@ impl Preview {
         }
     }
 
-    /// The view of `levels`, (C, H, W), with full light standing for amplitude `scale`, into `rgba`: rows of red,
-    /// green, blue, alpha 255; amplitude 1 is 255, and one laser's view is grey. Allocates nothing.
+    /// Renders `levels`, (C, H, W), into `rgba`: rows of red, green, blue, alpha 255. `scale` is the amplitude that
+    /// maps to full light. Amplitude 1 becomes 255, and the view of one laser is grey. Allocates nothing.
     ///
     /// # Panics
-    /// If `levels` or `rgba` has another length than planned.
+    /// Panics if `levels` or `rgba` does not have the planned length.
     pub fn look(&self, levels: &[u8], scale: f32, rgba: &mut [u8], scratch: &mut PreviewScratch) {
         let (height, width) = self.hologram;
         let (small_height, small_width) = self.small;
@@ -130,7 +131,7 @@ impl Preview {
         assert_eq!(levels.len(), self.colours * height * width);
         assert_eq!(rgba.len(), 4 * screen_height * screen_width);
         let light = scale / (self.factor * self.factor) as f32;
-        // Where all pixels answer alike each level is one phase.
+        // If all pixels respond alike, each level has one phase.
         let shown: [Complex32; 256] = match &self.response {
             Response::PerPixel(_) => [Complex32::ZERO; 256],
             alike => std::array::from_fn(|l| Complex32::from_polar(light, alike.phase(l as u8, 0))),
@@ -162,8 +163,8 @@ impl Preview {
         self.draw(&scratch.amplitude, rgba);
     }
 
-    /// The light of `factor` × `factor` pixels a value, out of `factor` rows of levels. `light` gives that of a level
-    /// at an index in them.
+    /// Sums the light of `factor` × `factor` pixels into each value, from `factor` rows of levels. `light` returns the
+    /// light for a level at an index in the rows.
     fn sum(&self, rows: &[u8], sums: &mut [Complex32], light: impl Fn(u8, usize) -> Complex32) {
         let width = self.hologram.1;
         sums.fill(Complex32::ZERO);
@@ -193,7 +194,7 @@ impl Preview {
         }
     }
 
-    /// The planes of amplitudes as pixels of the screen.
+    /// Converts the planes of amplitudes to pixels of the screen.
     fn draw(&self, amplitude: &[f32], rgba: &mut [u8]) {
         let (height, width) = self.small;
         (rgba.par_chunks_exact_mut(4 * self.screen.1))
@@ -231,7 +232,7 @@ mod tests {
 
     const SHAPE: (usize, usize) = (96, 128);
 
-    /// The levels of soft blobs of each colour that lie at z = 1 mm.
+    /// Returns the levels of soft blobs of each colour at z = 1 mm.
     fn hologram(display: &Display, response: &Response) -> (Vec<u8>, f32) {
         let (height, width) = SHAPE;
         let mut field: Vec<Complex32> = (0..3 * height * width)
@@ -241,7 +242,7 @@ mod tests {
                 Complex32::new(0.1 + 0.8 * (-square / 400.0).exp(), 0.0)
             })
             .collect();
-        // From where they lie to the midpoint, and to the modulator.
+        // Propagates from the blobs to the midpoint and on to the modulator.
         let home = display.clone().with_offset_m(display.offset_m() - 1e-3).unwrap();
         let target = Target {
             response: response.clone(),
@@ -301,7 +302,7 @@ mod tests {
         assert!(Preview::new((1, 50), &target, 0.0, (10, 10)).is_err());
         assert!(Preview::new(SHAPE, &target, 0.0, (0, 10)).is_err());
         assert!(Preview::new(SHAPE, &target, f64::NAN, (10, 10)).is_err());
-        // A screen larger than the hologram has a view too.
+        // A screen can be larger than the hologram.
         assert_eq!(Preview::new((5, 7), &target, 1e-3, (300, 200)).unwrap().factor(), 2);
     }
 }

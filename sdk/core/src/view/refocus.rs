@@ -1,7 +1,7 @@
-//! What an eye focused at z would see: |ASM(H, z − offset)|, for one z or a focal stack.
+//! The image for an eye focused at z: |ASM(H, z − offset)|, for one z or a focal stack.
 //!
-//! A hologram that stands at z = offset is taken to the plane z, positive toward the viewer. A
-//! phase-only hologram passes the Fourier aperture on its way, as its light does.
+//! A hologram at z = offset is propagated to the plane z, positive toward the viewer. The field of a phase-only
+//! hologram passes the Fourier aperture on the way, as its light does.
 
 use crate::display::Display;
 use crate::display::panel::PanelPlan;
@@ -17,7 +17,7 @@ use num_complex::Complex32;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// A plan for one shape, display and range of z. Immutable; shared between threads.
+/// A plan for one shape, display and range of z. It is immutable and can be shared between threads.
 pub struct Refocus {
     display: Display,
     fft: Fft2,
@@ -25,20 +25,19 @@ pub struct Refocus {
     reach_m: f64,
 }
 
-/// One colour of a hologram in the Fourier domain, ready to be looked at from any z.
+/// One colour of a hologram in the Fourier domain, from which a field at any z can be computed.
 pub struct Spectrum {
-    /// (W', H'), each column contiguous.
+    /// (W', H'), with each column contiguous.
     columns: Vec<Complex32>,
     wavelength_m: f64,
 }
 
 impl Refocus {
-    /// Plans views of a (`height`, `width`) hologram that stands at `display.offset_m()`, from every z
-    /// of `z_m`, metres. `aperture` is the one in the Fourier plane, `None` for a complex hologram,
-    /// which needs none.
+    /// Plans views of a (`height`, `width`) hologram at `display.offset_m()` from every z of `z_m`, in metres.
+    /// `aperture` is the aperture in the Fourier plane. A complex hologram needs none: pass `None`.
     ///
     /// # Errors
-    /// No z, or one that [`asm::padded_shape`] refuses.
+    /// Returns an error if `z_m` is empty or [`asm::padded_shape`] rejects one of its values.
     pub fn new(height: usize, width: usize, display: &Display, z_m: &[f64], aperture: Option<Opening>) -> Result<Self> {
         if z_m.is_empty() {
             return Err(Error::Setting("no z to refocus at; give at least one".into()));
@@ -62,15 +61,16 @@ impl Refocus {
         })
     }
 
-    /// Working memory for one call at a time.
+    /// Returns working memory for one call at a time.
     pub fn scratch(&self) -> Scratch {
         self.fft.scratch()
     }
 
-    /// The spectrum of `plane`, (H, W), one colour (0 red, 1 green, 2 blue, or 0 of one laser) of a hologram.
+    /// Returns the spectrum of `plane`, (H, W), which is one colour of a hologram: 0 red, 1 green, 2 blue, or 0 for one
+    /// laser.
     ///
     /// # Panics
-    /// If `plane` has not H·W values or the display has no such colour.
+    /// Panics if `plane` does not have H·W values or the display does not have the colour.
     pub fn spectrum(&self, plane: &[Complex32], colour: usize, scratch: &mut Scratch) -> Spectrum {
         let shape = self.fft.padded_shape();
         let mut columns = vec![Complex32::ZERO; shape.0 * shape.1];
@@ -91,13 +91,13 @@ impl Refocus {
         }
     }
 
-    /// The field at `z_m` from its spectrum, into `plane`, (H, W).
+    /// Writes the field at `z_m`, computed from its spectrum, into `plane`, (H, W).
     ///
     /// # Errors
-    /// A z farther from the hologram than those planned for.
+    /// Returns an error if `z_m` is farther from the hologram than planned.
     ///
     /// # Panics
-    /// If `plane` has not H·W values or `spectrum` or `scratch` is another plan's.
+    /// Panics if `plane` does not have H·W values, or if `spectrum` or `scratch` belongs to another plan.
     pub fn field(&self, spectrum: &Spectrum, z_m: f64, plane: &mut [Complex32], scratch: &mut Scratch) -> Result<()> {
         let distance_m = z_m - self.display.offset_m();
         if distance_m.is_nan() || distance_m.abs() > self.reach_m * (1.0 + 1e-9) {
@@ -132,11 +132,11 @@ impl Refocus {
         Ok(())
     }
 
-    /// The amplitudes |ASM(H, z − offset)| of a whole `hologram`, (C, H, W), for each z: stacks of
-    /// (C, H, W), in the order of `z_m`.
+    /// Returns the amplitudes |ASM(H, z − offset)| of a whole `hologram`, (C, H, W), for each z: stacks of (C, H, W) in
+    /// the order of `z_m`.
     ///
     /// # Errors
-    /// As [`Self::field`].
+    /// Returns the same errors as [`Self::field`].
     pub fn focal_stack(&self, hologram: &[Complex32], z_m: &[f64]) -> Result<Vec<Vec<f32>>> {
         let colours = self.display.colours();
         let size = hologram.len() / colours;
@@ -156,11 +156,11 @@ impl Refocus {
     }
 }
 
-/// The field right behind a modulator that shows `levels`, (C, H, W): `scale`·exp(iφ) for each. Through the
-/// Fourier aperture it becomes the field that was encoded at that scale.
+/// Writes the field directly behind a modulator that displays `levels`, (C, H, W): `scale`·exp(iφ) for each level. The
+/// Fourier aperture turns it into the field that was encoded at this scale.
 ///
 /// # Panics
-/// If the lengths differ, or `response` is made for another shape.
+/// Panics if the lengths differ or `response` is for another shape.
 pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &mut [Complex32]) {
     assert_eq!(levels.len(), field.len());
     if let Response::PerPixel(table) = response {
@@ -176,15 +176,15 @@ pub fn phase_only_field(levels: &[u8], response: &Response, scale: f32, field: &
     }
 }
 
-/// The light behind the modulator of `target` that shows the `levels` of a hologram of (H, W) = `shape`, full light
-/// standing for amplitude `scale`: (C, H, W). What the panel adds is left out: it undoes the panel's own bend, or turns
-/// all light alike.
+/// Returns the light, (C, H, W), behind the modulator of `target` that displays the `levels` of a hologram of (H, W) =
+/// `shape`. `scale` is the amplitude that maps to full light. The panel's phases are left out because they compensate
+/// the panel's own curvature or rotate all light equally.
 ///
 /// # Errors
-/// A table or a panel for fewer pixels.
+/// Returns an error if a table or panel has fewer pixels.
 ///
 /// # Panics
-/// If `levels` has not C·H·W values.
+/// Panics if `levels` does not have C·H·W values.
 pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usize, usize)) -> Result<Vec<Complex32>> {
     let mut field = vec![Complex32::ZERO; target.display.colours() * shape.0 * shape.1];
     match levels {
@@ -209,14 +209,15 @@ pub fn shown_field(levels: Levels<'_>, scale: f32, target: &Target, shape: (usiz
     Ok(field)
 }
 
-/// The field that [`shown_field`] becomes through the optics of `target` and its aperture at `z_m`, without the
-/// carrier: (C, H, W).
+/// Returns the field at `z_m`, (C, H, W), without the carrier: the field of [`shown_field`] after the optics and
+/// aperture of `target`.
 ///
 /// # Errors
-/// As [`shown_field`] and [`Refocus::new`]; a correction that moves light farther than can be padded.
+/// Returns the same errors as [`shown_field`] and [`Refocus::new`], and an error if a correction moves light farther
+/// than can be padded.
 ///
 /// # Panics
-/// As [`shown_field`].
+/// Panics under the same conditions as [`shown_field`].
 pub fn seen_field(
     levels: Levels<'_>,
     scale: f32,
@@ -224,7 +225,7 @@ pub fn seen_field(
     shape: (usize, usize),
     z_m: f64,
 ) -> Result<Vec<Complex32>> {
-    // Before there is a field, for a z too far away is refused here.
+    // Rejects a z that is too far away before a field is allocated.
     let opening = Opening::centred(target.display.aperture_radius());
     let plan = Refocus::new(shape.0, shape.1, &target.display, &[z_m], Some(opening))?;
     let aberration = target.correction.as_ref().map(Aberration::reversed);

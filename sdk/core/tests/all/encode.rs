@@ -1,4 +1,5 @@
-//! The dark and the local steps of encoders against sums over whole planes in f64, and what they are there for.
+//! Compares the dark threshold and the local steps of encoders with f64 sums over whole planes, and tests their
+//! benefit.
 use crate::reference;
 
 use ndarray::{Array2, Array3};
@@ -18,11 +19,11 @@ use phasefront_core::pipeline::display_plan::DisplayPlan;
 use reference::test_plane;
 use rustfft::num_complex::{Complex32, Complex64};
 
-/// A display's first line.
+/// The first line of the description of a display with one laser.
 const ONE_LASER: &str = "wavelengths_nm = [532]\n";
 
-/// What double phase begins with, value by value: the field drawn to the real axis where it is dark, blurred, divided
-/// by the light, over `scale`.
+/// Returns the input of double phase, value by value: the field moved to the real axis where it is dark, blurred,
+/// divided by the light and by `scale`.
 fn start(
     field: &[Complex32],
     (h, w): (usize, usize),
@@ -56,7 +57,7 @@ fn start(
     (0..h * w).map(|i| blurred(i) / light[i] / scale).collect()
 }
 
-/// A case against the oracle, by phases and by levels; the same bits on any number of threads.
+/// Compares a case with the oracle, by phases and by levels. The bits must be the same on any number of threads.
 fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, options: &EncoderOptions) {
     const SCALE: f32 = 1.3;
     let (h, w) = shape;
@@ -103,7 +104,7 @@ fn check(display: &str, shape: (usize, usize), laser: Option<&Illumination>, opt
         let mut squares = 0.0;
         for (z, phase) in expected.iter().zip(phases) {
             assert!((0.0..std::f32::consts::TAU).contains(phase));
-            // Where little is left of a value its direction is rounding's.
+            // If little remains of a value, rounding determines its direction.
             let sure = z.norm().min(1.0);
             let apart = sure * (z / z.norm().max(1e-30) - Complex64::from_polar(1.0, f64::from(*phase))).norm();
             assert!(apart < 4e-3, "{z} {phase}: {apart}, {why}");
@@ -138,8 +139,8 @@ fn dark_and_local_steps_agree_with_sums_over_whole_planes() {
     }
 }
 
-/// A picture with noise where it is dark, by what is seen of it behind the aperture: root mean square of the
-/// amplitudes' difference.
+/// Encodes an image with noise in its dark parts and returns the root mean square error of the amplitudes behind the
+/// aperture.
 fn error_behind_the_aperture(options: &EncoderOptions, laser: Option<&Illumination>) -> f64 {
     let shape @ (h, w) = (96, 120);
     let target = Target {
@@ -205,7 +206,7 @@ fn each_stage_brings_what_is_shown_nearer_to_the_field() {
     }
 }
 
-/// What a colour of (H, W) = `shape` becomes over `distance_m`, the carrier left out, through an aperture of `radius`.
+/// Propagates a colour of (H, W) = `shape` over `distance_m` without the carrier, through an aperture of `radius`.
 fn through_aperture(
     plane: &[Complex64],
     (h, w): (usize, usize),
@@ -329,7 +330,8 @@ fn steps_at_the_midpoint_are_part_of_the_way_to_levels() {
     assert_ne!(levels(0), levels(2));
 }
 
-/// In video one step a frame leads where many lead; where the field changes it begins anew, as a frame by itself.
+/// Checks that in video one step for each frame reaches the result of many steps, and that a pixel whose field changes
+/// starts anew, like a single frame.
 #[test]
 fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
     const SCALE: f32 = 1.2;
@@ -371,7 +373,7 @@ fn steps_at_the_midpoint_go_on_where_the_picture_stands_still() {
     assert!(most.fold(0.0, f32::max) < 1e-2);
     assert_eq!(run(1, &[(&first, None), (&first, None)]), run(1, &still[..1]));
 
-    // Away from what stands still, what moves is as it would be by itself.
+    // Away from the unchanged part, the moving part is the same as in a single frame.
     let anew = run(1, &[(&second, None)]);
     let after = run(1, &[(&first, None), (&second, follows)]);
     let far = (0..anew.len()).filter(|at| at % w > w / 2 + 20);
@@ -396,7 +398,7 @@ fn a_dark_frame_is_dark() {
     assert!(sum.norm() < 1e-4);
 }
 
-/// A value that is no number costs what lies around it, not the frame.
+/// Checks that a value that is not a number affects only its surroundings, not the whole frame.
 #[test]
 fn no_number_stays_where_it_is() {
     let shape @ (h, w) = (40, 50);

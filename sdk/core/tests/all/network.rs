@@ -1,4 +1,4 @@
-//! The network against its naive oracle, and every file that is not such a network against its refusal.
+//! Compares the network with its naive oracle, and checks that invalid files are rejected.
 use crate::network_models;
 
 use network_models::{Model, frame, int, ints};
@@ -15,7 +15,8 @@ fn largest_difference(a: &[f32], b: &[f32]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// `size`, or for a model at half the resolution, which tract runs so alone, the next of even sides.
+/// Returns `size`. For a model at half the resolution, which tract runs only with even sides, returns the next even
+/// sides.
 fn even((height, width): (usize, usize), model: &Model) -> (usize, usize) {
     match model.halved {
         true => (height.next_multiple_of(2), width.next_multiple_of(2)),
@@ -78,7 +79,7 @@ fn stock_tract_agrees_with_the_definition_in_int8() {
                 let input = frame(4, height, width, 7);
                 let expected = reference::run(network.chain(), &input, height, width);
                 let output = run_stock(&network, &input, height, width);
-                // A value that falls on the other side of a rounding moves its neighbours by a step.
+                // A value on the other side of a rounding changes its neighbours by a step.
                 let off = output
                     .iter()
                     .zip(&expected)
@@ -95,7 +96,7 @@ fn stock_tract_agrees_with_the_definition_in_int8() {
     }
 }
 
-/// The kernels of a network's precision that this processor runs.
+/// Returns the kernels of a network's precision that this processor supports.
 fn kernels(network: &Network) -> Vec<Isa> {
     match network.precision() {
         Precision::Int8 => Isa::int8(),
@@ -225,7 +226,7 @@ fn rows_to_a_field_are_the_same_bits_as_planes_and_then_the_head() {
     ];
     for model in models {
         let network = Network::from_onnx(&model.bytes()).unwrap();
-        // The last is cut into bands, and where threads are few into strips.
+        // The last size is cut into bands, and into strips if there are few threads.
         for (height, width) in [(1, 1), (7, 5), (61, 47), (150, 300)] {
             let values = frame(model.inputs, height, width, 7);
             let source = Planes {
@@ -471,7 +472,7 @@ fn set_f32(proto: &mut ModelProto, tensor: &str, index: usize, value: f32) {
     tensor.raw_data[4 * index..][..4].copy_from_slice(&value.to_le_bytes());
 }
 
-/// Spoils a model and checks that the refusal speaks of the right thing.
+/// Corrupts a model and checks that the error message names the cause.
 fn check(model: &Model, spoil: impl Fn(&mut ModelProto), speaks_of: &[&str]) {
     let mut proto = model.proto();
     Network::from_onnx(&proto.encode_to_vec()).unwrap();
@@ -505,10 +506,10 @@ fn what_is_no_onnx_file_is_refused() {
     }
 }
 
-/// What a small file could make of itself in memory.
+/// Checks bounds on the memory that a small file can request.
 #[test]
 fn files_that_would_grow_in_memory_are_refused() {
-    // Scales that are read again and again.
+    // The same scales, read repeatedly.
     let many = |proto: &mut ModelProto| {
         let graph = proto.graph.as_mut().unwrap();
         let scale = graph.initializer.iter_mut().find(|t| t.name == "w0_scale").unwrap();
@@ -520,7 +521,7 @@ fn files_that_would_grow_in_memory_are_refused() {
         node(proto, "conv0").attribute = vec![Default::default(); 1 << 17];
     };
     check(&Model::new(5, 8), attributes, &["over 131072 parts"]);
-    // A name of megabytes, with what controls a terminal.
+    // A name of several megabytes with terminal control characters.
     let mut proto = Model::new(5, 8).proto();
     let name = "\u{1b}[2J\n".repeat(1 << 20);
     let conv = node(&mut proto, "conv1");

@@ -1,4 +1,4 @@
-//! The optics against the paper's equations in f64, and what physics demands of them.
+//! Compares the optics with the paper's equations in f64 and checks physical laws.
 use crate::network_models;
 use crate::reference;
 
@@ -42,7 +42,7 @@ fn propagated(plane: &[Complex32], (h, w): (usize, usize), s: f64, padding: Padd
     out
 }
 
-/// Each frame by its largest amplitude.
+/// Returns options that scale each frame by its largest amplitude.
 fn largest(encoding: Encoding) -> EncoderOptions {
     EncoderOptions {
         brightness: Brightness::FrameMax,
@@ -58,7 +58,7 @@ fn energy(plane: &[Complex32]) -> f64 {
     plane.iter().map(|v| f64::from(v.norm_sqr())).sum()
 }
 
-/// Light that stays away from the frame's edge over ±3 mm.
+/// Returns light that stays away from the frame's edge over ±3 mm.
 fn inner_plane((h, w): (usize, usize), margin: usize) -> Vec<Complex32> {
     let taper = |i: usize, n: usize| {
         let edge = i.min(n - 1 - i) as f32 - margin as f32;
@@ -86,7 +86,7 @@ fn propagation_agrees_with_equation_2() {
                 if padding == Padding::Double
                     && asm::reach_m(distance, RED, PITCH) / PITCH > shape.0.min(shape.1) as f64
                 {
-                    continue; // the band limit binds: another equation
+                    continue; // The band limit applies, so the equation differs.
                 }
                 out.iter_mut().for_each(|v| *v *= carrier);
                 let error = relative_error(&widen(&out, shape), &expected);
@@ -143,7 +143,7 @@ fn energy_is_kept_and_the_way_back_returns_the_field() {
         let back = propagated(&there, shape, -2.5e-3, Padding::Circular);
         assert!(relative_error(&widen(&back, shape), &widen(&plane, shape)) < 1e-4);
     }
-    // The same where the frame is padded, for light that does not leave it.
+    // Energy is also conserved in a padded frame if the light does not leave it.
     let shape = (200, 240);
     let plane = inner_plane(shape, 40);
     let there = propagated(&plane, shape, 3e-3, Padding::Reach);
@@ -154,7 +154,7 @@ fn energy_is_kept_and_the_way_back_returns_the_field() {
 
 #[test]
 fn a_positive_distance_converges_light_that_a_lens_sends_toward_the_viewer() {
-    // A wave that meets at z = +5 mm has the phase −πr²/(λ·z): it must grow brighter there and not at −5 mm.
+    // A wave that converges at z = +5 mm has the phase −πr²/(λ·z). It must become brighter there and not at −5 mm.
     let (h, w) = (128, 128);
     let lens: Vec<_> = (0..h * w)
         .map(|i| {
@@ -172,7 +172,7 @@ fn a_positive_distance_converges_light_that_a_lens_sends_toward_the_viewer() {
 
 #[test]
 fn the_band_limit_keeps_a_far_field_from_wrapping_around() {
-    // At 2 m the kernel is far wider than the doubled plane; what comes must still be finite and no brighter.
+    // At 2 m the kernel is far wider than the doubled plane. The result must still be finite and no brighter.
     let shape = (64, 64);
     let plane = inner_plane(shape, 8);
     let far = propagated(&plane, shape, 2.0, Padding::Double);
@@ -206,7 +206,7 @@ fn double_phase_agrees_with_equation_7() {
             assert!((f64::from(used) - number).abs() < 1e-6);
             let expected = reference::double_phase(&wide, number);
             for (got, want) in phase.iter().zip(&expected) {
-                // acos is infinitely steep at the brightest pixels: compare the phasors.
+                // acos is infinitely steep at the brightest pixels, so this compares phasors.
                 let apart = (Complex64::from_polar(1.0, f64::from(*got)) - Complex64::from_polar(1.0, *want)).norm();
                 assert!(apart < 1.5e-3, "{got} {want}");
             }
@@ -336,7 +336,7 @@ fn deep_encoding(input: &'static str) {
     assert!(why(&Display::default(), &hologram).contains("'rgbd'"));
 }
 
-/// The correction is one more phase in the offset's transfer function: against Eq. 2 with it, in f64.
+/// Compares the correction, which is an additional phase in the offset's transfer function, with Eq. 2 in f64.
 #[test]
 fn a_correction_is_part_of_the_offset() {
     let a = Aberration::new([
@@ -358,8 +358,8 @@ fn a_correction_is_part_of_the_offset() {
         plan.propagate(&mut field, &mut plan.scratch());
         let plans =
             Propagator::for_colours_corrected(h, w, PITCH, display.wavelengths_m(), offset_m, &a, PITCH).unwrap();
-        // In the plan's own periodic plane, and with room for all that moves, so that nothing comes back around: tails
-        // of the kernel at the corner frequencies reach beyond what rays do.
+        // Compares first in the plan's own periodic plane, then with enough space that nothing wraps around: the
+        // kernel's tails at the corner frequencies reach farther than rays do.
         for ((ph, pw), most) in [(plans[0].padded_shape(), 1e-4), ((4 * h, 4 * w), 0.03)] {
             for (c, lambda) in display.wavelengths_m().iter().copied().enumerate() {
                 let size = h * w;
@@ -385,7 +385,7 @@ fn a_correction_is_part_of_the_offset() {
     }
 }
 
-/// A hologram smaller than the modulator is lit by the middle of the beam, after the filter.
+/// Checks that a hologram smaller than the modulator is lit by the middle of the beam, after the filter.
 #[test]
 fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     let display = Display::from_toml("width = 60\nheight = 50").unwrap();
@@ -416,8 +416,8 @@ fn what_a_pixel_sends_is_divided_by_what_it_gets() {
     assert_eq!(levels, expected);
 }
 
-/// What a panel adds, in whole levels, is added to the levels modulo their number, of 8 bits and of 10, with every step
-/// of the encoder.
+/// Checks that a panel's phases in whole levels are added to the levels modulo their number, with 8 and with 10 bits
+/// and with every step of the encoder.
 #[test]
 fn a_panel_adds_its_phases_after_the_encoder() {
     let (h, w) = (40, 33);
@@ -498,8 +498,8 @@ fn thin_frames_pass_the_whole_pipeline_and_huge_ones_are_refused() {
     }
 }
 
-/// Stage after stage on whole planes: filter, light, largest amplitude, double phase, levels. The encoder does them row
-/// by row; the bits are the same, whatever the threads.
+/// Runs each stage on whole planes: filter, light, largest amplitude, double phase, levels. The encoder works row by
+/// row and must produce the same bits on any number of threads.
 #[test]
 fn one_sweep_from_field_to_levels_is_stage_after_stage() {
     for ((h, w), more) in [

@@ -1,4 +1,4 @@
-//! The plane sweep against its naive oracle, on every instruction set, and its edge cases.
+//! Compares the plane sweep with its naive oracle on every instruction set and tests its edge cases.
 use crate::network_models;
 
 use ndarray::{Array2, Array3};
@@ -15,7 +15,7 @@ use phasefront_core::method::sweep::Sweep;
 use phasefront_core::method::sweep::{SweepPlan, hidden, reference};
 use std::sync::Arc;
 
-/// A small volume, so that the naive oracle has little black to carry around.
+/// Returns a display with a small volume, so that the naive oracle needs only a narrow black border.
 fn display() -> Display {
     Display::from_toml("volume_depth_mm = 1.5").unwrap()
 }
@@ -34,7 +34,7 @@ fn sweep() -> Sweep {
     }
 }
 
-/// Surfaces at several depths with sharp edges, one slanted, and fine colour.
+/// Returns surfaces at several depths with sharp edges, one of them slanted, and fine colour.
 fn frame(height: usize, width: usize) -> RgbdFrame {
     let depth = Array2::from_shape_fn((height, width), |(y, x)| {
         let (v, u) = (y as f32 / height as f32, x as f32 / width as f32);
@@ -53,7 +53,7 @@ fn frame(height: usize, width: usize) -> RgbdFrame {
 
 fn run(plan: &SweepPlan, frame: &RgbdFrame) -> Vec<Complex32> {
     let (height, width) = plan.shape();
-    // What stood there before must not matter.
+    // The previous contents must not matter.
     let mut field = vec![Complex32::new(f32::NAN, f32::NAN); frame.colours() * height * width];
     let mut scratch = plan.scratch();
     for _ in 0..2 {
@@ -160,7 +160,7 @@ fn a_flat_frame_of_one_colour_stays_as_it_is_far_from_its_border() {
             .skip(size * size / 2 + size / 2)
             .step_by(size * size)
         {
-            // Fresnel's fringes of the border are still there.
+            // Fresnel fringes from the border remain.
             assert!((value - 0.6).norm() < 0.03, "{value}");
         }
     }
@@ -209,7 +209,7 @@ fn a_seeded_network_corrects_the_sweep() {
         (Model::new(4, 8), 1e-5, None, "[638, 520, 450]"),
         (Model::int8(5, 8), 0.05, None, "[638, 520, 450]"),
         (Model::new(4, 8), 1e-5, Some(24), "[638, 520, 450]"),
-        // Colour 1, without a stretch.
+        // Colour 1, without stretched depth.
         (Model::new(4, 8), 1e-5, None, "[520]"),
         (Model::int8(5, 8), 0.05, Some(24), "[520]"),
     ] {
@@ -228,7 +228,7 @@ fn a_seeded_network_corrects_the_sweep() {
             ..model
         };
         let network = Arc::new(Network::from_onnx(&model.bytes()).unwrap());
-        // One laser is all three colours of the input, and one of the output.
+        // One laser is used for all three colours of the input and gives one colour of the output.
         let (rgb, seeds) = (frame.rgb(), seed.repeat(3 / frame.colours()));
         let rgb = rgb.broadcast((3, height, width)).unwrap();
         let mut input: Vec<f32> = rgb.iter().chain(frame.depth()).map(|v| v - 0.5).collect();
@@ -250,7 +250,7 @@ fn a_seeded_network_corrects_the_sweep() {
 #[test]
 fn auto_gives_each_frame_what_suits_its_depth() {
     let (height, width) = (40, 60);
-    // A modulator that a sweep alone would go on to.
+    // A modulator to which a sweep alone would continue.
     let display = Display::default().with_offset_m(2e-3).unwrap();
     let network = Arc::new(Network::from_onnx(&Model::new(4, 8).bytes()).unwrap());
     let default = Sweep::for_display(&display);

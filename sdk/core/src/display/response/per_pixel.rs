@@ -1,12 +1,12 @@
-//! A table of levels for each pixel that a phone can hold: monotone knots on a coarse grid.
+//! A compact table of levels for each pixel: monotone knots on a coarse grid, small enough for a phone.
 //!
-//! A table of 256 levels for each of 1920×1080 pixels and three colours takes 1.6 GB. What differs between
-//! pixels, the thickness and the field of the liquid crystal, changes slowly over the panel. So curves are kept for
-//! nodes every `spacing` pixels, each as the levels of `intervals` + 1 phases, and interpolated linearly
-//! in x, y and phase.
+//! A table of 256 levels for each of 1920×1080 pixels and three colours takes 1.6 GB. The differences between pixels
+//! come from the thickness and the field of the liquid crystal, which change slowly over the panel. The table therefore
+//! stores curves for nodes every `spacing` pixels. Each curve holds the levels of `intervals` + 1 phases, and the table
+//! is interpolated linearly in x, y and phase.
 //!
 //! # The file
-//! All numbers little-endian, nothing between them:
+//! All numbers are little-endian, without padding:
 //!
 //! | bytes | what |
 //! |---|---|
@@ -15,62 +15,64 @@
 //! | (C, Gh, Gw, K+1) × u16 | levels × 128 of the phases 2πk/K, colour by colour, rows from the top |
 //! | (C, Gh, Gw) × u16 | `turn`/2π × 65535 |
 //!
-//! C, the colours, is 3 or 1, as the file's length says. Node (i, j) lies on pixel (s·i, s·j); Gh = ⌈(H−1)/s⌉ + 1 and
-//! Gw alike, so nodes reach to the last pixel or beyond it.
+//! The number of colours C is 3 or 1; it follows from the length of the file. Node (i, j) lies on pixel (s·i, s·j). Gh
+//! = ⌈(H−1)/s⌉ + 1 and Gw = ⌈(W−1)/s⌉ + 1, so the nodes reach the last pixel or lie beyond it.
 //!
 //! # The rule
-//! A phase φ at pixel (x, y), with t = φ·K/2π, k = min(⌊t⌋, K−1): the four nodes around the pixel give their
-//! knots k and k+1; these are interpolated in y, then x, then by t−k; the level is that + ½, cut to
-//! 0..=255, its fraction dropped. Where the modulator cannot reach 2π, the knots go on rising over 255; from the
-//! phase `turn` on (interpolated likewise) the smallest phase is nearer than the largest, and the level is
-//! that of phase 0. All in f32.
+//! For a phase φ at pixel (x, y), let t = φ·K/2π and k = min(⌊t⌋, K−1). Knots k and k+1 of the four nodes around the
+//! pixel are interpolated in y, then in x, then by t−k. The level is the result plus ½, clamped to 0..=255, with its
+//! fraction dropped. If the modulator cannot reach 2π, the knots continue to rise over 255. From the phase `turn` on,
+//! which is interpolated in the same way, the smallest phase is nearer than the largest, so phase 0 determines the
+//! level. All arithmetic is in f32.
 
 use crate::runtime::error::{Error, Result};
 use std::f32::consts::TAU;
 
 /// The first bytes of the file.
 const MAGIC: &[u8; 8] = b"PFPIXEL1";
-/// Steps of a level in the file.
+/// The number of steps of a level in the file.
 const FRACTIONS: f32 = 128.0;
-/// The most intervals of phase.
+/// The largest number of phase intervals.
 pub const MAX_INTERVALS: usize = 64;
 
-/// The levels of every pixel. Immutable; shared between threads.
+/// The levels of every pixel. The table is immutable and can be shared between threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PerPixel {
-    /// Of the modulator.
+    /// The height of the modulator.
     height: usize,
     width: usize,
-    /// The part of it that a stack (C, H, W) covers: its upper left pixel, and its size.
+    /// The upper left pixel of the part of the modulator that a stack (C, H, W) covers; `window` is the size of that
+    /// part.
     corner: (usize, usize),
     window: (usize, usize),
     spacing: usize,
     intervals: usize,
-    /// (Gh, Gw).
+    /// The grid of nodes, (Gh, Gw).
     nodes: (usize, usize),
-    /// (C, Gh, Gw, K+1).
+    /// The knots, (C, Gh, Gw, K+1), in levels.
     levels: Vec<f32>,
-    /// (C, Gh, Gw), radians.
+    /// The phases from which phase 0 is nearer, (C, Gh, Gw), in radians.
     turn: Vec<f32>,
 }
 
-/// The grid of nodes, (Gh, Gw), every `spacing` pixels over (`height`, `width`).
+/// Returns the grid (Gh, Gw) of nodes every `spacing` pixels over (`height`, `width`).
 pub fn nodes(height: usize, width: usize, spacing: usize) -> (usize, usize) {
     let along = |n: usize| n.saturating_sub(1).div_ceil(spacing) + 1;
     (along(height), along(width))
 }
 
 impl PerPixel {
-    /// A table for a modulator of (`height`, `width`) pixels, with nodes every `spacing` of them. `levels`, (C, Gh, Gw,
-    /// `intervals` + 1), are those of the phases 2πk/`intervals`, and may go on over 255 where the modulator does not
-    /// reach the phase; `turn`, (C, Gh, Gw), C being 3 or 1, are the phases from which that of phase 0 is nearer, 2π
-    /// where the modulator reaches all.
+    /// Creates a table for a modulator of (`height`, `width`) pixels with nodes every `spacing` pixels.
     ///
-    /// Values are rounded to what the file holds, so that a table is the same before and after.
+    /// `levels`, (C, Gh, Gw, `intervals` + 1), are the levels of the phases 2πk/`intervals`. They may exceed 255 for
+    /// phases that the modulator does not reach. `turn`, (C, Gh, Gw), are the phases from which phase 0 is nearer, or
+    /// 2π if the modulator reaches all phases. C is 3 or 1.
+    ///
+    /// Values are rounded to the precision of the file, so that a table does not change when it is written and read.
     ///
     /// # Errors
-    /// A size of 0, more than [`MAX_INTERVALS`] intervals, lengths that do not fit, levels that fall along a curve or
-    /// lie outside 0..=511, or a `turn` outside 0..=2π.
+    /// Returns an error if a size is 0, there are more than [`MAX_INTERVALS`] intervals, lengths do not match, levels
+    /// fall along a curve or lie outside 0..=511, or a `turn` lies outside 0..=2π.
     pub fn new(
         height: usize,
         width: usize,
@@ -140,10 +142,10 @@ impl PerPixel {
         })
     }
 
-    /// Reads the file's bytes.
+    /// Reads a table from the bytes of a file.
     ///
     /// # Errors
-    /// Bytes that are not such a table, or not all of it.
+    /// Returns an error if the bytes are not a valid table or are incomplete.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let refuse = |what: String| Error::Setting(format!("per-pixel table: {what}"));
         let rest = bytes
@@ -159,7 +161,7 @@ impl PerPixel {
             return Err(refuse(format!("holds impossible sizes {sizes:?}")));
         }
         let (rows, columns) = nodes(height, width, spacing);
-        // Of one colour.
+        // The number of bytes of one colour.
         let needed = 2 * rows * columns * (intervals + 2);
         let count = rest.len() / needed * rows * columns;
         if ![needed, 3 * needed].contains(&rest.len()) {
@@ -175,7 +177,7 @@ impl PerPixel {
         Self::of_fractions(height, width, spacing, intervals, levels, turn)
     }
 
-    /// The file's bytes.
+    /// Returns the bytes of the file.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         for number in [self.height, self.width, self.spacing, self.intervals] {
@@ -190,11 +192,10 @@ impl PerPixel {
         bytes
     }
 
-    /// The table of the (`height`, `width`) pixels in the middle of this one's: for a hologram smaller than the
-    /// modulator.
+    /// Returns the table of the central (`height`, `width`) pixels, for a hologram smaller than the modulator.
     ///
     /// # Errors
-    /// More pixels than there are.
+    /// Returns an error if the table has fewer pixels.
     pub fn centred(&self, height: usize, width: usize) -> Result<Self> {
         let (rows, columns) = self.window;
         if height > rows || width > columns {
@@ -212,51 +213,51 @@ impl PerPixel {
         })
     }
 
-    /// How many colours it is of.
+    /// Returns the number of colours.
     pub fn colours(&self) -> usize {
         self.turn.len() / (self.nodes.0 * self.nodes.1)
     }
 
-    /// (H, W) of the stacks that it is for.
+    /// Returns the (H, W) of stacks for this table.
     pub fn shape(&self) -> (usize, usize) {
         self.window
     }
 
-    /// The first row and column of the modulator that its stacks cover.
+    /// Returns the first row and the first column of the modulator that stacks cover.
     #[doc(hidden)]
     pub fn corner(&self) -> (usize, usize) {
         self.corner
     }
 
-    /// Pixels from node to node.
+    /// Returns the number of pixels between nodes.
     #[doc(hidden)]
     pub fn spacing(&self) -> usize {
         self.spacing
     }
 
-    /// Intervals of phase, K.
+    /// Returns the number of phase intervals, K.
     #[doc(hidden)]
     pub fn intervals(&self) -> usize {
         self.intervals
     }
 
-    /// The knots of all nodes, (C, Gh, Gw, K+1), in levels.
+    /// Returns the knots of all nodes, (C, Gh, Gw, K+1), in levels.
     #[doc(hidden)]
     pub fn knots(&self) -> &[f32] {
         &self.levels
     }
 
-    /// The phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest one.
+    /// Returns the phase of each node, (C, Gh, Gw), from which phase 0 is nearer than the largest phase.
     #[doc(hidden)]
     pub fn turns(&self) -> &[f32] {
         &self.turn
     }
 
-    /// The level that shows `phase`, in \[0, 2π), at value `at` of a stack (C, H, W). The rule as it stands: the oracle
-    /// of [`Self::levels`].
+    /// Returns the level for `phase`, in \[0, 2π), at value `at` of a stack (C, H, W). This implements the rule
+    /// directly; tests compare [`Self::levels`] with it.
     ///
     /// # Panics
-    /// If `at` is outside the stack.
+    /// Panics if `at` lies outside the stack.
     #[doc(hidden)]
     pub fn level(&self, phase: f32, at: usize) -> u8 {
         let turn = self.interpolate(at, |node| self.turn[node]);
@@ -268,7 +269,7 @@ impl PerPixel {
         rounded(here + (next - here) * (t - k as f32))
     }
 
-    /// A node's value between the four nodes around value `at` of the stack: in y first, then in x.
+    /// Interpolates a value between the four nodes around value `at` of the stack, in y first, then in x.
     fn interpolate(&self, at: usize, value: impl Fn(usize) -> f32) -> f32 {
         let (colour, y, x) = self.place(at);
         let (i, fy) = self.split(y);
@@ -282,7 +283,7 @@ impl PerPixel {
         left + (right - left) * fx
     }
 
-    /// Colour and pixel (y, x) of the modulator of value `at` of a stack.
+    /// Returns the colour and the modulator pixel (y, x) of value `at` of a stack.
     fn place(&self, at: usize) -> (usize, usize, usize) {
         let (height, width) = self.window;
         let plane = height * width;
@@ -291,22 +292,22 @@ impl PerPixel {
         (at / plane, y + self.corner.0, x + self.corner.1)
     }
 
-    /// The node before pixel `n` of an axis, and how far it is to the next.
+    /// Returns the node before pixel `n` of an axis, and the fraction of the way to the next node.
     fn split(&self, n: usize) -> (usize, f32) {
         (n / self.spacing, (n % self.spacing) as f32 / self.spacing as f32)
     }
 
-    /// The index of node (i, j); beyond the grid, where the way to it is 0, that of its last one.
+    /// Returns the index of node (i, j). Indices beyond the grid, whose weight is 0, are clamped to the last node.
     fn node(&self, colour: usize, i: usize, j: usize) -> usize {
         let (rows, columns) = self.nodes;
         (colour * rows + i.min(rows - 1)) * columns + j.min(columns - 1)
     }
 
-    /// [`Self::level`] of each of `phases`, which begin at value `first` of a stack (C, H, W) and stay in one row. The
-    /// same bits; allocates nothing.
+    /// Writes the level of each of `phases`, which begin at value `first` of a stack (C, H, W) and lie in one row. The
+    /// results are bit-identical to [`Self::level`]. Does not allocate.
     ///
     /// # Panics
-    /// If the lengths differ or the row ends before them.
+    /// Panics if the lengths differ or the phases extend beyond the row.
     #[inline(always)]
     #[doc(hidden)]
     pub fn levels(&self, phases: &[f32], first: usize, levels: &mut [u8]) {
@@ -316,7 +317,7 @@ impl PerPixel {
         assert!(x + phases.len() <= end, "a run beyond its row");
         let knots = self.intervals + 1;
         let (i, fy) = self.split(y);
-        // A node's curve and its turn, interpolated in y.
+        // Interpolates a node's curve and its turn in y.
         let column = |j: usize, curve: &mut [f32; MAX_INTERVALS + 1]| {
             let (top, bottom) = (self.node(colour, i, j), self.node(colour, i + 1, j));
             let lines = self.levels[top * knots..][..knots]
@@ -360,7 +361,7 @@ impl PerPixel {
         }
     }
 
-    /// The phase that `level` shows at value `at` of a stack: the smallest whose curve reaches it, in \[0, 2π).
+    /// Returns the smallest phase whose curve reaches `level` at value `at` of a stack, in \[0, 2π).
     #[doc(hidden)]
     pub fn phase(&self, level: u8, at: usize) -> f32 {
         let knots = self.intervals + 1;
@@ -378,29 +379,30 @@ impl PerPixel {
             }
             here = next;
         }
-        // Beyond 2π the curve is not kept; nothing that the table asks for lies there.
+        // The curve ends at 2π, and the table produces no level beyond it.
         0.0
     }
 }
 
-/// Values that are looked up at a time.
+/// The number of values in a block.
 const LANES: usize = 32;
 
 /// The curves between two nodes of a row.
 struct Between<'a> {
-    /// Of each interval the left node's first knot, the way to the right node's, and both of the second knot: in one
-    /// place, for looking up is what takes the time.
+    /// For each interval: the left node's first knot, its difference to the right node's, and the same for the second
+    /// knot. They are adjacent because the look-up dominates the time.
     ends: &'a [[f32; 4]; MAX_INTERVALS],
-    /// The turn likewise.
+    /// The left node's turn, and its difference to the right node's.
     turn: (f32, f32),
     intervals: usize,
-    /// Pixels from node to node.
+    /// The number of pixels between nodes.
     step: f32,
 }
 
 impl Between<'_> {
-    /// The levels of at most [`LANES`] phases, the first of which is `first` pixels from the left node.
-    // Index loops over arrays of one fixed length: only the middle one, which looks knots up, does not run on vectors.
+    /// Writes the levels of at most [`LANES`] phases. The first is `first` pixels from the left node.
+    // These are index loops over arrays of one fixed length. All of them vectorise except the middle one, which looks
+    // up knots.
     #[allow(clippy::needless_range_loop)]
     fn levels(&self, phases: &[f32], first: f32, levels: &mut [u8]) {
         let mut wanted = [0.0; LANES];
@@ -429,22 +431,22 @@ impl Between<'_> {
     }
 }
 
-/// To a level: the fraction is dropped after adding ½.
+/// Rounds to a level by adding ½ and dropping the fraction.
 fn rounded(level: f32) -> u8 {
     (level + 0.5) as u8
 }
 
-/// 2²³: from here on floats have no fraction.
+/// 2²³, from which on floats have no fraction.
 const WHOLE: f32 = 8_388_608.0;
 
-/// The whole part of a value from 0 on, far below 2²³: as a conversion to an integer and back, which vectors do slowly
-/// where it has to handle values out of range.
+/// Returns the integer part of a non-negative value far below 2²³. Vector conversions to an integer and back are slow
+/// if they must handle values out of range.
 fn whole(value: f32) -> f32 {
     let nearest = value + WHOLE - WHOLE;
     if nearest > value { nearest - 1.0 } else { nearest }
 }
 
-/// A whole value below 2²³ in the low bits of an integer.
+/// Returns a whole value below 2²³ in the low bits of an integer.
 fn bits(whole: f32) -> u32 {
     (whole + WHOLE).to_bits()
 }
@@ -454,7 +456,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Curves that bend, differ from node to node, and fall short of 2π where `short`.
+    /// Creates a table of curves that bend and differ between nodes. If `short`, they do not reach 2π.
     fn table(shape: (usize, usize), spacing: usize, intervals: usize, short: bool) -> PerPixel {
         let (rows, columns) = nodes(shape.0, shape.1, spacing);
         let mut levels = Vec::new();
@@ -523,7 +525,7 @@ mod tests {
                 let phase = i as f32 / 200.0 * TAU;
                 let shown = table.phase(table.level(phase, at), at);
                 let error = (shown - phase).abs();
-                // Half a level, where the curve is at its steepest.
+                // Half a level at the steepest point of the curve.
                 assert!(error.min(TAU - error) < 0.04, "{phase} {shown}");
             }
         }

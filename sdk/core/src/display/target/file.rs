@@ -1,7 +1,8 @@
-//! A target in one file, for an app to carry. `phasefront calibrate pack` writes it from what calibration found.
+//! The calibration file, which stores a target in one file for an app. `phasefront calibrate pack` writes it from the
+//! results of a calibration.
 //!
-//! The file is `PFCALIB1`, the length of a TOML text as u32, the text, the lasers' gains as f32, (C, Gh, Gw), the
-//! flatness maps as u16, (1 or 3, H, W), then the bytes of the per-pixel table; numbers little-endian.
+//! The file contains `PFCALIB1`, the length of a TOML text as u32, the text, the lasers' gains as f32, (C, Gh, Gw), the
+//! flatness maps as u16, (1 or 3, H, W), and the bytes of the per-pixel table. All numbers are little-endian.
 
 use super::Target;
 use crate::display::Display;
@@ -18,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 const MAGIC: &[u8; 8] = b"PFCALIB1";
-/// Most nodes of a laser's map along an axis.
+/// The largest number of nodes of a laser map along an axis.
 const MOST_NODES: usize = 65536;
 
 #[derive(Serialize, Deserialize)]
@@ -26,10 +27,10 @@ const MOST_NODES: usize = 65536;
 struct Header {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     lut: Option<Vec<u8>>,
-    /// Bytes of the per-pixel table.
+    /// The number of bytes of the per-pixel table.
     #[serde(default)]
     per_pixel: usize,
-    /// Gh, Gw.
+    /// The grid of the laser map, Gh and Gw.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     laser: Option<[usize; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -38,10 +39,10 @@ struct Header {
     carrier_rad: Option<[f64; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     lens_m: Option<f64>,
-    /// Flatness maps: none, one for all colours, or one for each.
+    /// The number of flatness maps: none, one for all colours, or one for each.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     flatness: Option<usize>,
-    /// The phases of the levels, from which the response is made where there is no other.
+    /// The phases of the levels. They define the response if the file has no other response.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     levels_turns: Option<Vec<f64>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -56,10 +57,11 @@ fn refuse(what: impl std::fmt::Display) -> Error {
 }
 
 impl Target {
-    /// Reads the file's bytes.
+    /// Reads a target from the bytes of a file.
     ///
     /// # Errors
-    /// Bytes that are not such a file, or not all of it; values that cannot be; a table for another display.
+    /// Returns an error if the bytes are not a valid calibration file or are incomplete, a value is invalid, or a table
+    /// is for another display.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
         let short = || refuse("is cut short");
         let rest = bytes
@@ -142,10 +144,10 @@ impl Target {
         Ok(target)
     }
 
-    /// The file's bytes.
+    /// Returns the bytes of the file.
     ///
     /// # Errors
-    /// As [`Self::from_bytes`] would.
+    /// Returns an error if the target is invalid, as [`Self::from_bytes`] would.
     pub fn to_bytes(&self) -> Result<Vec<u8>> {
         self.check()?;
         let Panel {
@@ -263,7 +265,7 @@ mod tests {
             assert_eq!(got.response, response);
             assert!(got.illumination.is_none() && got.correction.is_none());
         }
-        // Levels that say what they show.
+        // The response follows from the phases of the levels.
         let turns = [0.0, 0.1, 0.4, 0.8];
         let of_levels = Target {
             response: Response::of_turns(&turns).unwrap(),
@@ -286,7 +288,7 @@ mod tests {
         let mut long = bytes.clone();
         long.push(0);
         assert!(Target::from_bytes(&long).is_err());
-        // A header that promises a laser's map beyond any memory.
+        // A header that declares a laser map larger than any memory.
         let text = "laser = [60000, 60000]\n[display]\n";
         let mut huge = MAGIC.to_vec();
         huge.extend((text.len() as u32).to_le_bytes());
@@ -317,7 +319,7 @@ mod tests {
         };
         let error = other.to_bytes().unwrap_err().to_string();
         assert!(error.contains("40×24"), "{error}");
-        // The same of a file whose display was changed by hand.
+        // A file whose display was changed by hand is refused too.
         let plain = Target {
             panel: Panel::default(),
             ..calibration()

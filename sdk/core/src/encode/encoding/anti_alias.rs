@@ -1,20 +1,22 @@
-//! AA-DPM's filter: a small Gaussian blur of the complex field, so that neighbours which the
-//! checkerboard pairs are alike (Shi et al., Nature 591, 234, 2021).
+//! The filter of AA-DPM: a small Gaussian blur of the complex field that makes the neighbours in a checkerboard pair
+//! similar (Shi et al., Nature 591, 234, 2021).
 
 use crate::runtime::error::{Error, Result};
 use num_complex::Complex32;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// A separable Gaussian of an odd number of taps, its sum 1; edges are repeated.
+/// A separable Gaussian with an odd number of taps and sum 1. Edge values are repeated.
 pub struct AntiAlias {
-    /// The centre tap and those to one side.
+    /// The centre tap and the taps to one side.
     taps: Vec<f32>,
 }
 
 impl AntiAlias {
+    /// Creates a Gaussian of standard deviation `sigma` in pixels with `width` taps.
+    ///
     /// # Errors
-    /// A `sigma` that is not positive, or a `width` that is even or over 63.
+    /// Returns an error if `sigma` is not positive, or if `width` is even or above 63.
     pub fn new(sigma: f32, width: usize) -> Result<Self> {
         if !(sigma > 0.0 && sigma.is_finite()) {
             return Err(Error::Setting(format!(
@@ -34,14 +36,14 @@ impl AntiAlias {
         })
     }
 
-    /// The centre tap and those to one side.
+    /// Returns the centre tap and the taps to one side.
     pub fn taps(&self) -> &[f32] {
         &self.taps
     }
 
-    /// Working memory for rows of `width` values, one call at a time: some rows for each part of a plane.
+    /// Returns working memory for rows of `width` values and one call at a time. Each part of a plane gets some rows.
     pub fn scratch(&self, width: usize) -> AntiAliasScratch {
-        // Rows blurred along themselves, in a ring and behind a part's end, and one blurred both ways.
+        // The rows blurred along themselves, in a ring and behind a part's end, and one row blurred both ways.
         let rows = 3 * (self.taps.len() - 1) + 2;
         AntiAliasScratch {
             rows: vec![Complex32::ZERO; 2 * rayon::current_num_threads() * rows * width],
@@ -49,19 +51,19 @@ impl AntiAlias {
         }
     }
 
-    /// Taps to one side of the centre.
+    /// Returns the number of taps to one side of the centre.
     pub(in crate::encode) fn half(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// Replaces `plane`, (H, W), by itself blurred. Allocates nothing.
+    /// Blurs `plane`, (H, W), in place. Allocates nothing.
     pub fn in_place(&self, plane: &mut [Complex32], width: usize, scratch: &mut AntiAliasScratch) {
         let height = plane.len() / width;
         let half = self.taps.len() - 1;
         let count = 2 * half + 1;
         let AntiAliasScratch { rows, part } = scratch;
         let band = height.div_ceil(rows.len() / *part);
-        // What parts read of their neighbours, before anyone writes.
+        // Blurs the rows that parts read from their neighbours before any part writes.
         let before = &*plane;
         rows.par_chunks_exact_mut(*part)
             .zip(before.par_chunks(band * width))
@@ -108,13 +110,13 @@ impl AntiAlias {
             });
     }
 
-    /// Row `y` of `height` blurred, of a ring of rows that are blurred along themselves.
+    /// Blurs row `y` of `height` along the columns, from a ring of rows that are already blurred along themselves.
     #[inline(always)]
     pub(in crate::encode) fn blur_down(&self, ring: &[Complex32], y: usize, height: usize, blurred: &mut [Complex32]) {
         let width = blurred.len();
         let count = ring.len() / width;
         let row = |y: usize| values(&ring[y % count * width..][..width]);
-        // Here, for a store to the row could change what is read anew in each turn.
+        // Loads the tap once, because after a store to the row the compiler would load it again in each iteration.
         let tap = self.taps[0];
         for (to, from) in values_mut(blurred).iter_mut().zip(row(y)) {
             *to = from * tap;
@@ -128,10 +130,11 @@ impl AntiAlias {
         }
     }
 
-    /// The blur of `plane`, (H, W), value by value: the oracle of the faster forms, to the bit.
+    /// Blurs `plane`, (H, W), value by value. This is the bit-exact oracle for the faster versions.
     pub fn filter(&self, plane: &mut [Complex32], width: usize) {
         let height = plane.len() / width;
-        // What stands `i` places before and after the value at `at`, of `count` that are `step` apart.
+        // Returns the sum of the values `i` places before and after position `at`, on an axis of `count` values that
+        // are `step` apart.
         let pair = |from: &[Complex32], at: usize, i: usize, count: usize, step: usize| {
             let place = at / step % count;
             let (before, after) = (place.saturating_sub(i), (place + i).min(count - 1));
@@ -148,7 +151,7 @@ impl AntiAlias {
         }
     }
 
-    /// The blur of `row` along itself into `out`.
+    /// Blurs `row` along itself into `out`.
     #[inline(always)]
     pub(in crate::encode) fn blur_row(&self, row: &[Complex32], out: &mut [Complex32]) {
         let (last, half) = (row.len() - 1, self.taps.len() - 1);
@@ -177,7 +180,7 @@ impl AntiAlias {
     }
 }
 
-/// Real and imaginary parts in turn.
+/// Returns real and imaginary parts alternately.
 #[inline(always)]
 fn values(row: &[Complex32]) -> &[f32] {
     bytemuck::cast_slice(row)
@@ -188,10 +191,10 @@ fn values_mut(row: &mut [Complex32]) -> &mut [f32] {
     bytemuck::cast_slice_mut(row)
 }
 
-/// Working memory of [`AntiAlias::in_place`].
+/// The working memory of [`AntiAlias::in_place`].
 pub struct AntiAliasScratch {
     rows: Vec<Complex32>,
-    /// Values of a part.
+    /// The number of values of a part.
     part: usize,
 }
 

@@ -1,5 +1,5 @@
-//! BL-DPM's filter: the frequencies that the checkerboard would fold onto the image are cut
-//! (Sui et al., Opt. Express 29, 2597, 2021): |tan(πfx)·tan(πfy)| ≤ k stays, f in cycles a pixel.
+//! The filter of BL-DPM (Sui et al., Opt. Express 29, 2597, 2021). It removes the frequencies that the checkerboard
+//! would fold onto the image and keeps |tan(πfx)·tan(πfy)| ≤ k, with f in cycles per pixel.
 
 use crate::optics::fft::{ConvolveScratch, Fft2};
 use crate::runtime::error::{Error, Result};
@@ -12,15 +12,17 @@ pub struct BandLimit {
     k: f64,
 }
 
-/// Whether the frequency (`fx`, `fy`), in cycles a pixel, stays under the bound `k`.
+/// Returns whether the frequency (`fx`, `fy`), in cycles per pixel, is within the bound `k`.
 pub fn passes(fx: f64, fy: f64, k: f64) -> bool {
-    // tan(π/2) is 1.6e16 in f64, so an axis at Nyquist passes with tan(0) = 0 on the other.
+    // tan(π/2) is 1.6e16 in f64, so an axis at Nyquist passes if the other tangent is tan(0) = 0.
     ((PI * fx).tan() * (PI * fy).tan()).abs() <= k
 }
 
 impl BandLimit {
+    /// Plans the filter for one shape and the bound `k`.
+    ///
     /// # Errors
-    /// A `k` that is not positive.
+    /// Returns an error if `k` is not positive.
     pub fn new(height: usize, width: usize, k: f32) -> Result<Self> {
         if k.is_nan() || k <= 0.0 {
             return Err(Error::Setting(format!(
@@ -33,25 +35,25 @@ impl BandLimit {
         })
     }
 
-    /// Working memory for one call at a time.
+    /// Returns working memory for one call at a time.
     pub fn scratch(&self) -> ConvolveScratch {
         self.fft.convolve_scratch()
     }
 
-    /// The largest |ky| that stays in column `kx` of the spectrum.
+    /// Returns the largest |ky| that is kept in column `kx` of the spectrum.
     fn bound(&self, kx: usize) -> f64 {
         let (height, width) = self.fft.padded_shape();
         let tan_x = (PI * kx.min(width - kx) as f64 / width as f64).tan();
-        // tan grows with the frequency, so the rows that stay are those up to one angle.
+        // tan grows with the frequency, so the kept rows are those up to one angle.
         (self.k / tan_x).atan() * height as f64 / PI
     }
 
-    /// Whether the frequency of the spectrum's column `kx` and row `ky`, up to half of each, stays.
+    /// Returns whether the spectrum's column `kx` and row `ky`, each at most half the size, is kept.
     pub fn keeps(&self, kx: usize, ky: usize) -> bool {
         ky as f64 <= self.bound(kx)
     }
 
-    /// Filters `plane`, (H, W), as a periodic one.
+    /// Filters `plane`, (H, W), with periodic boundaries.
     pub fn filter(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         let (height, width) = self.fft.padded_shape();
         let scale = 1.0 / (height * width) as f32;
@@ -96,7 +98,7 @@ mod tests {
                 };
                 let tangents = (PI * signed(kx, w)).tan() * (PI * signed(ky, h)).tan();
                 if (tangents.abs() - 1.0).abs() < 1e-9 {
-                    continue; // on the bound itself either is right
+                    continue; // Exactly on the bound, either result is valid.
                 }
                 let energy: f32 = plane.iter().map(Complex32::norm_sqr).sum::<f32>();
                 let kept = energy / (h * w) as f32 > 0.5;

@@ -1,8 +1,9 @@
-//! The deep double phase method's pre-filter (DDPM, Eq. 6): a small network that was trained, together with the one
-//! that made the field and through encoding and aperture, to leave what double phase can show.
+//! The pre-filter of the deep double phase method (DDPM, Eq. 6). It is a small network that removes the parts of a
+//! field that double phase cannot display. It was trained together with the network that computes the field, through
+//! encoding and aperture.
 //!
-//! It reads the field at the modulator, its phase included: neither a mean phase is taken out nor is it scaled. Where
-//! it asks for that, AA-DPM's blur has gone over the field first.
+//! It reads the field at the modulator with its phase: the mean phase is not removed and the field is not scaled. If
+//! the network's input requires it, the blur of AA-DPM is applied first.
 
 use super::anti_alias::{AntiAlias, AntiAliasScratch};
 use crate::display::Display;
@@ -11,40 +12,41 @@ use crate::runtime::cancel::Cancel;
 use crate::runtime::error::Result;
 use num_complex::Complex32;
 
-/// The blur that pre-filters for blurred fields are trained behind.
+/// Returns the blur that pre-filters for blurred fields were trained with.
 ///
 /// # Errors
-/// None.
+/// Always succeeds because the parameters are valid.
 pub fn blur() -> Result<AntiAlias> {
     AntiAlias::new(0.7, 3)
 }
 
 /// A pre-filter for one shape.
 pub struct Deep {
-    /// (H, W).
+    /// The frame shape (H, W).
     shape: (usize, usize),
     blur: Option<AntiAlias>,
     network: FilterPlan,
 }
 
-/// Working memory of [`Deep::filter`].
+/// The working memory of [`Deep::filter`].
 pub struct DeepScratch {
     blur: Option<AntiAliasScratch>,
     network: FilterScratch,
 }
 
 impl DeepScratch {
-    /// Has fields end where `cancel` is requested.
+    /// Makes the computation stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.network.set_cancel(cancel);
     }
 }
 
 impl Deep {
-    /// Plans the filtering of (C, `height`, `width`) fields of the colours of `display`.
+    /// Plans the filtering of fields of (C, `height`, `width`) in the colours of `display`.
     ///
     /// # Errors
-    /// A network that is no pre-filter, that does not serve the display, or that the kernels do not take.
+    /// Returns an error if the network is not a pre-filter, does not support the display, or is not supported by the
+    /// kernels.
     pub fn new(height: usize, width: usize, network: &Network, display: &Display) -> Result<Self> {
         let blurred = network.input().is_blurred();
         Ok(Deep {
@@ -54,7 +56,7 @@ impl Deep {
         })
     }
 
-    /// Working memory for one call at a time.
+    /// Returns working memory for one call at a time.
     pub fn scratch(&self) -> DeepScratch {
         DeepScratch {
             blur: self.blur.as_ref().map(|blur| blur.scratch(self.shape.1)),
@@ -62,10 +64,10 @@ impl Deep {
         }
     }
 
-    /// Replaces `field`, (C, H, W) at the modulator, by the pre-encoding field.
+    /// Replaces `field`, (C, H, W) at the modulator, by the filtered field.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values.
+    /// Panics if `field` does not have C·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut DeepScratch) {
         let (height, width) = self.shape;
         if let (Some(blur), Some(scratch)) = (&self.blur, &mut scratch.blur) {

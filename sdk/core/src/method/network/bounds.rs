@@ -1,17 +1,17 @@
-//! What a file may make the library allocate, said before it is read: a message of two bytes becomes hundreds in
-//! memory, so that it is messages that are counted.
+//! Bounds on the memory that a file may make the library allocate, checked before it is decoded. The bounds count
+//! messages because a message of two bytes takes hundreds of bytes in memory.
 
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 use crate::runtime::file::MOST_NETWORK;
 
-/// Most messages and strings in one: nodes, attributes, tensors, types, their names. Those of a chain of 256 layers in
-/// int8 are fewer.
+/// The largest number of messages and strings: nodes, attributes, tensors, types and their names. An int8 chain of 256
+/// layers has fewer.
 pub const MAX_PARTS: usize = 1 << 17;
-/// How deep messages may lie in one another; a chain's lie 8 deep.
+/// The largest nesting depth of messages. A chain's messages are nested 8 deep.
 const MAX_DEPTH: usize = 16;
 
-/// The messages of ONNX, as far as they tell which of their fields hold others.
+/// The ONNX messages, as far as needed to know which of their fields hold other messages.
 #[derive(Clone, Copy)]
 enum Message {
     Model,
@@ -22,12 +22,12 @@ enum Message {
     Attribute,
     Tensor,
     Sparse,
-    /// All of whose fields are read as messages: types, entries of names.
+    /// A message, such as a type or a name entry, all of whose fields are read as messages.
     Any,
 }
 
 impl Message {
-    /// What field `number` of it holds; none for data and text.
+    /// Returns the message in field `number`, or `None` for data and text.
     fn field(self, number: u64) -> Option<Message> {
         match (self, number) {
             (Message::Model, 7) | (Message::Attribute, 6 | 11) | (Message::Training, 1 | 2) => Some(Message::Graph),
@@ -45,10 +45,10 @@ impl Message {
     }
 }
 
-/// Checks that a file is not too large, nor its parts too many.
+/// Checks that a file is not too large and does not have too many parts.
 ///
 /// # Errors
-/// [`Error::Network`] with the bound.
+/// Returns [`Error::Network`] with the bound.
 pub(super) fn check(file: &[u8]) -> Result<()> {
     if file.len() as u64 > MOST_NETWORK {
         return Err(Error::Network(format!(
@@ -59,16 +59,16 @@ pub(super) fn check(file: &[u8]) -> Result<()> {
     check_parts(file)
 }
 
-/// Checks that the parts of an ONNX file are not too many.
+/// Checks that an ONNX file does not have too many parts.
 ///
 /// # Errors
-/// [`Error::Network`] with the bound.
+/// Returns [`Error::Network`] with the bound.
 pub fn check_parts(file: &[u8]) -> Result<()> {
     count(file, Message::Model, 0, &mut 0)
 }
 
 fn count(mut bytes: &[u8], message: Message, depth: usize, parts: &mut usize) -> Result<()> {
-    // What is no protobuf ends the counting; decoding says so.
+    // Counting stops at data that is not protobuf. Decoding then reports it.
     while let Some((key, rest)) = varint(bytes) {
         bytes = rest;
         let (number, kind) = (key >> 3, key & 7);
@@ -109,7 +109,7 @@ fn count(mut bytes: &[u8], message: Message, depth: usize, parts: &mut usize) ->
     Ok(())
 }
 
-/// The number at the beginning, and what comes after it.
+/// Returns the number at the start of `bytes` and the remaining bytes.
 fn varint(bytes: &[u8]) -> Option<(u64, &[u8])> {
     let mut value = 0;
     for (i, byte) in bytes.iter().enumerate().take(10) {
@@ -126,7 +126,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A field that holds `bytes`.
+    /// Returns a field that holds `bytes`.
     fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
         let mut length = bytes.len();
         let mut field = vec![number << 3 | 2];
@@ -153,7 +153,7 @@ mod tests {
             let why = check(&file).unwrap_err().to_string();
             assert!(why.contains("over 131072 parts"), "{why}");
         }
-        // Data are one part.
+        // Data counts as one part.
         check(&field(7, &field(5, &field(9, &[10; 1 << 20])))).unwrap();
         let mut deep = Vec::new();
         for _ in 0..20 {

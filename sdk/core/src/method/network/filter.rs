@@ -1,5 +1,5 @@
-//! A pre-filter network on a field, in place: rows are read before what becomes of the row above is written, so that
-//! a second field is never held.
+//! A pre-filter network that processes a field in place. Input rows are read before the output of the row above is
+//! written, so a second field is not needed.
 
 use super::fused::{FusedChain, FusedScratch, tanh};
 use super::{Engine, Head, InputKind};
@@ -7,49 +7,49 @@ use crate::runtime::cancel::Cancel;
 use num_complex::Complex32;
 use phasefront_kernels::{Band, OUTPUTS, Rows, Tiling, wide};
 
-/// A network for fields, prepared for one size, from [`super::Network::filter_plan`]. Immutable; one plan serves many
-/// threads, each with its own scratch.
+/// A network for fields, prepared for one size, from [`super::Network::filter_plan`]. It is immutable. Threads can
+/// share one plan, each with its own scratch.
 pub struct FilterPlan {
     pub(super) chain: FusedChain,
     pub(super) input: InputKind,
     pub(super) head: Head,
-    /// Of a display of one laser, the output that is its field.
+    /// The output that is the field of a display with one laser.
     pub(super) colour: Option<usize>,
     pub(super) size: (usize, usize),
     pub(super) engine: Engine,
 }
 
-/// Working memory of [`FilterPlan::filter`].
+/// The working memory of [`FilterPlan::filter`].
 #[derive(Debug, Default)]
 pub struct FilterScratch {
     fused: FusedScratch,
-    /// The rows around each border between bands, as they were: border by border, (C, 2·reach, W).
+    /// The original rows around each border between bands: border by border, (C, 2·reach, W).
     borders: Vec<Complex32>,
 }
 
 impl FilterScratch {
-    /// Has runs end where `cancel` is requested.
+    /// Makes runs stop early once `cancel` is requested.
     pub fn set_cancel(&mut self, cancel: &Cancel) {
         self.fused.cancel = cancel.clone();
     }
 }
 
 impl FilterPlan {
-    /// Working memory for one run at a time; filled in the first.
+    /// Returns working memory for one run at a time. The first run fills it.
     pub fn scratch(&self) -> FilterScratch {
         FilterScratch::default()
     }
 
-    /// What runs the network, and why.
+    /// Returns the engine that runs the network and the reason for the choice.
     pub fn engine(&self) -> &Engine {
         &self.engine
     }
 
-    /// Replaces `field`, (C, H, W), by what the network makes of it, on the current rayon pool. After the first frame
-    /// nothing is allocated.
+    /// Replaces `field`, (C, H, W), by the output of the network, on the current rayon pool. Allocates nothing after
+    /// the first frame.
     ///
     /// # Panics
-    /// If `field` has not C·H·W values.
+    /// Panics if `field` does not have C·H·W values.
     pub fn filter(&self, field: &mut [Complex32], scratch: &mut FilterScratch) {
         match self.colour {
             None => self.filter_of([0, 1, 2], field, scratch),
@@ -57,11 +57,12 @@ impl FilterPlan {
         }
     }
 
-    /// By some colours of the output. The field's planes are the network's red, green and blue; a single one is each.
+    /// Filters with some colours of the output. The field's planes are the network's red, green and blue. A single
+    /// plane is used for all three.
     fn filter_of<const C: usize>(&self, colours: [usize; C], field: &mut [Complex32], scratch: &mut FilterScratch) {
         let (height, width) = self.size;
         assert_eq!(field.len(), C * height * width, "values of the field");
-        // A strip's halo would be overwritten by its neighbour: bands are whole.
+        // Bands span the whole width because a neighbouring strip would overwrite a strip's halo.
         let tiling = Tiling {
             strip_columns: width,
             ..self.chain.tiling(self.size)
@@ -164,7 +165,7 @@ impl<const C: usize> Rows<C> for InPlace<'_, C> {
 }
 
 impl<const C: usize> InPlace<'_, C> {
-    /// Where `row` was kept, if it lies outside `band`: at which border, and which of its rows.
+    /// Returns the border and the row there that hold `row`, if it is outside `band`.
     fn kept_row(&self, row: usize, band: &std::ops::Range<usize>) -> Option<(usize, usize)> {
         let border = match row {
             row if row < band.start => band.start / self.band_rows,

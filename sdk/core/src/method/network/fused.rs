@@ -10,7 +10,7 @@ use phasefront_kernels::{
 };
 use rayon::prelude::*;
 
-/// A chain packed for the kernels; any frame size, threads share it.
+/// A chain packed for the kernels. It works for any frame size, and threads can share it.
 pub(super) struct FusedChain {
     kernels: Kernels,
     tanh: bool,
@@ -21,7 +21,7 @@ enum Kernels {
     F32(F32Chain),
 }
 
-/// Working memory of a run; grows in the first frame and is kept.
+/// The working memory of a run. The first frame allocates it.
 #[derive(Debug, Default)]
 pub(super) struct FusedScratch {
     int8: Scratch<u8>,
@@ -36,9 +36,10 @@ impl FusedScratch {
 }
 
 impl FusedChain {
-    /// Packs `chain` for `isa`, or for the fastest kernels that this processor runs.
+    /// Packs `chain` for `isa`, or for the fastest kernels that this processor supports.
     ///
-    /// The error says what the kernels cannot run.
+    /// # Errors
+    /// Returns a description of the part that the kernels do not support.
     pub(super) fn new(chain: &Chain, isa: Option<Isa>) -> Result<FusedChain, String> {
         let kernels = match chain.precision {
             Precision::Int8 => {
@@ -60,7 +61,7 @@ impl FusedChain {
         }
     }
 
-    /// Runs the chain on the current rayon pool; `input` and `output` are planes of `size` (height, width).
+    /// Runs the chain on the current rayon pool. `input` and `output` are planes of `size` (height, width).
     pub(super) fn run(&self, input: &[f32], output: &mut [f32], size: (usize, usize), scratch: &FusedScratch) {
         let tiling = self.tiling(size);
         match &self.kernels {
@@ -73,8 +74,8 @@ impl FusedChain {
         }
     }
 
-    /// Runs the chain from `source` into `field`, (C, H, W), row by row: neither the input nor the output lies in
-    /// memory as a whole.
+    /// Runs the chain from `source` into `field`, (C, H, W), row by row. Neither the input nor the output is stored as
+    /// a whole.
     pub(super) fn field<S: Source + ?Sized, const C: usize>(
         &self,
         source: &S,
@@ -101,12 +102,12 @@ impl FusedChain {
         }
     }
 
-    /// Whether what rows are written holds before tanh.
+    /// Returns whether the chain ends with tanh, which output rows do not include yet.
     pub(super) fn has_tanh(&self) -> bool {
         self.tanh
     }
 
-    /// The tiling that suits a frame of `size` and the current rayon pool.
+    /// Returns the tiling that suits a frame of `size` and the current rayon pool.
     pub(super) fn tiling(&self, size: (usize, usize)) -> Tiling {
         match &self.kernels {
             Kernels::Int8(chain) => chain.tiling(size.0, size.1),
@@ -114,7 +115,7 @@ impl FusedChain {
         }
     }
 
-    /// Runs the chain but for its tanh.
+    /// Runs the chain without its tanh.
     pub(super) fn run_rows<R: Rows<PLANES>, const PLANES: usize>(
         &self,
         rows: &R,
@@ -130,16 +131,16 @@ impl FusedChain {
     }
 }
 
-/// The field that a chain is run into.
+/// The field that a chain writes to.
 pub(super) struct FieldOf<const C: usize> {
-    /// What the source's planes are.
+    /// The kind of the source's planes.
     pub(super) kind: InputKind,
     pub(super) head: Head,
     /// The colours of the output that are the field's planes.
     pub(super) colours: [usize; C],
 }
 
-/// Rows of a source in, rows of a field out.
+/// Reads rows of a source and writes rows of a field.
 struct FieldRows<'a, S: ?Sized, const C: usize> {
     source: &'a S,
     into: FieldOf<C>,
@@ -202,13 +203,13 @@ fn int8(chain: &Chain, isa: Isa) -> Result<Int8Chain, String> {
 pub struct Int8Layers {
     /// The layers in the order in which they run.
     pub layers: Vec<Int8Layer>,
-    /// How the network's input is rounded for the first layer.
+    /// The rounding of the network's input for the first layer.
     pub input: Quantiser,
-    /// How it is for the last one.
+    /// The rounding of the network's input for the last layer.
     pub concatenated: Quantiser,
 }
 
-/// The layers of a quantised chain as [`Int8Chain`] takes them.
+/// Returns the layers of a quantised chain in the form that [`Int8Chain`] takes.
 pub fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
     let input = |i: usize| -> Result<Quantisation, String> {
         chain.layers[i]
@@ -222,7 +223,7 @@ pub fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
         let Weights::Int8 { kernel, scale, bias } = &layer.weights else {
             return Err(format!("layer '{}' is f32 in an int8 chain", layer.name));
         };
-        // One step of what the sums are multiplied to, and what follows.
+        // The step that the multiplied sums are in, and the operations that follow.
         let mut requantise = Requantise {
             skip: None,
             rescale: None,
@@ -233,7 +234,7 @@ pub fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
             let next = &chain.layers[i + 1].quantisation;
             let end = f64::from(input(i + 1)?.scale);
             let relu = next.relu.map(|q| f64::from(q.scale));
-            // The first rounding of what the concatenation reads, if it is rounded before.
+            // The first rounding of the concatenation's input, if it is rounded before.
             let first = if Chain::has_skip(i + 1) {
                 next.sum.map(|q| f64::from(q.scale))
             } else {
@@ -276,7 +277,7 @@ pub fn int8_layers(chain: &Chain) -> Result<Int8Layers, String> {
     })
 }
 
-/// tanh of runs of values, in place.
+/// Computes tanh of runs of values, in place.
 #[inline(always)]
 pub(super) fn tanh(runs: &mut [&mut [f32]]) {
     for run in runs {
@@ -284,17 +285,17 @@ pub(super) fn tanh(runs: &mut [&mut [f32]]) {
     }
 }
 
-/// tanh to 3e-7, without branches, so that loops over it vectorise: `1 − 2/(e^2x + 1)`.
+/// Returns tanh to 3e-7 as `1 − 2/(e^2x + 1)`. It has no branches, so loops over it vectorise.
 #[inline(always)]
 fn tanh_value(x: f32) -> f32 {
-    // Beyond ±10 tanh is ±1 in f32.
+    // Beyond ±10, tanh is ±1 in f32.
     let y = x.clamp(-10.0, 10.0) * (2.0 * std::f32::consts::LOG2_E);
-    // 2^y = 2^k · 2^r with |r| ≤ ½; adding 1.5·2²³ rounds and leaves k in the low bits.
+    // 2^y = 2^k · 2^r with |r| ≤ ½. Adding 1.5·2²³ rounds and leaves k in the low bits.
     const ROUND: f32 = 12_582_912.0;
     let shifted = y + ROUND;
     let k = shifted.to_bits() << 23;
     let r = (y - (shifted - ROUND)) * std::f32::consts::LN_2;
-    // Taylor series of e^r; the next term is below 2e-7 of the sum.
+    // Taylor series of e^r. The next term is below 2e-7 of the sum.
     let e = 1.0 + r * (1.0 + r * (1.0 / 2.0 + r * (1.0 / 6.0 + r * (1.0 / 24.0 + r * (1.0 / 120.0 + r / 720.0)))));
     let e = f32::from_bits(e.to_bits().wrapping_add(k));
     1.0 - 2.0 / (e + 1.0)

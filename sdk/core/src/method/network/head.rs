@@ -1,4 +1,4 @@
-//! From a network's output to the complex field that it stands for.
+//! Converts a network's output to the complex field that it represents.
 
 use super::InputKind;
 use crate::runtime::error::Error;
@@ -7,22 +7,24 @@ use num_complex::Complex32;
 use phasefront_kernels::wide;
 use rayon::prelude::*;
 
-/// Pixels of a parallel part, and of a piece that is worked on at once.
+/// The number of pixels of a parallel part, and of a piece that is processed at once.
 const PART: usize = 1 << 12;
 const PIECE: usize = 256;
 
-/// How a network's six output planes stand for a complex field of three colours.
+/// The representation of a complex field of three colours by a network's six output planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Head {
-    /// The paper's: with `t` the tanh of the last layer, amplitude `(t[c] + 1)·√½ ∈ [0, √2]` and phase `π·t[3+c]`.
+    /// The paper's representation: with `t` the tanh of the last layer, amplitude `(t[c] + 1)·√½ ∈ [0, √2]` and phase
+    /// `π·t[3+c]`.
     AmplitudePhase,
-    /// A correction `o` of what came in: of the flat field, real part `rgb[c] + o[c]` with the front image's value in
-    /// [0, 1], imaginary `o[3+c]`; or, where the input is or holds a field `u`, `u[c] + o[c] + i·o[3+c]`.
+    /// A correction `o` of the input. The real part is `rgb[c] + o[c]`, with the front image `rgb` in [0, 1], and the
+    /// imaginary part is `o[3+c]`. If the input is or holds a field `u`, the result is instead
+    /// `u[c] + o[c] + i·o[3+c]`.
     RealImaginary,
 }
 
 impl Head {
-    /// The name in a network's metadata, `phasefront.head`.
+    /// Returns the name in a network's metadata, `phasefront.head`.
     pub fn name(self) -> &'static str {
         match self {
             Head::AmplitudePhase => "amplitude-phase",
@@ -30,19 +32,19 @@ impl Head {
         }
     }
 
-    /// Turns `output` (6, H, W) into `field` (3, H, W), carrier-free, at z = 0 (or, for a pre-filter, where its input
-    /// stands).
+    /// Turns `output` (6, H, W) into `field` (3, H, W), without the carrier, at z = 0 (or at the plane of the input for
+    /// a pre-filter).
     ///
     /// `input` is the network's input, planes of `kind`; only [`Head::RealImaginary`] reads it. Runs on the current
     /// rayon pool and allocates nothing.
     ///
     /// # Errors
-    /// When the lengths do not fit each other.
+    /// Returns an error if the lengths do not match.
     pub fn field(self, kind: InputKind, output: &[f32], input: &[f32], field: &mut [Complex32]) -> Result<()> {
         self.field_of(kind, &[0, 1, 2], output, input, field)
     }
 
-    /// [`Self::field`] of some `colours` of the output, in their order.
+    /// Works like [`Self::field`] for some `colours` of the output, in their order.
     pub(super) fn field_of(
         self,
         kind: InputKind,
@@ -77,8 +79,8 @@ impl Head {
         Ok(())
     }
 
-    /// A run of pixels of [`Head::field`], of these `colours` of the output: `base` gives pixels of a plane of the
-    /// input, from the given one of the run on.
+    /// Computes a run of pixels of [`Head::field`] for these `colours` of the output. `base` reads pixels of an input
+    /// plane, starting at the given pixel of the run.
     #[inline(always)]
     pub(super) fn row<const C: usize>(
         self,
@@ -112,7 +114,7 @@ impl Head {
                         }
                     }
                     InputKind::Seeded => {
-                        // A seed u comes in as ½(Re u − ½) and ½ Im u, behind RGB-D.
+                        // A seed u is encoded as ½(Re u − ½) and ½ Im u, after RGB-D.
                         base(4 + c, at, &mut re[..count]);
                         base(7 + c, at, &mut im[..count]);
                         re[..count].iter_mut().for_each(|re| *re = 2.0 * *re + 0.5);
@@ -120,7 +122,7 @@ impl Head {
                     }
                     InputKind::Rgbd | InputKind::RgbdXy | InputKind::Ldi { .. } => {
                         base(c, at, &mut re[..count]);
-                        // Colours come in minus a half.
+                        // Colours are encoded minus a half.
                         re[..count].iter_mut().for_each(|re| *re += 0.5);
                     }
                 }
@@ -132,7 +134,7 @@ impl Head {
         }
     }
 
-    /// A run of pixels of [`Head::AmplitudePhase`].
+    /// Computes a run of pixels of [`Head::AmplitudePhase`].
     #[inline(always)]
     pub(super) fn amplitude_phase<const C: usize>(
         colours: &[usize; C],
@@ -149,20 +151,20 @@ impl Head {
     }
 }
 
-/// `(sin πt, cos πt)` for |t| ≤ 1e6, to 2e-7; without branches, so that loops over it vectorise.
+/// Returns `(sin πt, cos πt)` for |t| ≤ 1e6, to 2e-7. It has no branches, so loops over it vectorise.
 #[inline(always)]
 fn sin_cos_pi(t: f32) -> (f32, f32) {
-    // Reduce to r in [-1/4, 1/4], t = r + k/2; adding 1.5·2²³ rounds to an integer and leaves it in the low bits.
+    // Reduce to r in [-1/4, 1/4], t = r + k/2. Adding 1.5·2²³ rounds to an integer and leaves it in the low bits.
     const ROUND: f32 = 12_582_912.0;
     let shifted = 2.0 * t + ROUND;
     let quarter = shifted.to_bits();
     let r = t - 0.5 * (shifted - ROUND);
     let r2 = r * r;
-    // Taylor series of sin πr and cos πr; the first term left out is below 1e-8 on the interval.
+    // Taylor series of sin πr and cos πr. The first omitted term is below 1e-8 on the interval.
     let sin =
         r * (std::f32::consts::PI + r2 * (-5.167_713 + r2 * (2.550_164 + r2 * (-0.599_264_5 + r2 * 0.082_145_89))));
     let cos = 1.0 + r2 * (-4.934_802 + r2 * (4.058_712 + r2 * (-1.335_263 + r2 * (0.235_330_63 + r2 * -0.025_806_89))));
-    // Odd quarters swap sine and cosine; the second bit of k gives the sign.
+    // Odd quarters swap sine and cosine. The second bit of k gives the sign.
     let odd = 0u32.wrapping_sub(quarter & 1);
     let (s, c) = (sin.to_bits(), cos.to_bits());
     let (s, c) = ((s & !odd) | (c & odd), (c & !odd) | (s & odd));
@@ -189,7 +191,7 @@ mod tests {
 
     #[test]
     fn heads_follow_their_definitions() {
-        // Two pixels; planes of each colour.
+        // Two pixels, with one plane for each colour.
         let output: Vec<f32> = (0..12).map(|k| (k as f32 - 5.5) / 6.0).collect();
         let input: Vec<f32> = (0..8).map(|k| k as f32 / 8.0 - 0.5).collect();
         let mut field = vec![Complex32::default(); 6];

@@ -1,4 +1,4 @@
-//! The `phasefront.*` metadata of a network file: what goes in, what comes out, and for which display.
+//! The `phasefront.*` metadata of a network file: the input, the output and the display.
 
 use super::Head;
 use super::proto::Entry;
@@ -7,45 +7,47 @@ use crate::method::sweep::MAX_PLANES;
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 
-/// What a network's input planes are.
+/// The kind of a network's input planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InputKind {
     /// "rgbd": red, green, blue and normalized depth, each minus 0.5.
     Rgbd,
-    /// "rgbdxy": as [`InputKind::Rgbd`], then the place in the frame, x and y, from −½ at the first pixel's outer edge
-    /// to ½ at the last one's: for aberrations that differ over it.
+    /// "rgbdxy": the planes of [`InputKind::Rgbd`], then the position in the frame, x and y, from −½ at the outer edge
+    /// of the first pixel to ½ at that of the last. For aberrations that vary over the frame.
     RgbdXy,
-    /// "ldi2" to "ldi9": that many layers front first, each as [`InputKind::Rgbd`].
+    /// "ldi2" to "ldi9": 2 to 9 layers, front first, each with the planes of [`InputKind::Rgbd`].
     Ldi {
-        /// How many layers.
+        /// The number of layers.
         layers: usize,
     },
-    /// "seeded": RGB-D as [`InputKind::Rgbd`], and the plane sweep's field of it; see `seeded.rs`.
+    /// "seeded": the planes of [`InputKind::Rgbd`], then the plane sweep's field of the frame; see `seeded.rs`.
     Seeded,
-    /// "field": real (3) and imaginary (3) parts of a field's colours; a pre-filter network.
+    /// "field": the real (3) and imaginary (3) parts of a field's colours, for a pre-filter network.
     Field,
-    /// "blurred-field": the same, of a field that the blur of AA-DPM has gone over first. What is left for the network
-    /// is small, and so is its rounding, which dark pixels cannot bear: at them the modulator's light cancels.
+    /// "blurred-field": the planes of [`InputKind::Field`], of a field that AA-DPM's blur was applied to. The remaining
+    /// correction is small, and so are its rounding errors. Dark pixels, where the modulator's light cancels, are
+    /// sensitive to them.
     BlurredField,
-    /// "split-blurred-field": the same in two parts, for networks whose input is rounded to 8 bits: its six planes in
-    /// steps of [`InputKind::SPLIT_STEP`], then of each what is left, [`InputKind::REMAINDER_GAIN`] times.
+    /// "split-blurred-field": the planes of [`InputKind::BlurredField`] in two parts, for networks whose input is
+    /// rounded to 8 bits: the six planes in steps of [`InputKind::SPLIT_STEP`], then their remainders times
+    /// [`InputKind::REMAINDER_GAIN`].
     SplitBlurredField,
 }
 
 impl InputKind {
-    /// The steps that a split field is rounded to in its first part.
+    /// The step to which the first part of a split field is rounded.
     pub const SPLIT_STEP: f32 = 1.0 / 64.0;
-    /// What the remainders of a split field are multiplied by.
+    /// The factor of the remainders of a split field.
     pub const REMAINDER_GAIN: f32 = 16.0;
 
-    /// A value of a field in the two parts of a split one: `value = first + second / REMAINDER_GAIN`.
+    /// Splits a value of a field into two parts with `value = first + second / REMAINDER_GAIN`.
     #[inline(always)]
     pub fn split(value: f32) -> (f32, f32) {
         let first = (value / Self::SPLIT_STEP).round_ties_even() * Self::SPLIT_STEP;
         (first, Self::REMAINDER_GAIN * (value - first))
     }
 
-    /// Planes of the input.
+    /// Returns the number of input planes.
     pub fn channels(self) -> usize {
         match self {
             InputKind::Rgbd => 4,
@@ -57,7 +59,7 @@ impl InputKind {
         }
     }
 
-    /// Whether a plane of it holds depth.
+    /// Returns whether `plane` holds depth.
     pub(super) fn is_depth(self, plane: usize) -> bool {
         match self {
             InputKind::Rgbd | InputKind::RgbdXy | InputKind::Seeded => plane == 3,
@@ -66,12 +68,12 @@ impl InputKind {
         }
     }
 
-    /// Whether a network for it is a pre-filter.
+    /// Returns whether a network with this input is a pre-filter.
     pub fn is_field(self) -> bool {
         self == InputKind::Field || self.is_blurred()
     }
 
-    /// Whether what it reads is a field that the blur of AA-DPM has gone over.
+    /// Returns whether the input is a field that AA-DPM's blur was applied to.
     pub fn is_blurred(self) -> bool {
         matches!(self, InputKind::BlurredField | InputKind::SplitBlurredField)
     }
@@ -106,53 +108,54 @@ impl std::fmt::Display for InputKind {
     }
 }
 
-/// What `phasefront.input` may be.
+/// The permitted values of `phasefront.input`.
 const INPUTS: &str = "'rgbd', 'rgbdxy', 'seeded', 'ldi2' to 'ldi9', 'field', 'blurred-field' or 'split-blurred-field'";
 
-/// How far the modulator may stand from where a pre-filter was trained for, as at the display it was trained for: what
-/// light spreads over it stays below a tenth of a pixel of 8 µm.
+/// The largest difference between the modulator's offset and the one that a pre-filter was trained for, scaled to the
+/// trained display. Over it, light spreads by less than a tenth of a pixel of 8 µm.
 const OFFSET_TOLERANCE_M: f64 = 20e-6;
-/// How far λ·V/p² may lie over what a network was trained for, relative.
+/// The relative tolerance by which λ·V/p² may exceed the trained value.
 const RANGE_TOLERANCE: f64 = 0.02;
-/// How far a colour's own λ·V/p² may lie from the mean over the colours, relative: 35 dB from its exact hologram, which
-/// is more than networks have.
+/// The relative tolerance between a colour's own λ·V/p² and the mean over the colours. It corresponds to 35 dB from the
+/// exact hologram, which is more than networks reach.
 const COLOUR_TOLERANCE: f64 = 0.05;
 
 /// The display that a network was trained for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainedDisplay {
-    /// Pixel pitch of the modulator, metres.
+    /// The pixel pitch of the modulator, in metres.
     pub pitch_m: f64,
-    /// Wavelengths of red, green and blue, metres.
+    /// The wavelengths of red, green and blue, in metres.
     pub wavelengths_m: [f64; 3],
-    /// Depth of the volume, metres.
+    /// The depth of the volume, in metres.
     pub volume_depth_m: f64,
-    /// Distance of the hologram plane from the volume's middle, metres; 0 for a midpoint hologram.
+    /// The distance of the hologram plane from the volume's middle, in metres. 0 for a midpoint hologram.
     pub offset_m: f64,
-    /// Whether its holograms correct an aberration of the display's optics, so that they are for it alone.
+    /// Whether the holograms correct an aberration of the display's optics, which limits them to this display.
     pub corrected: bool,
 }
 
-/// How a network serves a display.
+/// The parameters with which a network supports a display.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Served {
-    /// What depths are stretched by about the middle of the volume.
+    /// The factor that stretches depths about the middle of the volume.
     pub(super) scale: f64,
-    /// Of a display of one laser, the colour whose output is its field: 0 red, 1 green, 2 blue.
+    /// The colour whose output is the field of a display with one laser: 0 red, 1 green, 2 blue.
     pub(super) colour: Option<usize>,
 }
 
 impl TrainedDisplay {
-    /// What depths d of frames for `display` are stretched by about the middle of the volume, d' = ½ + s·(d − ½), for a
-    /// network for this display to give their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over the colours.
+    /// Returns the factor s that stretches depths d of frames for `display` about the middle of the volume, d' = ½ +
+    /// s·(d − ½), so that a network for this display computes their hologram: s = (λ·V/p²) / (λ·V/p²)trained, mean over
+    /// the colours.
     ///
-    /// To the paraxial order a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display
-    /// of another pitch, volume or laser is one for this display with its depth stretched. One laser takes the output
-    /// of one colour: the nearest of those whose depths were trained as far as the display's reach.
+    /// To paraxial order, a midpoint hologram without its carrier depends on λ·z/p² alone, so a frame for a display
+    /// with another pitch, volume or laser equals a frame for this display with stretched depth. One laser uses the
+    /// output of one colour: the nearest whose trained depths cover the display's range.
     ///
     /// # Errors
-    /// A display of a larger λ·V/p², whose depths were not trained; lasers that differ by over 5 % from one stretch;
-    /// any other display where an aberration is corrected.
+    /// Returns an error if the display has a larger λ·V/p², whose depths were not trained, if the factors of its lasers
+    /// differ by more than 5 %, or if the network corrects the aberration of another display.
     pub(super) fn serve(&self, display: &Display) -> Result<Served> {
         let trained = self.pitch_m.powi(2) / self.volume_depth_m;
         let given = display.volume_depth_m() / display.pitch_m().powi(2);
@@ -195,10 +198,11 @@ impl TrainedDisplay {
         Ok(Served { scale, colour })
     }
 
-    /// Checks that a pre-filter for this display is one for `display`: that λ·offset/p² is the same.
+    /// Checks that a pre-filter for this display also suits `display`, for which λ·offset/p² must be the same.
     ///
     /// # Errors
-    /// As [`Self::serve`], or an offset that differs by over 20 µm at the pitch it was trained for.
+    /// Returns the same errors as [`Self::serve`], and an error if the offset differs by more than 20 µm at the trained
+    /// pitch.
     pub(super) fn check_offset(&self, display: &Display) -> Result<()> {
         let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
         let trained_m = match self.serve(display)?.colour {
@@ -219,8 +223,8 @@ impl TrainedDisplay {
     }
 }
 
-/// The colour of the wavelength nearest to `given_m` of those whose stretch, of `each`, stays within the depths that
-/// were trained; where none does, the one of the least stretch.
+/// Returns the colour whose wavelength is nearest to `given_m` among those whose factor in `each` stays within the
+/// trained depths. If there is none, returns the colour with the smallest factor.
 fn nearest(trained_m: &[f64; 3], given_m: f64, each: &[f64]) -> usize {
     let apart = |colour: &usize| (trained_m[*colour] / given_m).ln().abs();
     let within = (0..3).filter(|colour| each[*colour] <= 1.0 + RANGE_TOLERANCE);
@@ -229,16 +233,16 @@ fn nearest(trained_m: &[f64; 3], given_m: f64, each: &[f64]) -> usize {
     nearest.or(least).unwrap_or(0)
 }
 
-/// What a file says of its network.
+/// The metadata of a network file.
 pub(super) struct Description {
     pub(super) input: InputKind,
     pub(super) head: Head,
     pub(super) display: TrainedDisplay,
-    /// Of a seeded network, if it says so.
+    /// The number of sweep planes of a seeded network, if the file gives it.
     pub(super) seed_planes: Option<usize>,
 }
 
-/// Reads all that the metadata must say, and what it may.
+/// Reads all required and optional metadata.
 pub(super) fn read(metadata: &[Entry]) -> Result<Description> {
     let input = text(metadata, "input", INPUTS)?;
     let input = InputKind::from_name(input).ok_or_else(|| wrong("input", input, INPUTS))?;

@@ -1,8 +1,8 @@
-//! From an ONNX file to a [`Chain`], or to the reason why the file holds no such chain.
+//! Reads an ONNX file as a [`Chain`], or reports why it holds no chain.
 //!
-//! The graph is read as exported: weights and scales are taken before any engine folds them. Each node is understood
-//! in the file's order as one step of the chain; the first that is not ends the reading with its name and what would
-//! be right.
+//! The graph is read as exported: weights and scales are taken before any engine folds them. Each node, in the file's
+//! order, must be one step of the chain. The first node that is not stops the reading with an error that gives its name
+//! and the expected value.
 
 use super::chain::{Chain, InputQuantisation, Layer, Precision, Quantisation, Weights};
 use super::proto::{Graph, Node, ValueInfo, data_type};
@@ -11,14 +11,14 @@ use crate::runtime::error::Error;
 use crate::runtime::error::Result;
 use std::collections::HashMap;
 
-/// Most layers, and most channels of one layer, that are taken for a hologram network.
+/// The largest number of layers, and of channels in one layer, of a hologram network.
 const MAX_LAYERS: usize = 256;
 const MAX_CHANNELS: usize = 1024;
 
-/// What a step of the chain yields, before any rounding.
+/// The result of a step of the chain, before any rounding.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Step {
-    /// The graph's input, where layers read it as squares of pixels.
+    /// The graph's input, if layers read it as squares of pixels.
     Frame,
     Input,
     Convolution(usize),
@@ -27,7 +27,7 @@ enum Step {
     Sum(usize),
     /// The last layer's input.
     Concat,
-    /// The last layer's output, its squares as pixels again.
+    /// The last layer's output with its squares rearranged as pixels.
     Pixels,
     Tanh,
 }
@@ -47,7 +47,7 @@ impl std::fmt::Display for Step {
     }
 }
 
-/// A tensor of the graph, as far as it is understood.
+/// A tensor of the graph, as interpreted by the reader.
 #[derive(Debug, Clone)]
 enum Value<'a> {
     /// A step's values, rounded (QuantizeLinear then DequantizeLinear) or not.
@@ -61,7 +61,7 @@ enum Value<'a> {
         quantisation: Quantisation,
     },
     Constant(&'a Constant),
-    /// An integer constant after DequantizeLinear: value and scales, one or one an output channel.
+    /// An integer constant after DequantizeLinear, with one scale or one for each output channel.
     Dequantised {
         constant: &'a Constant,
         scale: &'a [f32],
@@ -80,7 +80,7 @@ pub(super) fn chain(graph: &Graph) -> Result<Chain> {
     reader.finish(graph)
 }
 
-/// How messages call a node.
+/// Returns the description of a node for messages.
 fn describe(node: &Node) -> String {
     let name = if node.name.is_empty() {
         node.output.first().map_or("", String::as_str)
@@ -90,7 +90,7 @@ fn describe(node: &Node) -> String {
     format!("node '{name}' ({})", node.op_type)
 }
 
-/// Initializers and Constant nodes by name.
+/// Returns initializers and Constant nodes by name.
 fn constants(graph: &Graph) -> Result<HashMap<&str, Constant>> {
     let mut all = HashMap::new();
     for tensor in &graph.initializer {
@@ -119,9 +119,9 @@ struct Reader<'a> {
     halved: bool,
     layer_count: usize,
     layers: Vec<Layer>,
-    /// For the concatenation: roundings of its features and of the network's input.
+    /// The roundings of the concatenation's features and of its network input.
     concat: Option<[Option<Quantisation>; 2]>,
-    /// Roundings of the ReLU in each sum, by the layer that reads the sum.
+    /// The rounding of the ReLU in each sum, by the layer that reads the sum.
     relu_in_sum: HashMap<usize, Option<Quantisation>>,
 }
 
@@ -169,12 +169,12 @@ impl<'a> Reader<'a> {
         self.layer_count - 1
     }
 
-    /// Channels of the network's input as layers read it.
+    /// Returns the number of channels of the network's input as layers read it.
     fn read_channels(&self) -> usize {
         self.inputs * if self.halved { 4 } else { 1 }
     }
 
-    /// What the graph gives but for a tanh.
+    /// Returns the graph's last step before any tanh.
     fn end(&self) -> Step {
         match self.halved {
             true => Step::Pixels,
@@ -182,7 +182,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// What layer `i` reads, the concatenation left out.
+    /// Returns the input of layer `i` without the concatenation.
     fn features(&self, i: usize) -> Step {
         match Chain::has_skip(i) {
             true => Step::Sum(i),
@@ -254,7 +254,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The scales of a Quantize- or DequantizeLinear, each finite and positive.
+    /// Returns the scales of a Quantize- or DequantizeLinear, each finite and positive.
     fn scales(&self, node: &Node) -> Read<&'a [f32]> {
         let scale = self.constant(node, 1)?.f32s()?;
         if scale.len() > MAX_CHANNELS {
@@ -272,7 +272,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Scale and zero point of an activation's u8 values.
+    /// Returns scale and zero point of an activation's u8 values.
     fn activation_quantisation(&self, node: &Node) -> Read<Quantisation> {
         let &[scale] = self.scales(node)? else {
             return Err("activations are quantised per tensor: one scale".into());
@@ -304,7 +304,7 @@ impl<'a> Reader<'a> {
             ));
         }
         let quantisation = self.activation_quantisation(node)?;
-        // What the last layer concatenates may be rounded as the whole is, whose other part has a sign.
+        // An input of the last concatenation may be rounded like the whole, which can be negative in its other part.
         let concatenated = step == self.features(self.last());
         if matches!(step, Step::Relu(_) | Step::Sum(_)) && quantisation.zero_point != 0 && !concatenated {
             return Err(format!(
@@ -335,7 +335,7 @@ impl<'a> Reader<'a> {
                     ));
                 }
                 let scale = self.scales(node)?;
-                // The axis means nothing for a single scale; for several it must be the output channel's.
+                // The axis has no meaning for a single scale. For several it must be the output channel's.
                 if scale.len() > 1 && int_attribute(node, "axis").unwrap_or(1) != 0 && constant.shape().len() > 1 {
                     return Err("weights are quantised per output channel: axis 0 is right".into());
                 }
@@ -412,7 +412,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Fills in the roundings before the input's own, and settles the input's where a concatenation has none after it.
+    /// Fills in the roundings before the input's own. If no rounding follows a concatenation, sets the input's rounding
+    /// from its parts.
     fn int8_roundings(&mut self, i: usize, quantisation: &mut InputQuantisation) -> Read<()> {
         if Chain::has_skip(i) {
             quantisation.relu = self.relu_in_sum.get(&i).copied().flatten();
@@ -422,13 +423,13 @@ impl<'a> Reader<'a> {
         {
             let whole = match quantisation.input {
                 Some(whole) => whole,
-                // Without a rounding of the whole, both parts must already have one and the same.
+                // If the whole is not rounded, both parts must have the same rounding.
                 None => features.filter(|_| features == network_input).ok_or(
                     "the concatenation's parts have different scales: round it as a whole \
                                 (QuantizeLinear, DequantizeLinear)",
                 )?,
             };
-            // A part that is rounded as the whole is, is rounded once.
+            // A part with the same rounding as the whole is rounded only once.
             let before = |part: Option<Quantisation>| part.filter(|part| *part != whole);
             let (features, network_input) = (before(features), before(network_input));
             if let Some(features) = features
@@ -583,7 +584,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Pixels as squares at the beginning, and back at the end.
+    /// Reads the rearrangement of pixels as squares at the beginning, or back at the end.
     fn squares(&self, node: &Node) -> Read<Value<'a>> {
         if int_attribute(node, "blocksize") != Some(2) {
             return Err("blocksize 2 is right".into());
@@ -658,7 +659,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The channel count of the graph's input, `(1, C, H, W)` in f32.
+/// Returns the channel count of the graph's input, `(1, C, H, W)` in f32.
 fn input_channels(input: &ValueInfo) -> Result<usize> {
     let wrong = |what: String| Error::Network(format!("input '{}' {what}; f32 (1, C, H, W) is right", input.name));
     let Some(tensor) = input.r#type.as_ref().and_then(|t| t.tensor.as_ref()) else {
@@ -684,7 +685,7 @@ fn input_channels(input: &ValueInfo) -> Result<usize> {
     }
 }
 
-/// A convolution's attributes: 3×3, stride 1, dilation 1, one group, padding 1 on each side.
+/// Checks a convolution's attributes: 3×3, stride 1, dilation 1, one group, padding 1 on each side.
 fn check_convolution(node: &Node) -> Read<()> {
     for attribute in &node.attribute {
         let ints = &attribute.ints[..];
@@ -716,7 +717,7 @@ fn check_convolution(node: &Node) -> Read<()> {
     Ok(())
 }
 
-/// Every accumulator must fit 32 bits and every step size an f32.
+/// Checks that every accumulator fits 32 bits and every step size an f32.
 fn check_multipliers(weights: &Weights, quantisation: &InputQuantisation) -> Read<()> {
     let (Weights::Int8 { kernel, scale, bias }, Some(input)) = (weights, quantisation.input) else {
         return Ok(());
@@ -740,7 +741,7 @@ fn check_multipliers(weights: &Weights, quantisation: &InputQuantisation) -> Rea
     Ok(())
 }
 
-/// A bias in steps of the accumulator, input scale × weight scale; none of a value that is no bias.
+/// Returns a bias in steps of the accumulator, input scale × weight scale, or `None` if the value is not a bias.
 fn int8_bias(bias: &Value<'_>, input_scale: f32, scale: &[f32]) -> Read<Option<Vec<i32>>> {
     match bias {
         Value::Dequantised {

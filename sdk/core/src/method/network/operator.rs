@@ -7,7 +7,8 @@ use std::sync::Arc;
 use tract_onnx::prelude::*;
 use tract_onnx::tract_core::internal::*;
 
-/// A graph of one operator, from `name`, (1, `channels`, H, W), to the network's output. Height and width are symbols.
+/// Returns a graph of one operator, from `name`, (1, `channels`, H, W), to the network's output. Height and width are
+/// symbols.
 pub(super) fn model(name: &str, chain: FusedChain, channels: usize) -> Result<TypedModel> {
     let build = || -> TractResult<TypedModel> {
         let mut model = TypedModel::default();
@@ -24,7 +25,7 @@ pub(super) fn model(name: &str, chain: FusedChain, channels: usize) -> Result<Ty
     build().map_err(|why| Error::Network(super::stock::one_line(&why)))
 }
 
-/// Compared by identity: two packed chains are the same operator if they are the same memory.
+/// A shared chain that is compared by identity: two packed chains are the same operator if they are the same memory.
 #[derive(Clone)]
 struct Shared(Arc<FusedChain>);
 

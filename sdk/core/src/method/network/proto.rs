@@ -1,5 +1,5 @@
-//! The messages of ONNX that a hologram network needs, by the field numbers of onnx.proto3; what else a file holds is
-//! passed over.
+//! The ONNX messages that a hologram network needs, with the field numbers of onnx.proto3. All other messages are
+//! skipped.
 
 use prost::Message;
 
@@ -109,21 +109,21 @@ pub(super) struct Shape {
     pub(super) dim: Vec<Dimension>,
 }
 
-/// A size; one that is left open has a name, or nothing.
+/// A size. An open size has a name instead, or nothing.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Dimension {
     #[prost(int64, optional, tag = "1")]
     pub(super) value: Option<i64>,
 }
 
-/// The numbers of a tensor's types.
+/// The numbers of the tensor types.
 pub(super) mod data_type {
     pub(in super::super) const FLOAT: i32 = 1;
     pub(in super::super) const UINT8: i32 = 2;
     pub(in super::super) const INT8: i32 = 3;
     pub(in super::super) const INT32: i32 = 6;
 
-    /// How the standard calls a type.
+    /// Returns the standard's name of a type.
     pub(in super::super) fn name(data_type: i32) -> &'static str {
         const NAMES: [&str; 17] = [
             "UNDEFINED",

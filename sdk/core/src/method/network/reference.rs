@@ -1,16 +1,17 @@
-//! The naive oracle: a chain run as its definition reads, one sum a value. Slow; every fast path is tested against it.
+//! The naive oracle, which runs a chain exactly as defined, with one sum for each value. It is slow. Every fast path is
+//! tested against it.
 
 use super::chain::{Chain, Quantisation, Weights};
 
-/// Pixels of a square of two by two, from the upper left.
+/// The pixels of a square of two by two, from the upper left.
 const PIXELS: [(usize, usize); 4] = [(0, 0), (0, 1), (1, 0), (1, 1)];
 
-/// Runs `chain` on one frame: `input` planar `(C, H, W)`, the result `(outputs, H, W)`.
+/// Runs `chain` on one frame: `input` is planar `(C, H, W)`, the result is `(outputs, H, W)`.
 ///
-/// An int8 chain is computed in real numbers (f64 sums) with the roundings where the file has them.
+/// An int8 chain is computed in real numbers (f64 sums) with the roundings of the file.
 ///
 /// # Panics
-/// If `input` is not `chain.inputs · height · width` long.
+/// Panics if `input` does not have `chain.inputs · height · width` values.
 pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
     assert_eq!(input.len(), chain.inputs * height * width);
     let mut output = match chain.halved {
@@ -27,7 +28,7 @@ pub fn run(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32
     output
 }
 
-/// (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉).
+/// Rearranges (C, H, W) as (4·C, ⌈H/2⌉, ⌈W/2⌉).
 fn squares(values: &[f32], height: usize, width: usize) -> Vec<f32> {
     let mut squares = Vec::new();
     for (dy, dx) in PIXELS {
@@ -41,7 +42,7 @@ fn squares(values: &[f32], height: usize, width: usize) -> Vec<f32> {
     squares
 }
 
-/// The inverse of [`squares`].
+/// Rearranges squares as pixels. This is the inverse of [`squares`].
 fn pixels(squares: &[f32], channels: usize, height: usize, width: usize) -> Vec<f32> {
     let (rows, columns) = (height.div_ceil(2), width.div_ceil(2));
     let mut values = Vec::new();
@@ -54,7 +55,7 @@ fn pixels(squares: &[f32], channels: usize, height: usize, width: usize) -> Vec<
     values
 }
 
-/// The layers on (C, H, W) at their own resolution.
+/// Runs the layers on (C, H, W) at their own resolution.
 fn layers(chain: &Chain, input: &[f32], height: usize, width: usize) -> Vec<f32> {
     let last = chain.layers.len() - 1;
     let mut inputs: Vec<Vec<f32>> = Vec::new();
@@ -94,7 +95,7 @@ fn round(values: &mut [f32], quantisation: Option<Quantisation>) {
     }
 }
 
-/// Kernel and bias of a layer as real numbers.
+/// Returns kernel and bias of a layer as real numbers.
 fn real_kernel(layer: &super::chain::Layer) -> (Vec<f64>, Vec<f64>) {
     match &layer.weights {
         Weights::F32 { kernel, bias } => (
@@ -117,7 +118,7 @@ fn real_kernel(layer: &super::chain::Layer) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-/// A 3×3 convolution (correlation, as networks have it), stride 1, zero padding.
+/// Computes a 3×3 convolution (a correlation, as in networks) with stride 1 and zero padding.
 fn convolve(x: &[f32], (kernel, bias): &(Vec<f64>, Vec<f64>), outputs: usize, height: usize, width: usize) -> Vec<f32> {
     let inputs = x.len() / (height * width);
     let mut result = Vec::with_capacity(outputs * height * width);

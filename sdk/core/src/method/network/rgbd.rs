@@ -1,10 +1,10 @@
-//! RGB-D frames as what networks read.
+//! RGB-D frames as network input.
 
 use super::Source;
 use crate::frame::RgbdFrame;
 
-/// The planes of [`super::InputKind::Rgbd`]: red, green, blue, depth, each minus ½, one laser's amplitude being all
-/// three colours; and behind them, for [`super::InputKind::RgbdXy`], the place in the frame.
+/// Reads the planes of [`super::InputKind::Rgbd`]: red, green, blue and depth, each minus ½. The amplitude of one laser
+/// is used for all three colours. For [`super::InputKind::RgbdXy`], the position in the frame follows.
 impl Source for RgbdFrame {
     #[inline(always)]
     fn read(&self, plane: usize, row: usize, from: usize, into: &mut [f32]) {
@@ -38,7 +38,7 @@ mod tests {
     fn a_network_reads_rows_of_centred_planes() {
         let rgb = Array3::from_shape_fn((3, 2, 4), |(c, y, x)| (c * 8 + y * 4 + x) as f32 / 24.0);
         let depth = Array2::from_shape_fn((2, 4), |(y, x)| (y * 4 + x) as f32 / 8.0);
-        // The same values in another order in memory.
+        // The same values in another memory order.
         let mut turned = Array3::zeros((4, 2, 3)).reversed_axes();
         turned.assign(&rgb);
         for rgb in [rgb, turned] {

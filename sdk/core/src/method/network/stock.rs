@@ -1,4 +1,4 @@
-//! A chain on stock tract: the ONNX graph as it stands, in f32.
+//! A chain on stock tract: the unmodified ONNX graph, in f32.
 
 use crate::runtime::error::Error;
 use crate::runtime::error::Result;

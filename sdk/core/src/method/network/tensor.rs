@@ -1,9 +1,9 @@
-//! Constant tensors of an ONNX file, checked once: as many values as the shape says, real values finite.
+//! Constant tensors of an ONNX file. They are checked once: the number of values matches the shape, and real values are
+//! finite.
 
 use super::proto::{Tensor, data_type};
 
-/// A constant and its values. Types that a chain has no use for are kept by name, for the message of whoever reads
-/// them.
+/// A constant and its values. For types that a chain does not use, only the name is kept, for error messages.
 #[derive(Debug)]
 pub(super) struct Constant {
     name: String,
@@ -100,7 +100,7 @@ impl Constant {
         }
     }
 
-    /// Whether all values are integer zeros.
+    /// Returns whether all values are integer zeros.
     pub(super) fn is_zero(&self) -> bool {
         match &self.values {
             Values::U8(v) => v.iter().all(|&v| v == 0),

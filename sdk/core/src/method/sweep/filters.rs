@@ -1,9 +1,10 @@
-//! The filters of one colour: a step between planes, what several steps through empty space become, and the way home.
+//! The filters of one colour: a step between planes, several merged steps through empty space, and the final filter
+//! from the planes to the hologram.
 //!
-//! Everything is made of one step H and one filter B from plane 0 to where the hologram stands, both fitted
-//! ([`super::fit`]). Over a gap of m empty planes Hᵐ is one filter, nearly as short as light's reach over the gap, and
-//! from plane k the way home is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so it makes
-//! no difference to a result which planes were empty and merged.
+//! All are made from one step H and one filter B from plane 0 to the hologram, both fitted ([`super::fit`]). Over a gap
+//! of m empty planes, Hᵐ is one filter, little longer than light's reach over the gap. From plane k, the filter to the
+//! hologram is HᵏB. Both are cut where their tails hold less than [`TAIL`] of the light, so merging empty planes does
+//! not affect the result.
 
 use super::CARRIED;
 use super::fit::{self, Coefficients};
@@ -13,12 +14,12 @@ use std::f64::consts::PI;
 
 /// The sum of magnitudes that a merged filter may lose at its ends.
 const TAIL: f64 = 2e-5;
-/// What a pass over the field costs beside its taps, in taps: reading and writing it.
+/// The cost of reading and writing the field in a pass, expressed in taps.
 const PASS: usize = 3;
-/// Taps that the filter home has beyond light's reach, on each side.
+/// The number of taps that the final filter has beyond light's reach, on each side.
 const MARGIN: usize = 6;
 
-/// A symmetric filter as the kernels take it: the centre, then the taps at distances 1, 2 …
+/// A symmetric filter in the form that the kernels take: the centre, then the taps at distances 1, 2 …
 pub(super) type Taps = Vec<[f32; 2]>;
 
 /// The optics of one colour between the planes.
@@ -26,23 +27,23 @@ pub(super) type Taps = Vec<[f32; 2]>;
 pub struct Optics {
     pub(super) pitch_m: f64,
     pub(super) wavelength_m: f64,
-    /// Between neighbouring planes.
+    /// The distance between neighbouring planes.
     pub step_m: f64,
     pub(super) planes: usize,
-    /// From plane 0, the nearest to the viewer, to the hologram.
+    /// The distance from plane 0, the nearest to the viewer, to the hologram.
     pub home_m: f64,
-    /// Whether light of points between planes is carried to theirs.
+    /// Whether light of points between planes is carried to their plane.
     pub(super) between_planes: bool,
 }
 
 impl Optics {
-    /// How far light spreads over `distance_m`, pixels.
+    /// Returns how far light spreads over `distance_m`, in pixels.
     pub fn reach(&self, distance_m: f64) -> usize {
         let reach_m = crate::optics::asm::reach_m(distance_m, self.wavelength_m, self.pitch_m);
         (reach_m / self.pitch_m).ceil() as usize
     }
 
-    /// The radius of the filter home.
+    /// Returns the radius of the final filter.
     pub(super) fn home_radius(&self) -> usize {
         match self.home_m {
             0.0 => 1,
@@ -53,26 +54,26 @@ impl Optics {
 
 /// The filters of one colour.
 pub struct Filters {
-    /// What light gains beside its point, over i, its amplitude and how much deeper in normalized depth the point lies
-    /// than its plane; the point itself loses four times that.
+    /// The light that a point adds to each neighbour, divided by i, its amplitude and its depth behind its plane in
+    /// normalized depth. The point itself loses four times as much.
     pub carry: f32,
     /// H and B, for the oracle.
     pub step: Taps,
     pub home: Taps,
-    /// Weighted errors of H and of its power over the whole volume.
+    /// The weighted errors of H and of its power over the whole volume.
     pub(super) errors: [f64; 2],
-    /// Hᵐ for m − 1; only what [`Filters::part`] names is used.
+    /// Hᵐ at index m − 1. Only the filters that [`Filters::part`] returns are used.
     merged: Vec<Taps>,
-    /// The first part, in steps, of the cheapest way over a gap of m − 1 steps more.
+    /// The number of steps in the first part of the cheapest path over a gap of m steps, at index m − 1.
     parts: Vec<usize>,
     /// HᵏB for each plane k.
     ends: Vec<Taps>,
-    /// How many steps to do before `ends` is the cheapest way from plane k.
+    /// The number of steps before the filter in `ends`, on the cheapest path from plane k.
     before_end: Vec<usize>,
 }
 
 impl Filters {
-    /// Fits a step of `radius` taps on each side, and the way home.
+    /// Fits a step of `radius` taps on each side, and the final filter.
     pub(super) fn new(optics: &Optics, radius: usize) -> Self {
         let &Optics {
             pitch_m,
@@ -86,7 +87,7 @@ impl Filters {
         let steps = (planes - 1).max(1);
         let step = fit::powers(radius, steps, |f| free(f, step_m));
         let errors = [1, steps].map(|power| fit::error(&step, |f| free(f, step_m), power));
-        // The best way home for light from all planes together: it also makes good what the steps did wrong.
+        // The best final filter for the light from all planes together. It also compensates the errors of the steps.
         let home = fit::once(optics.home_radius(), |f| {
             let h = fit::gain(&step, f);
             let (mut right, mut energy) = (Complex64::ZERO, 0.0);
@@ -132,7 +133,7 @@ impl Filters {
         filters
     }
 
-    /// The cheapest ways over gaps and home, by dynamic programming over their lengths.
+    /// Finds the cheapest paths over gaps and to the hologram, by dynamic programming over their lengths.
     fn choose_ways(&mut self) {
         let cost = |taps: &Taps| taps.len() + PASS;
         let mut costs = vec![0];
@@ -153,7 +154,7 @@ impl Filters {
         }
     }
 
-    /// One step after the other, over gaps and home.
+    /// Replaces merged filters by single steps, over gaps and to the hologram.
     pub(super) fn unmerge(&mut self) {
         self.parts.fill(1);
         for (k, before) in self.before_end.iter_mut().enumerate() {
@@ -161,30 +162,31 @@ impl Filters {
         }
     }
 
-    /// The first part of the way over a gap of `steps`, at least 1: its filter, and how many steps it is.
+    /// Returns the filter and the number of steps of the first part of the path over a gap of `steps`, at least 1.
     pub(super) fn part(&self, steps: usize) -> (&Taps, usize) {
         let part = self.parts[steps - 1];
         (&self.merged[part - 1], part)
     }
 
-    /// The steps to do from plane `k` before [`Filters::end`].
+    /// Returns the number of steps from plane `k` before [`Filters::end`].
     pub(super) fn before_end(&self, k: usize) -> usize {
         self.before_end[k]
     }
 
-    /// From plane `k` to the hologram.
+    /// Returns the filter from plane `k` to the hologram.
     pub(super) fn end(&self, k: usize) -> &Taps {
         &self.ends[k]
     }
 
-    /// The longest radius of a filter between planes.
+    /// Returns the longest radius of a filter between planes.
     pub(super) fn longest_part(&self) -> usize {
         let used = self.parts.iter().map(|part| &self.merged[part - 1]);
         used.map(|taps| taps.len() - 1).max().unwrap_or(0)
     }
 }
 
-/// A filter's taps in f32; the centre takes up the rounding of the others, so that the gain at frequency 0 stays 1.
+/// Converts a filter's taps to f32. The centre absorbs the rounding of the others, so that the gain at frequency 0
+/// stays 1.
 fn taps(coefficients: &Coefficients) -> Taps {
     let sides: Taps = (coefficients.iter()).map(|c| [c.re as f32, c.im as f32]).collect();
     with_centre(sides)
@@ -196,7 +198,7 @@ fn with_centre(sides: Taps) -> Taps {
     std::iter::once(centre).chain(sides).collect()
 }
 
-/// Frequencies fine enough for the longest filter not to wrap around.
+/// A frequency grid fine enough for the longest filter not to wrap around.
 struct Grid {
     size: usize,
     inverse: std::sync::Arc<dyn rustfft::Fft<f64>>,
@@ -218,7 +220,7 @@ impl Grid {
         (0..self.size).map(|i| fit::gain(coefficients, f(i))).collect()
     }
 
-    /// The filter of a spectrum, as long as [`TAIL`] asks for.
+    /// Returns the filter of a spectrum, as long as [`TAIL`] requires.
     fn cut(&self, spectrum: impl Iterator<Item = Complex64>) -> Taps {
         let mut filter: Vec<_> = spectrum.collect();
         self.inverse.process(&mut filter);

@@ -1,30 +1,32 @@
-//! Short filters fitted to the transfer of free space.
+//! Short filters fitted to the transfer function of free space.
 //!
-//! Along one axis a distance s multiplies the frequency f by exp(−i2πsλf²/(1 + √(1 − λ²f²))), the carrier left out as
-//! in [`crate::optics::asm`]; both axes together differ from the true transfer by a phase of πsλ³f²ₓf²ᵧ/2, which is
-//! small where the diffraction angles are. A symmetric filter is a polynomial in cos: H(f) = 1 + Σ cⱼ(2cos(2πjfp) − 2),
-//! whose gain at f = 0 is 1 whatever the cⱼ.
+//! Along one axis a distance s multiplies the frequency f by exp(−i2πsλf²/(1 + √(1 − λ²f²))), without the carrier as in
+//! [`crate::optics::asm`]. The product of both axes differs from the true transfer function by a phase of πsλ³f²ₓf²ᵧ/2,
+//! which is small for small diffraction angles. A symmetric filter is a polynomial in cos: H(f) = 1 + Σ cⱼ(2cos(2πjfp)
+//! − 2). Its gain at f = 0 is 1 for any cⱼ.
 //!
-//! A step's filter is applied again and again, so it is not H that must be near its target T but the powers of H near
-//! those of T: Σ over f and several m of w(f)·|(H/T)ᵐ − 1|² is made least by Levenberg and Marquardt's method, for
-//! small powers first. w falls as the spectra of images do.
+//! Because a step's filter is applied repeatedly, the powers of H must be near those of its target T. Levenberg and
+//! Marquardt's method minimises Σ over f and several m of w(f)·|(H/T)ᵐ − 1|², for small powers first. w falls like the
+//! spectra of images.
 
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// Frequencies from 0 to the Nyquist frequency at which a step is fitted.
+/// The number of frequencies from 0 to the Nyquist frequency at which a step is fitted.
 const SAMPLES: usize = 129;
-/// w(f) = 1/((2pf)² + this).
+/// The constant in the weight w(f) = 1/((2pf)² + WHITE).
 const WHITE: f64 = 0.02;
-/// Coefficients over which a fit that is applied once goes by sums of cosines: a hundredth of the time at 1000.
+/// The number of coefficients above which a fit that is applied once uses sums of cosines. With 1000 coefficients, this
+/// takes a hundredth of the time.
 const WIDE: usize = 128;
-/// Most iterations for one set of powers.
+/// The largest number of iterations for one set of powers.
 const ITERATIONS: usize = 60;
 
 /// The coefficients c₁, c₂ … of a symmetric filter whose gain at frequency 0 is 1.
 pub(super) type Coefficients = Vec<Complex64>;
 
-/// The transfer along one axis over `distance_m`, at `f` of the Nyquist frequency, 0 to 1.
+/// Returns the transfer function along one axis over `distance_m`, at the fraction `f` of the Nyquist frequency, 0 to
+/// 1.
 pub(super) fn transfer(f: f64, distance_m: f64, wavelength_m: f64, pitch_m: f64) -> Complex64 {
     let f = f / (2.0 * pitch_m);
     let cosine = (1.0 - (wavelength_m * f).powi(2)).max(0.0).sqrt();
@@ -32,17 +34,17 @@ pub(super) fn transfer(f: f64, distance_m: f64, wavelength_m: f64, pitch_m: f64)
     Complex64::from_polar(1.0, phase)
 }
 
-/// The gain of a filter at `f` of the Nyquist frequency.
+/// Returns the gain of a filter at the fraction `f` of the Nyquist frequency.
 pub(super) fn gain(coefficients: &[Complex64], f: f64) -> Complex64 {
     (1..).zip(coefficients).map(|(j, c)| c * basis(j, f)).sum::<Complex64>() + 1.0
 }
 
-/// What coefficient j is multiplied by.
+/// Returns the factor of coefficient j.
 fn basis(j: usize, f: f64) -> f64 {
     2.0 * (PI * j as f64 * f).cos() - 2.0
 }
 
-/// `samples` frequencies from 0 to 1, and the square roots of their weights, which sum up to 1.
+/// Returns `samples` frequencies from 0 to 1 and the square roots of their weights. The weights sum to 1.
 fn weights(samples: usize) -> Vec<(f64, f64)> {
     let f = |i: usize| i as f64 / (samples - 1) as f64;
     let weight = |f: f64| 1.0 / (f * f + WHITE);
@@ -50,7 +52,8 @@ fn weights(samples: usize) -> Vec<(f64, f64)> {
     (0..samples).map(|i| (f(i), (weight(f(i)) / total).sqrt())).collect()
 }
 
-/// How far the `power`th power of a filter lies from that of its target, √(Σ w(f)·|(H/T)ᵐ − 1|²): 0 is perfect.
+/// Returns the deviation of the `power`th power of a filter from that of its target, √(Σ w(f)·|(H/T)ᵐ − 1|²). 0 is
+/// perfect.
 pub(super) fn error(coefficients: &[Complex64], target: impl Fn(f64) -> Complex64, power: usize) -> f64 {
     let squares = weights(SAMPLES).into_iter().map(|(f, weight)| {
         let ratio = gain(coefficients, f) * target(f).conj();
@@ -59,7 +62,8 @@ pub(super) fn error(coefficients: &[Complex64], target: impl Fn(f64) -> Complex6
     squares.sum::<f64>().sqrt()
 }
 
-/// The filter of `radius` coefficients nearest to `target` when applied once: weighted least squares.
+/// Returns the filter of `radius` coefficients that is nearest to `target` when applied once, by weighted least
+/// squares.
 pub(super) fn once(radius: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
     match radius > WIDE {
         true => once_wide(radius, target),
@@ -67,12 +71,12 @@ pub(super) fn once(radius: usize, target: impl Fn(f64) -> Complex64) -> Coeffici
     }
 }
 
-/// [`once`] by sums of cosines: the products of two coefficients' bases over all frequencies depend on the sum and the
-/// difference of their numbers alone, and are real.
+/// Computes [`once`] by sums of cosines. The products of two coefficients' bases, summed over all frequencies, are real
+/// and depend only on the sum and difference of the coefficients' indices.
 fn once_wide(radius: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
     let samples = SAMPLES.max(4 * radius + 1);
     let weights = weights(samples);
-    // cos(πkf) of the kth cosine at the ith frequency, which is i/(samples − 1).
+    // cos(πkf) of the kth cosine at the ith frequency, i/(samples − 1).
     let circle: Vec<f64> = (0..2 * (samples - 1))
         .map(|i| (PI * i as f64 / (samples - 1) as f64).cos())
         .collect();
@@ -98,8 +102,8 @@ fn once_wide(radius: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
     solve(matrix, right.collect()).unwrap_or(vec![Complex64::ZERO; radius])
 }
 
-/// The solution of a real, symmetric system, of which the lower triangle is given, by Cholesky's method; None where
-/// there is none.
+/// Returns the solution of a real, symmetric system, given by its lower triangle, by Cholesky's method. Returns `None`
+/// if there is none.
 fn solve(mut l: Vec<f64>, mut x: Vec<Complex64>) -> Option<Vec<Complex64>> {
     let n = x.len();
     for i in 0..n {
@@ -142,7 +146,8 @@ fn once_narrow(radius: usize, target: impl Fn(f64) -> Complex64) -> Coefficients
     normal.step(1e-12).unwrap_or(vec![Complex64::ZERO; radius])
 }
 
-/// The filter of `radius` coefficients whose powers up to `steps` stay nearest to those of `target`, |target| = 1.
+/// Returns the filter of `radius` coefficients whose powers up to `steps` stay nearest to those of `target`, |target| =
+/// 1.
 pub(super) fn powers(radius: usize, steps: usize, target: impl Fn(f64) -> Complex64) -> Coefficients {
     let samples: Vec<_> = (weights(SAMPLES).into_iter())
         .map(|(f, weight)| Sample {
@@ -166,13 +171,13 @@ pub(super) fn powers(radius: usize, steps: usize, target: impl Fn(f64) -> Comple
 
 struct Sample {
     weight: f64,
-    /// Of the target, the conjugate.
+    /// The conjugate of the target.
     target: Complex64,
     basis: Vec<f64>,
 }
 
 impl Sample {
-    /// H/T.
+    /// Returns H/T.
     fn ratio(&self, coefficients: &[Complex64]) -> Complex64 {
         let gain: Complex64 = self.basis.iter().zip(coefficients).map(|(b, c)| c * b).sum();
         (gain + 1.0) * self.target
@@ -190,7 +195,7 @@ fn cost(coefficients: &[Complex64], samples: &[Sample], powers: &[usize]) -> f64
     squares.sum()
 }
 
-/// Levenberg and Marquardt's method from `coefficients`, for `powers` together.
+/// Refines `coefficients` by Levenberg and Marquardt's method, for all `powers` together.
 fn refine(coefficients: &mut Coefficients, samples: &[Sample], powers: &[usize]) {
     let radius = coefficients.len();
     let mut least = cost(coefficients, samples, powers);
@@ -253,14 +258,15 @@ impl Normal {
     fn add(&mut self, row: &[Complex64], residual: Complex64) {
         for (i, a) in row.iter().enumerate() {
             self.right[i] -= a.conj() * residual;
-            // The lower triangle; the rest is its conjugate.
+            // The lower triangle. The upper one is its conjugate.
             for (value, b) in self.matrix[i * self.size..].iter_mut().zip(&row[..=i]) {
                 *value += a.conj() * b;
             }
         }
     }
 
-    /// The solution with the diagonal raised by `damping` of itself, by Cholesky's method; None where there is none.
+    /// Returns the solution with the diagonal increased by the factor 1 + `damping`, by Cholesky's method. Returns
+    /// `None` if there is none.
     fn step(&self, damping: f64) -> Option<Vec<Complex64>> {
         let n = self.size;
         let mut l = self.matrix.clone();

@@ -1,30 +1,30 @@
-//! Hidden surfaces: what an RGB-D frame does not show and light still comes from.
+//! Hidden surfaces, which an RGB-D frame does not show but which still emit light.
 //!
-//! Behind a pixel lies what its deeper neighbours show: the hidden layers continue them under the nearer surface, as
-//! far as light can reach. Of a pixel's left, right, upper and lower side, each is searched for
+//! Behind a pixel are the surfaces that its deeper neighbours show. The hidden layers continue them under the nearer
+//! surface, as far as light can reach. On a pixel's left, right, upper and lower side, the search looks for
 //!
-//! - its *near* source, the first pixel deeper than this one by more than [`JUMP`] whose next pixel is not yet another
-//!   jump deeper, as it is where an edge is blurred, and
-//! - its *far* source, the first beyond that is deeper than the near one by more than [`JUMP`],
+//! - its *near* source, the first pixel that is deeper than this one by more than [`JUMP`] and whose next pixel is not
+//!   another jump deeper, as at a blurred edge, and
+//! - its *far* source, the first pixel beyond the near source that is deeper than it by more than [`JUMP`],
 //!
-//! by a rule from pixel to pixel (`Found::next`), so that the search costs the same for any reach. The nearest source
-//! of the four sides is the first hidden layer, the nearest that lies deeper than it the second.
+//! by a rule from pixel to pixel (`Found::next`), so that the cost does not depend on the reach. The nearest source of
+//! the four sides is the first hidden layer. The nearest source deeper than that is the second.
 
 use super::workers::Workers;
 use rayon::prelude::*;
 
-/// How much deeper, in normalized depth, a pixel must be to lie on another surface.
+/// The difference in normalized depth above which two pixels are on different surfaces.
 pub const JUMP: f32 = 0.02;
-/// Where nothing is hidden.
+/// The index of no source.
 pub const NOTHING: u32 = u32::MAX;
-/// Rows of a task.
+/// The number of rows of a task.
 const BAND: usize = 32;
-/// Pixels that are passed over together where nothing is hidden.
+/// The number of pixels that are skipped together if nothing is hidden.
 const BLOCK: usize = 16;
-/// The depth of no source: not deeper than anything.
+/// The depth of no source, which is not deeper than anything.
 const NO_DEPTH: f32 = -1.0;
 
-/// A source on one side of a pixel: its depth, and how far away it is.
+/// A source on one side of a pixel, with its depth and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Source {
     depth: f32,
@@ -56,9 +56,9 @@ impl Found {
         self.near.depth == NO_DEPTH && !self.edge
     }
 
-    /// From the sources of the neighbour on that side, and the neighbour's own depth, to those of a pixel of `depth`:
-    /// of the neighbour itself, its near source and its far source, the first that is deep enough and within `reach`,
-    /// and the one after it.
+    /// Returns the sources of a pixel of `depth`, given those of its neighbour and the neighbour's own depth. The
+    /// candidates are the neighbour itself, its near source and its far source. The first that is deep enough and
+    /// within `reach` becomes the near source, and the one after it the far source.
     #[inline(always)]
     fn next(self, neighbour: f32, depth: f32, reach: u32) -> Found {
         let aged = |source: Source| Source {
@@ -77,7 +77,7 @@ impl Found {
         };
         let deeper = |source: Source| source.depth > least;
         let edge = deeper(itself);
-        // A neighbour at an edge itself is a pixel of a blurred one, of neither surface.
+        // A neighbour that is itself at an edge is a pixel of a blurred edge and belongs to neither surface.
         let itself = if self.edge { NONE } else { itself };
         Found {
             edge,
@@ -105,13 +105,13 @@ impl Found {
     }
 }
 
-/// `far`, if it is deeper than a surface at `depth`.
+/// Returns `far` if it is deeper than a surface at `depth`.
 #[inline(always)]
 fn far_of(far: Source, depth: f32) -> Source {
     if far.depth > depth + JUMP { far } else { NONE }
 }
 
-/// The sources of a pixel's hidden layers, as sides are added one after the other.
+/// The sources of a pixel's hidden layers. Sides are added one after another.
 #[derive(Clone, Copy)]
 struct Layers {
     source: [u32; 2],
@@ -126,7 +126,7 @@ impl Layers {
         distance: [u32::MAX; 2],
     };
 
-    /// Takes in what a side has found; `index` is the source's pixel at a distance on that side.
+    /// Adds the sources of one side. `index` returns the source's pixel for a distance on that side.
     fn add(&mut self, found: Found, index: impl Fn(u32) -> usize) {
         for Source { depth, distance } in [found.near, found.far] {
             if depth == NO_DEPTH {
@@ -158,7 +158,7 @@ impl Layers {
     }
 }
 
-/// A search for one frame shape and reach. Immutable; shared between threads.
+/// A search for one frame shape and reach. It is immutable and can be shared between threads.
 #[derive(Debug, Clone)]
 pub struct Hidden {
     height: usize,
@@ -166,27 +166,27 @@ pub struct Hidden {
     reach: usize,
 }
 
-/// Working memory of [`Hidden::find`].
+/// The working memory of [`Hidden::find`].
 pub struct HiddenScratch {
     workers: Workers<Work>,
 }
 
 struct Work {
-    /// The sources above or below the current row, one a column.
+    /// The sources above or below the current row for each column.
     columns: Vec<Found>,
-    /// Whether any column of each [`BLOCK`] has found something.
+    /// Whether any column of each [`BLOCK`] has found a source.
     busy: Vec<bool>,
-    /// (BAND, W).
+    /// The layers of a band, (BAND, W).
     layers: Vec<Layers>,
 }
 
 impl Hidden {
-    /// Plans the search in (`height`, `width`) frames as far as `reach` pixels.
+    /// Plans the search in frames of (`height`, `width`) up to `reach` pixels.
     pub fn new(height: usize, width: usize, reach: usize) -> Self {
         Hidden { height, width, reach }
     }
 
-    /// Working memory for one call at a time, for the current thread pool.
+    /// Returns working memory for one call at a time, sized for the current thread pool.
     pub fn scratch(&self) -> HiddenScratch {
         HiddenScratch {
             workers: Workers::new(|| Work {
@@ -197,11 +197,11 @@ impl Hidden {
         }
     }
 
-    /// Finds, for each pixel of normalized `depth`, (H, W), the pixels that its hidden layers continue, into
-    /// `sources`, (2, H, W): indices into the frame, or [`NOTHING`]. Allocates nothing.
+    /// Finds, for each pixel of normalized `depth`, (H, W), the pixels that its hidden layers continue, and writes them
+    /// into `sources`, (2, H, W), as indices into the frame or [`NOTHING`]. Allocates nothing.
     ///
     /// # Panics
-    /// If a length is wrong.
+    /// Panics if a length is wrong.
     pub fn find(&self, depth: &[f32], sources: &mut [u32], scratch: &mut HiddenScratch) {
         let size = self.height * self.width;
         assert!(depth.len() == size && sources.len() == 2 * size);
@@ -216,7 +216,7 @@ impl Hidden {
             });
     }
 
-    /// The rows from `top` on that `first` and `second` hold.
+    /// Finds the sources of the rows from `top` on that `first` and `second` hold.
     fn band(&self, depth: &[f32], top: usize, first: &mut [u32], second: &mut [u32], work: &mut Work) {
         let (width, reach) = (self.width, self.reach as u32);
         let row = |y: usize| &depth[y * width..][..width];
@@ -226,8 +226,8 @@ impl Hidden {
         for (y, layers) in layers.chunks_exact_mut(width).enumerate() {
             along(row(top + y), layers, (top + y) * width, reach);
         }
-        // Sources are at most `reach` rows away, and whether one stands at an edge the row behind it tells: a walk
-        // that begins there with nothing finds the same.
+        // Sources are at most `reach` rows away, and the row behind a source determines whether it is at an edge. A
+        // walk that starts there without sources therefore finds the same result.
         let before = self.reach + 1;
         let (columns, busy) = (&mut work.columns, &mut work.busy);
         columns.fill(Found::NOTHING);
@@ -253,7 +253,7 @@ impl Hidden {
     }
 }
 
-/// The left and the right side of a row's pixels; `at` is the row's place in the frame.
+/// Adds the sources on the left and right of a row's pixels. `at` is the index of the row's first pixel in the frame.
 fn along(depth: &[f32], layers: &mut [Layers], at: usize, reach: u32) {
     let width = depth.len();
     let mut x = 1;
@@ -270,7 +270,7 @@ fn along(depth: &[f32], layers: &mut [Layers], at: usize, reach: u32) {
         }
         x += 1;
     }
-    // The same from the other end: x counts from the right.
+    // The right side, where x counts from the right.
     let mut x = 1;
     while x < width {
         x += calm_back(&depth[1..=width - x], &depth[..width - x]);
@@ -288,7 +288,7 @@ fn along(depth: &[f32], layers: &mut [Layers], at: usize, reach: u32) {
     }
 }
 
-/// How many pixels from the first on have a neighbour that is not a jump deeper.
+/// Returns how many pixels, from the first on, have a neighbour that is not a jump deeper.
 fn calm(neighbours: &[f32], depths: &[f32]) -> usize {
     let whole = (neighbours.chunks_exact(BLOCK))
         .zip(depths.chunks_exact(BLOCK))
@@ -299,7 +299,7 @@ fn calm(neighbours: &[f32], depths: &[f32]) -> usize {
     whole + rest.take_while(|(n, d)| **n <= **d + JUMP).count()
 }
 
-/// As [`calm`], from the last on.
+/// Works like [`calm`] from the last pixel backwards.
 fn calm_back(neighbours: &[f32], depths: &[f32]) -> usize {
     let whole = (neighbours.rchunks_exact(BLOCK))
         .zip(depths.rchunks_exact(BLOCK))
@@ -311,14 +311,14 @@ fn calm_back(neighbours: &[f32], depths: &[f32]) -> usize {
     whole + rest.take_while(|(n, d)| **n <= **d + JUMP).count()
 }
 
-/// Whether any neighbour is a jump deeper; all are looked at, so that it is a few instructions.
+/// Returns whether any neighbour is a jump deeper. Checking all without an early exit takes only a few instructions.
 fn any_jump(neighbours: &[f32], depths: &[f32]) -> bool {
     let jumps = neighbours.iter().zip(depths).map(|(n, d)| *n > *d + JUMP);
     jumps.fold(false, |any, jump| any | jump)
 }
 
-/// A row of columns one pixel on; what they found is added to the row's `layers` if it has any. `index(x, distance)` is
-/// a source's pixel. Blocks of columns that have found nothing, and find nothing, are passed over.
+/// Advances all columns by one row and adds their sources to the row's `layers`, if given. `index(x, distance)` returns
+/// a source's pixel. Blocks of columns that have found nothing and find nothing are skipped.
 fn step(
     columns: &mut [Found],
     busy: &mut [bool],
@@ -348,7 +348,8 @@ fn step(
     }
 }
 
-/// The naive oracle of [`Hidden::find`]: each side of each pixel is walked from a pixel beyond `reach`.
+/// Finds the same sources as [`Hidden::find`] naively, as the oracle for tests: for each side of each pixel, it walks
+/// from a pixel beyond `reach`.
 pub fn reference(depth: &[f32], height: usize, width: usize, reach: usize) -> Vec<u32> {
     let size = height * width;
     assert_eq!(depth.len(), size);

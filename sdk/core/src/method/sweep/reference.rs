@@ -1,4 +1,4 @@
-//! The naive oracle of the sweep: whole planes, every plane, one step at a time, sums in f64.
+//! The naive oracle of the sweep. It processes whole planes, every plane, one step at a time, with f64 sums.
 
 use super::filters::Filters;
 use super::{Sweep, hidden, hidden_reach, optics, plane_of_depth};
@@ -7,10 +7,11 @@ use crate::frame::RgbdFrame;
 use crate::runtime::error::Result;
 use num_complex::{Complex32, Complex64};
 
-/// The hologram of `frame` at `z_m`, (C, H, W), as [`super::SweepPlan::field`] gives it, slowly.
+/// Returns the hologram of `frame` at `z_m`, (C, H, W), slowly computed, with the result of
+/// [`super::SweepPlan::field`].
 ///
 /// # Errors
-/// As [`super::SweepPlan::new`].
+/// Returns the same errors as [`super::SweepPlan::new`].
 pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Result<Vec<Complex32>> {
     sweep.check(display)?;
     frame.check(frame.shape(), display.colours())?;
@@ -21,7 +22,7 @@ pub fn field(frame: &RgbdFrame, display: &Display, sweep: Sweep, z_m: f64) -> Re
     let mut result = Vec::with_capacity(display.colours() * size);
     for (colour, optics) in optics(display, &sweep, z_m)?.iter().enumerate() {
         let filters = Filters::new(optics, sweep.taps / 2);
-        // Light may leave the frame and come back: as much black around it as the filters reach.
+        // Light may leave the frame and return, so the black border is as wide as the reach of the filters.
         let border = sweep.planes * (filters.step.len() - 1) + filters.home.len();
         let mut plane = Plane::new(height + 2 * border, width + 2 * border);
         for k in (0..sweep.planes).rev() {
@@ -79,7 +80,7 @@ impl Plane {
         }
     }
 
-    /// With a filter along both axes; black beyond the edges.
+    /// Convolves with a filter along both axes. Values beyond the edges are black.
     fn convolve(&mut self, taps: &[[f32; 2]]) {
         for (step, length) in [(1, self.width), (self.width, self.height)] {
             let position = |i: usize| {

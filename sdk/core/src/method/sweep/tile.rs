@@ -1,9 +1,9 @@
-//! One tile of the sweep: the planes that hold points in the tile or its halo, back to front.
+//! One tile of the sweep. It processes the planes that hold points in the tile or its halo, from back to front.
 //!
-//! Light reaches a pixel of the hologram from no farther than light can spread on its way, so from plane k a tile needs
-//! only a halo of that many pixels, and the field that is needed shrinks plane by plane to the tile itself. Nor is
-//! there light farther from the points behind a plane than it can have spread since: each row's field is computed from
-//! the leftmost to the rightmost pixel that light can be at, its [`Span`].
+//! Light reaches a pixel of the hologram only from within its spread over the distance. A tile therefore needs only a
+//! halo as wide as the spread from plane k, and the required field shrinks plane by plane to the tile itself. Likewise,
+//! there is no light farther from the points behind a plane than the distance it can have spread. Each row's field is
+//! therefore computed only from the leftmost to the rightmost pixel that light can reach, its [`Span`].
 
 use super::filters::Filters;
 use super::hidden::NOTHING;
@@ -11,10 +11,11 @@ use num_complex::Complex32;
 use phasefront_kernels::fir::{Fir, RUN};
 use std::ops::Range;
 
-/// Pixels beyond light's reach that are computed, too: a fitted filter's light runs a little ahead.
+/// The number of pixels beyond light's reach that are also computed, because a fitted filter's light spreads slightly
+/// farther.
 pub const MARGIN: usize = 10;
 
-/// The pixels of a row from one to before another; none where the second is not the greater.
+/// A half-open range of pixels in a row. It is empty if the second bound is not greater than the first.
 type Span = [usize; 2];
 const NOWHERE: Span = [usize::MAX, 0];
 
@@ -22,37 +23,37 @@ fn join(a: Span, b: Span) -> Span {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// The surfaces of a frame: where each pixel's points lie and whose colour they have.
+/// The surfaces of a frame: the positions and colours of the points of each pixel.
 #[derive(Clone, Copy)]
 pub(super) struct Surfaces<'a> {
-    /// (C, H, W).
+    /// The colours, (C, H, W).
     pub(super) rgb: &'a [f32],
-    /// Normalized, (H, W).
+    /// The normalized depth, (H, W).
     pub(super) depth: &'a [f32],
     /// The plane of each pixel, (H, W).
     pub(super) planes: &'a [u16],
-    /// Pixels that the hidden layers continue, (layers, H, W).
+    /// The pixels that the hidden layers continue, (layers, H, W).
     pub(super) hidden: &'a [u32],
     pub(super) height: usize,
     pub(super) width: usize,
 }
 
-/// What all tiles of a plan have in common.
+/// The properties that all tiles of a plan share.
 pub(super) struct Layout {
     tile: usize,
-    /// For each plane, how far around the tile its points matter.
+    /// The distance around the tile within which the points of each plane matter.
     halos: Vec<usize>,
-    /// From the edge of the buffer to the tile.
+    /// The distance from the edge of the buffer to the tile.
     border: usize,
     stride: usize,
     longest: usize,
-    /// How far light spreads from a plane to one so many planes nearer.
+    /// The spread of light over each number of planes.
     spread: Vec<usize>,
 }
 
 impl Layout {
-    /// For tiles of `tile`² pixels; `reach(k)` is how far light spreads from plane k to the hologram, `spread(k)` to
-    /// plane 0.
+    /// Creates the layout of tiles of `tile`² pixels. `reach(k)` is the spread of light from plane k to the hologram,
+    /// `spread(k)` its spread to plane 0.
     pub(super) fn new(
         tile: usize,
         planes: usize,
@@ -78,7 +79,7 @@ impl Layout {
         }
     }
 
-    /// Tiles down and across a frame.
+    /// Returns the number of tiles down and across a frame.
     pub(super) fn count(&self, height: usize, width: usize) -> (usize, usize) {
         (height.div_ceil(self.tile), width.div_ceil(self.tile))
     }
@@ -106,7 +107,7 @@ impl Layout {
         }
     }
 
-    /// Most values that a ring holds: all rows of the longest filter.
+    /// Returns the largest number of values in a ring: all rows of the longest filter.
     fn ring_values(&self) -> usize {
         (1..=self.longest)
             .map(|radius| (2 * radius + 1) * strip(radius))
@@ -114,44 +115,44 @@ impl Layout {
             .unwrap_or(RUN)
     }
 
-    /// Rows of the buffer.
+    /// Returns the number of rows of the buffer.
     fn rows(&self) -> usize {
         self.tile + 2 * self.border
     }
 
-    /// Most points that a tile of `layers` layers can hold.
+    /// Returns the largest number of points that a tile of `layers` layers can hold.
     pub(super) fn most_points(&self, layers: usize) -> usize {
         let side = self.tile + 2 * self.halos.last().copied().unwrap_or(0);
         side * side * layers
     }
 }
 
-/// Working memory of one tile at a time.
+/// The working memory of one tile at a time.
 pub(super) struct TileScratch {
-    /// Real and imaginary part, rows of `stride`.
+    /// Real and imaginary parts, in rows of `stride`.
     field: [Aligned; 2],
     /// A row of a strip before it is filtered.
     line: [Aligned; 2],
-    /// Each row's last columns of the strip before, as they were.
+    /// The unfiltered last columns of the previous strip in each row.
     kept: [Vec<f32>; 2],
     /// The last rows filtered along x.
     ring: [Aligned; 2],
-    /// Where the taps' values lie, along x and along y.
+    /// The positions of the taps' values along x and along y.
     places: [Vec<[usize; 2]>; 2],
-    /// Where each plane's points start, and the end.
+    /// The start of each plane's points, and the end.
     starts: Vec<u32>,
     found: Vec<(u16, Points)>,
     points: Vec<Points>,
-    /// What neighbouring points carry to their plane, and two zeros on each side.
+    /// The light that neighbouring points carry to their plane, with two zeros on each side.
     light: Vec<f32>,
-    /// Of each plane, the span of its points in each row.
+    /// The span of each plane's points in each row.
     point_spans: Vec<Span>,
-    /// Where there can be light in each row of the field.
+    /// The span of possible light in each row of the field.
     lit: Vec<Span>,
     wider: Vec<Span>,
 }
 
-/// Values that start at a cache line, which kernels are faster on.
+/// Values that start at a cache line, which makes the kernels faster.
 struct Aligned(Vec<f32>);
 
 impl Aligned {
@@ -177,9 +178,9 @@ impl TileScratch {
 /// Neighbouring points of one plane in a row.
 #[derive(Clone, Copy, Default)]
 struct Points {
-    /// The first one's place in the field.
+    /// The position of the first point in the field.
     at: u32,
-    /// The first one's colour in the frame; the others' follow it.
+    /// The index of the first point's colour in the frame. The colours of the others follow it.
     from: u32,
     count: u16,
 }
@@ -189,13 +190,13 @@ pub(super) struct Tile<'a> {
     pub(super) layout: &'a Layout,
     pub(super) fir: Fir,
     pub(super) surfaces: Surfaces<'a>,
-    /// Where it lies in the frame.
+    /// The tile's position in the frame.
     pub(super) rows: Range<usize>,
     pub(super) columns: Range<usize>,
 }
 
 impl<'a> Tile<'a> {
-    /// Tile `index` of a frame, counted by rows.
+    /// Returns tile `index` of a frame, counted by rows.
     pub(super) fn of(layout: &'a Layout, fir: Fir, surfaces: Surfaces<'a>, index: usize) -> Self {
         let (_, across) = layout.count(surfaces.height, surfaces.width);
         let side = |i: usize, size: usize| i * layout.tile..((i + 1) * layout.tile).min(size);
@@ -208,8 +209,8 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Sorts the points that the tile needs by planes; within one, hidden layers come first, so that what is in front
-    /// is written last.
+    /// Sorts the points that the tile needs by plane. Within a plane, hidden layers come first, so that the front is
+    /// written last.
     pub(super) fn gather(&self, scratch: &mut TileScratch) {
         scratch.starts.fill(0);
         scratch.found.clear();
@@ -226,7 +227,8 @@ impl<'a> Tile<'a> {
             starts[k] += starts[k - 1];
         }
         points.resize(found.len(), Points::default());
-        // Each start runs to its plane's end, which is the next one's start; shifted back afterwards.
+        // Each start advances to its plane's end, which is the next plane's start. The starts are shifted back
+        // afterwards.
         for (plane, found) in found {
             let start = &mut starts[usize::from(*plane)];
             points[*start as usize] = *found;
@@ -236,7 +238,7 @@ impl<'a> Tile<'a> {
         starts[0] = 0;
     }
 
-    /// Finds a layer's points; 0 is the front.
+    /// Finds the points of a layer, where 0 is the front.
     fn find(&self, layer: usize, scratch: &mut TileScratch) {
         let Surfaces {
             planes,
@@ -286,8 +288,8 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Adds the points of row `y` and `columns` of the frame, as far as they are in the plane's halo; the first one's
-    /// colour is at `from`.
+    /// Adds the points of row `y` and `columns` of the frame that are within the plane's halo. The colour of the first
+    /// point is at `from`.
     fn add(&self, plane: u16, y: usize, columns: Range<usize>, from: usize, scratch: &mut TileScratch) {
         let &Layout { border, stride, .. } = self.layout;
         let k = usize::from(plane);
@@ -313,7 +315,7 @@ impl<'a> Tile<'a> {
         *span = join(*span, [x, x + end - start]);
     }
 
-    /// Sweeps one colour over the gathered points; [`Tile::store`] takes the result.
+    /// Sweeps one colour over the gathered points. [`Tile::store`] reads the result.
     pub(super) fn sweep(&self, colour: usize, filters: &Filters, scratch: &mut TileScratch) {
         for part in &mut scratch.field {
             part.values().fill(0.0);
@@ -332,13 +334,13 @@ impl<'a> Tile<'a> {
             self.scatter(colour, at, filters.carry, scratch);
         }
         at = self.cross(at, at - filters.before_end(at), filters, scratch);
-        // All of the tile: what is not lit must be filled as well.
+        // The whole tile, because unlit pixels must also be written.
         let end = self.layout.border..self.layout.border + self.rows.len();
         scratch.lit[end].fill([0, usize::MAX]);
         self.filter(filters.end(at), 0, scratch);
     }
 
-    /// From plane `at` to plane `to`, through empty space.
+    /// Propagates from plane `at` to plane `to` through empty space.
     fn cross(&self, mut at: usize, to: usize, filters: &Filters, scratch: &mut TileScratch) -> usize {
         while at > to {
             let (taps, steps) = filters.part(at - to);
@@ -349,8 +351,8 @@ impl<'a> Tile<'a> {
         at
     }
 
-    /// Plane `k`'s points replace the field where they are (Eq. 3 and 4): they shine with phase 0 and block what comes
-    /// from behind. Then the light of those that lie before or behind the plane is carried to it.
+    /// Replaces the field with the points of plane `k` where they are (Eq. 3 and 4): they emit light with phase 0 and
+    /// block the light from behind. Then carries the light of points before or behind the plane to it.
     fn scatter(&self, colour: usize, k: usize, carry: f32, scratch: &mut TileScratch) {
         let size = self.surfaces.planes.len();
         let rgb = &self.surfaces.rgb[colour * size..][..size];
@@ -398,8 +400,9 @@ impl<'a> Tile<'a> {
 
     /// Filters the field in place where it is lit, in the tile and `halo` around it.
     ///
-    /// Columns are taken in strips so narrow that the rows in use stay in the nearest cache. In a strip, a row is
-    /// filtered along x into the ring, and as soon as its neighbours below are there too, along y back into the field.
+    /// Columns are processed in strips, narrow enough that the rows in use stay in the nearest cache. Within a strip,
+    /// each row is filtered along x into the ring. Once the neighbours below are there too, it is filtered along y back
+    /// into the field.
     fn filter(&self, taps: &[[f32; 2]], halo: usize, scratch: &mut TileScratch) {
         let border = self.layout.border;
         let radius = taps.len() - 1;
@@ -408,14 +411,14 @@ impl<'a> Tile<'a> {
         let mut columns = NOWHERE;
         for (y, span) in scratch.lit.iter_mut().enumerate() {
             let [from, to] = [span[0].max(left), span[1].min(right)];
-            // To whole lines: they are as fast as parts of them.
+            // Rounding to whole lines is free because they are as fast as partial ones.
             *span = match rows.contains(&y) && from < to {
                 true => [from / RUN * RUN, to.next_multiple_of(RUN)],
                 false => NOWHERE,
             };
             columns = join(columns, *span);
         }
-        // What is filtered along x serves the rows around it.
+        // Rows filtered along x are also needed by the rows around them.
         widen_down(&scratch.lit, &mut scratch.wider, radius);
         let step = strip(radius);
         for start in (columns[0]..columns[1]).step_by(step) {
@@ -462,7 +465,7 @@ impl<'a> Tile<'a> {
                         *place = [centre - j, centre + j];
                     }
                 };
-                // The columns before the strip that are in view.
+                // The number of columns before the strip that the filter reads.
                 let overwritten = (start + radius).saturating_sub(from);
                 if strip.first || overwritten == 0 {
                     centre(along, at + from);
@@ -484,13 +487,13 @@ impl<'a> Tile<'a> {
                     kept[row * radius..][..radius].copy_from_slice(&field[at + end - radius..at + end]);
                 }
             }
-            // Row r needs rows up to r + radius, which is the one that has just come.
+            // Row r needs rows up to r + radius, which is the latest one.
             if let Some(row) = row.checked_sub(radius).filter(|row| *row >= rows.start) {
                 let [from, to] = cut(lit[row]);
                 if from < to {
                     let place = |slot: usize| slot * pitch + from - start;
                     let wrapped = |i: usize| if i < slots { i } else { i - slots };
-                    // The centre came `radius` rows ago.
+                    // The centre was filtered `radius` rows ago.
                     let centre = wrapped(slot + slots - radius);
                     for (j, places) in down.iter_mut().enumerate() {
                         *places = [centre + slots - j, centre + j].map(|i| place(wrapped(i)));
@@ -520,22 +523,22 @@ impl<'a> Tile<'a> {
     }
 }
 
-/// Columns of the field that are filtered together. What the strip before has overwritten is kept for those that are
-/// not the first.
+/// Columns of the field that are filtered together. After the first strip, the columns that the previous strip has
+/// overwritten are kept for it.
 struct Strip {
     columns: Range<usize>,
     first: bool,
     last: bool,
 }
 
-/// Columns of a strip: as many as let the rows of a filter's ring stay in the nearest cache, but no fewer than the
-/// filter looks back.
+/// Returns the number of columns of a strip. It lets the rows of a filter's ring stay in the nearest cache, but is at
+/// least the filter's radius.
 fn strip(radius: usize) -> usize {
     const RING: usize = 3072;
     (RING / (2 * radius + 1)).max(radius).max(2 * RUN).next_multiple_of(RUN)
 }
 
-/// Spans `by` pixels wider in all directions; `wider` is memory.
+/// Widens spans by `by` pixels in all directions. `wider` is working memory.
 fn widen(spans: &mut Vec<Span>, wider: &mut Vec<Span>, by: usize) {
     widen_down(spans, wider, by);
     for span in wider.iter_mut().filter(|span| span[0] < span[1]) {
@@ -544,7 +547,7 @@ fn widen(spans: &mut Vec<Span>, wider: &mut Vec<Span>, by: usize) {
     std::mem::swap(spans, wider);
 }
 
-/// Each row's span joined with those of the rows up to `by` above and below, into `wider`.
+/// Joins each row's span with those of the rows up to `by` above and below, into `wider`.
 fn widen_down(spans: &[Span], wider: &mut [Span], by: usize) {
     wider.fill(NOWHERE);
     for (y, span) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {

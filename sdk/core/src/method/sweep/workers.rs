@@ -1,4 +1,4 @@
-//! Working memory for each thread of a pool, made beforehand.
+//! Preallocated working memory for each thread of a pool.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 pub(super) struct Workers<T>(Vec<Mutex<T>>);
 
 impl<T> Workers<T> {
-    /// For the current pool.
+    /// Creates working memory for the current pool.
     pub(super) fn new(make: impl Fn() -> T) -> Self {
         Workers(
             (0..rayon::current_num_threads().max(1))
@@ -15,7 +15,7 @@ impl<T> Workers<T> {
         )
     }
 
-    /// Lends this thread its piece. A thread of a larger pool than the one planned for waits for another's.
+    /// Lends this thread its piece. If the pool is larger than planned, a thread may have to wait for another's piece.
     pub(super) fn with(&self, run: impl FnOnce(&mut T)) {
         let own = rayon::current_thread_index().unwrap_or(0) % self.0.len();
         run(&mut self.0[own].lock().unwrap_or_else(PoisonError::into_inner));

@@ -1,7 +1,7 @@
-//! A filter in three sweeps through memory: rows there, columns there and back, rows back.
+//! Filtering in three sweeps through memory: rows forward, columns forward and inverse, rows inverse.
 //!
-//! Between the sweeps the spectrum of rows lies in tiles, column by column, so that all of them read and write memory
-//! in long runs.
+//! Between the sweeps, the row spectra lie in tiles, column by column, so that all sweeps read and write memory in long
+//! runs.
 
 use super::{Fft2, parts};
 use num_complex::Complex32;
@@ -12,13 +12,13 @@ use rayon::prelude::*;
 pub struct ConvolveScratch {
     /// The tiles of the row spectra.
     tiles: Vec<Complex32>,
-    /// A row of tiles, or a column of them, and the 1D transforms' own, for each part of a pass.
+    /// For each part of a pass, a row or a column of tiles and the scratch of the 1D transforms.
     work: Vec<Complex32>,
     piece: usize,
 }
 
 impl Fft2 {
-    /// Working memory of [`Self::convolve`], for the current thread pool.
+    /// Allocates working memory of [`Self::convolve`], sized for the current thread pool.
     pub fn convolve_scratch(&self) -> ConvolveScratch {
         let zero = Complex32::new(0.0, 0.0);
         let (rows, columns) = self.tiles();
@@ -30,13 +30,13 @@ impl Fft2 {
         }
     }
 
-    /// Rows and columns of tiles that the frame's rows of the padded plane take.
+    /// Returns the number of rows and columns of tiles for the frame's rows of the padded plane.
     fn tiles(&self) -> (usize, usize) {
         (self.height.div_ceil(TILE), self.padded_width.div_ceil(TILE))
     }
 
-    /// Replaces `plane`, (H, W), by itself filtered: padded with zeros, transformed, each column of
-    /// the spectrum handed to `filter` with its index 0..W', transformed back, cropped.
+    /// Filters `plane`, (H, W), in place. It is padded with zeros and transformed, each column of the spectrum is
+    /// passed to `filter` with its index 0..W', and the result is transformed back and cropped.
     pub fn convolve<F>(&self, plane: &mut [Complex32], filter: F, scratch: &mut ConvolveScratch)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
@@ -47,7 +47,7 @@ impl Fft2 {
         self.tiles_to_rows(plane, scratch);
     }
 
-    /// Pads each row of `plane` and transforms it; rows of tiles are the parts.
+    /// Pads each row of `plane` and transforms it. Each part consists of rows of tiles.
     fn rows_to_tiles(&self, plane: &[Complex32], scratch: &mut ConvolveScratch) {
         let (width, padded_width) = (self.width, self.padded_width);
         let shape = self.tiles();
@@ -73,8 +73,8 @@ impl Fft2 {
         });
     }
 
-    /// Transforms each column of the tiles, padded, hands it to `filter` and transforms it back; columns of tiles are
-    /// the parts.
+    /// Pads each column of the tiles, transforms it, passes it to `filter`, and transforms it back. Each part consists
+    /// of columns of tiles.
     fn filter_tiles<F>(&self, filter: F, scratch: &mut ConvolveScratch)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
@@ -117,7 +117,7 @@ impl Fft2 {
             });
     }
 
-    /// Transforms each row of the tiles back and crops it into `plane`; rows of tiles are the parts.
+    /// Transforms each row of the tiles back and crops it into `plane`. Each part consists of rows of tiles.
     fn tiles_to_rows(&self, plane: &mut [Complex32], scratch: &mut ConvolveScratch) {
         let (width, padded_width) = (self.width, self.padded_width);
         let ConvolveScratch { tiles, work, piece } = scratch;
@@ -148,7 +148,7 @@ impl Fft2 {
     }
 }
 
-/// Copies the first values of `from`: a whole run of a tile without a call.
+/// Copies the first values of `from`. A whole run of a tile is copied without a call.
 #[inline(always)]
 fn copy_run(from: &[Complex32], to: &mut [Complex32]) {
     match (from.first_chunk::<TILE>(), to.first_chunk_mut::<TILE>()) {
@@ -157,8 +157,8 @@ fn copy_run(from: &[Complex32], to: &mut [Complex32]) {
     }
 }
 
-/// Fills a tile with columns `first..` of rows of `stride` values, transposed; where the rows end early, what is left
-/// of the tile means nothing.
+/// Fills a tile with the columns from `first` on of rows of `stride` values, transposed. If the rows end early, the
+/// rest of the tile is undefined.
 #[inline(always)]
 fn turn(rows: &[Complex32], stride: usize, first: usize, tile: &mut [Complex32]) {
     let count = TILE.min(stride - first);

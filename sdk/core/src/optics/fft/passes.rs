@@ -1,23 +1,23 @@
-//! The passes one by one: rows, their transposition block by block into columns, columns, and the same way back.
+//! The separate passes of a transform: rows, their blockwise transposition into columns, columns, and the inverse.
 
 use super::{Fft2, parts};
 use num_complex::Complex32;
 use rayon::prelude::*;
 
-/// Columns gathered at a time: one cache line of complex numbers.
+/// The number of columns gathered at a time: one cache line of complex numbers.
 const BLOCK: usize = 8;
 
 /// The working memory of an [`Fft2`] for one call at a time.
 pub struct Scratch {
-    /// (H, W'): the rows.
+    /// The rows, (H, W').
     pub rows: Vec<Complex32>,
-    /// (W', H'): the columns, each contiguous.
+    /// The columns, (W', H'), each contiguous.
     pub columns: Vec<Complex32>,
-    /// The 1D transforms' own.
+    /// The scratch of the 1D transforms.
     pub work: Work,
 }
 
-/// What the 1D transforms work in: one piece for each part of a pass.
+/// The scratch of the 1D transforms: one piece for each part of a pass.
 pub struct Work {
     buffer: Vec<Complex32>,
     piece: usize,
@@ -25,7 +25,7 @@ pub struct Work {
 }
 
 impl Fft2 {
-    /// Working memory for the current thread pool.
+    /// Allocates working memory, sized for the current thread pool.
     pub fn scratch(&self) -> Scratch {
         let zero = Complex32::new(0.0, 0.0);
         Scratch {
@@ -35,7 +35,7 @@ impl Fft2 {
         }
     }
 
-    /// Memory for the 1D transforms alone, for the current thread pool.
+    /// Allocates only the scratch of the 1D transforms, sized for the current thread pool.
     pub fn work(&self) -> Work {
         let (piece, parts) = (self.work_values(), parts());
         Work {
@@ -45,7 +45,7 @@ impl Fft2 {
         }
     }
 
-    /// The frame's part of `rows`, (H, W'), into `plane`, (H, W).
+    /// Copies the frame's part of `rows`, (H, W'), to `plane`, (H, W).
     pub fn crop(&self, rows: &[Complex32], plane: &mut [Complex32]) {
         let width = self.width;
         plane
@@ -71,8 +71,8 @@ impl Fft2 {
             });
     }
 
-    /// From transformed `rows`, (H, W'), to filtered `columns`, (W', H'): each is gathered, padded,
-    /// transformed, handed to `filter`, and transformed back.
+    /// Filters transformed `rows`, (H, W'), into `columns`, (W', H'). Each column is gathered, padded, transformed,
+    /// passed to `filter`, and transformed back.
     pub fn columns<F>(&self, rows: &[Complex32], columns: &mut [Complex32], filter: F, work: &mut Work)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
@@ -89,8 +89,8 @@ impl Fft2 {
         );
     }
 
-    /// From transformed `rows`, (H, W'), to the spectrum's `columns`, (W', H'), each handed to `then`
-    /// with its index and the transform's scratch.
+    /// Transforms `rows`, (H, W'), which are already transformed along x, into the spectrum's `columns`, (W', H'). Each
+    /// column is passed to `then` with its index and the transform's scratch.
     pub fn spectrum<F>(&self, rows: &[Complex32], columns: &mut [Complex32], then: F, work: &mut Work)
     where
         F: Fn(usize, &mut [Complex32], &mut [Complex32]) + Sync,
@@ -115,7 +115,7 @@ impl Fft2 {
             });
     }
 
-    /// Hands each of the spectrum's `columns`, (W', H'), to `filter` and transforms it back.
+    /// Passes each of the spectrum's `columns`, (W', H'), to `filter` and transforms it back.
     pub fn columns_inverse<F>(&self, columns: &mut [Complex32], filter: F, work: &mut Work)
     where
         F: Fn(usize, &mut [Complex32]) + Sync,
@@ -135,8 +135,8 @@ impl Fft2 {
             });
     }
 
-    /// From `columns`, (W', H'), back to `rows`, (H, W'), each transformed back; the first W values of a row
-    /// are the frame's.
+    /// Transforms `columns`, (W', H'), back along x into `rows`, (H, W'). The first W values of a row belong to the
+    /// frame.
     pub fn rows_inverse(&self, columns: &[Complex32], rows: &mut [Complex32], work: &mut Work) {
         let inverse = &self.row[1];
         self.rows_from(columns, rows, work, |_, row, work| {
@@ -144,9 +144,9 @@ impl Fft2 {
         });
     }
 
-    /// [`Self::rows_inverse`], `change` and [`Self::rows_forward`] in one sweep: for a periodic plane whose
-    /// field is changed in space between two filters. Rows that `touched` says no to stay in the
-    /// frequency domain, which saves both their transforms.
+    /// Combines [`Self::rows_inverse`], `change` and [`Self::rows_forward`] in one sweep, for a periodic plane whose
+    /// field is changed in space between two filters. Rows for which `touched` returns false stay in the frequency
+    /// domain, which saves both transforms.
     pub fn rows_there_and_back<T, F>(
         &self,
         columns: &[Complex32],
@@ -166,14 +166,14 @@ impl Fft2 {
                 change(y, row);
                 forward.process_with_scratch(row, work);
             } else {
-                // There and back, unnormalized, is a factor of the length.
+                // The forward and inverse transforms, both unnormalized, multiply by the length.
                 row.iter_mut().for_each(|value| *value *= scale);
             }
         });
     }
 
-    /// Gathers `rows`, (H, W'), from `columns`, (W', H'), and hands each to `then` with its index and the
-    /// transform's scratch.
+    /// Gathers `rows`, (H, W'), from `columns`, (W', H'), and passes each to `then` with its index and the transform's
+    /// scratch.
     fn rows_from<F>(&self, columns: &[Complex32], rows: &mut [Complex32], work: &mut Work, then: F)
     where
         F: Fn(usize, &mut [Complex32], &mut [Complex32]) + Sync,
@@ -195,8 +195,8 @@ impl Fft2 {
     }
 }
 
-/// Transposes a strip: `to[i][j] = from[j][first + i]` for j < `count`, rows of `to_stride` and
-/// `from_stride` values.
+/// Transposes a strip: `to[i][j] = from[j][first + i]` for j < `count`, with rows of `to_stride` and `from_stride`
+/// values.
 fn gather(from: &[Complex32], from_stride: usize, first: usize, to: &mut [Complex32], to_stride: usize, count: usize) {
     let lanes = to.len() / to_stride;
     if lanes == BLOCK {

@@ -1,16 +1,16 @@
-//! Lengths that transform fast.
+//! Fast transform lengths.
 
-/// A length of at least `n` that transforms fast: of all 2^a·3^b·5^c·7^d the one that costs the least. Powers of two
-/// are so much faster than others that a few more values are worth it.
+/// Returns the length 2^a·3^b·5^c·7^d of at least `n` with the lowest transform cost. Powers of two are so much faster
+/// than other lengths that they are worth some extra values.
 pub fn fast_size(n: usize) -> usize {
-    // What rustfft takes for a value and a prime factor, measured, in units of a factor 2; the constant is what the
-    // rest of a pass takes.
+    // Measured costs of rustfft for a value and a prime factor, in units of a factor 2. The constant is the cost of the
+    // rest of a pass.
     const THREE: f64 = 2.2;
     const FIVE: f64 = 4.6;
     const SEVEN: f64 = 4.8;
     const PASS: f64 = 20.0;
     let limit = n.next_power_of_two();
-    // The powers of `factor` with what they cost.
+    // Lists the powers of `factor` with their costs.
     let powers = |factor: usize, cost: f64| {
         let powers = (0..).map(move |k| (factor.pow(k), cost * f64::from(k)));
         powers.take_while(move |(power, _)| *power <= limit)
