@@ -5,11 +5,11 @@ use std::error::Error;
 use std::fs::File;
 use std::path::Path;
 
-/// Writes the levels of `hologram` as a PNG. Its text chunk `phasefront` says what the levels are for: the display, the
-/// encoding (`anti-alias` is the default of a session) and the amplitude that full light stands for.
+/// Writes the levels of `hologram` as a PNG. Its text chunk `phasefront` describes the levels: the display, the
+/// encoding (`anti-alias` is a session's default) and the amplitude that full light represents.
 pub(crate) fn save(hologram: &Hologram, path: &Path) -> Result<(), Box<dyn Error>> {
     let (height, width) = hologram.shape();
-    // Levels come colour by colour, (C, H, W); the pixels of a PNG hold their colours side by side.
+    // The levels are planar, (C, H, W); the pixels of a PNG interleave the colours.
     let planes = hologram.levels().chunks_exact(height * width).collect::<Vec<_>>();
     let pixels = (0..height * width).flat_map(|i| planes.iter().map(move |plane| plane[i]));
     let about = serde_json::json!({

@@ -1,4 +1,4 @@
-"""Makes holograms of a camera's frames while it runs. A picture that moves stands for the camera:
+"""Makes holograms of a camera's frames while it runs. A moving picture simulates the camera:
 
     pip install phasefront pillow
     python examples/live.py samples/scene_rgb.jpg samples/scene_depth.png last.png
@@ -22,17 +22,17 @@ def main(rgb_file: str, depth_file: str, last_file: str) -> None:
     rgb = numpy.asarray(Image.open(rgb_file).convert("RGB").resize(SIZE))
     depth = numpy.asarray(Image.open(depth_file).resize(SIZE, Image.Resampling.NEAREST)).astype(numpy.uint16)
 
-    # The session makes holograms on a thread of its own and tells its listener what became of each frame. The listener
-    # hands events on, because no frame is processed while it is busy.
+    # The session makes holograms on its own thread and reports the outcome of each frame to its listener. The listener
+    # only forwards events, because no frame is processed while it is busy.
     events: queue.SimpleQueue[phasefront.Event] = queue.SimpleQueue()
     display = phasefront.Display(width=WIDTH, height=HEIGHT)
     options = phasefront.session_options(target=display, target_rate_hz=float(RATE_HZ))
     with Session(options, RunningMode.LIVE, events.put) as session:
         session.warm_up()
         for i in range(2 * RATE_HZ):
-            # The next picture of the camera: all rows move to the left.
+            # The camera's next picture: all rows move to the left.
             moved = numpy.roll(rgb, -4 * i, axis=1), numpy.roll(depth, -4 * i, axis=1)
-            # This copies the frame and returns at once. Where the session is behind, it drops the older of two frames.
+            # The session copies the frame and returns at once. If it falls behind, it drops the older of two frames.
             session.submit(Frame(*moved, depth_format=DepthFormat.NORMALIZED_U16, timestamp_ns=i * 10**9 // RATE_HZ))
             time.sleep(1 / RATE_HZ)
             while not events.empty():

@@ -1,4 +1,4 @@
-//! Makes holograms of a camera's frames while it runs. A picture that moves stands for the camera:
+//! Makes holograms of a camera's frames while it runs. A moving picture simulates the camera:
 //!
 //! ```sh
 //! cargo run --release --bin live -- samples/scene_rgb.jpg samples/scene_depth.png last.png
@@ -28,8 +28,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         |path| Ok::<_, image::ImageError>(image::open(path)?.resize_exact(WIDTH as u32, HEIGHT as u32, Nearest));
     let (mut rgb, mut depth) = (small(rgb)?.into_rgb8(), small(depth)?.into_luma8());
 
-    // The session makes holograms on a thread of its own and tells its listener what became of each frame. The listener
-    // hands holograms on, because no frame is processed while it is busy.
+    // The session makes holograms on its own thread and reports the outcome of each frame to its listener. The listener
+    // only forwards holograms, because no frame is processed while it is busy.
     let (sender, holograms) = mpsc::channel();
     let display = Display::default().with_size(HEIGHT, WIDTH)?;
     let mut options = phasefront_models::session_options(display);
@@ -41,12 +41,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     session.warm_up()?;
 
     for frame in 0..2 * RATE_HZ {
-        // The next picture of the camera: all rows move to the left.
+        // The camera's next picture: all rows move to the left.
         rgb.chunks_exact_mut(3 * WIDTH).for_each(|row| row.rotate_left(3 * 4));
         depth.chunks_exact_mut(WIDTH).for_each(|row| row.rotate_left(4));
         let colour = ColourImage::new(ColourFormat::Rgb, WIDTH, HEIGHT, &[Plane::new(&rgb, 3 * WIDTH, 3)])?;
         let depth = DepthImage::new(DepthFormat::NormalizedU8, WIDTH, HEIGHT, Plane::new(&depth, WIDTH, 1))?;
-        // This copies the frame and returns at once. Where the session is behind, it drops the older of two frames.
+        // This copies the frame and returns at once. If the session cannot keep up, it drops the older of two frames.
         session.submit(&CameraFrame::new(frame * 1_000_000_000 / RATE_HZ, colour, depth))?;
         std::thread::sleep(Duration::from_millis(1000 / RATE_HZ));
         for hologram in holograms.try_iter() {

@@ -18,18 +18,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("three files are needed: still RGB DEPTH HOLOGRAM.png".into());
     };
 
-    // A picture, and how far each of its points is: 0 the nearest, 255 the farthest.
+    // A picture and the depth of each of its points: 0 is nearest, 255 farthest.
     let rgb = image::open(rgb)?.into_rgb8();
     let depth = image::open(depth)?.into_luma8();
     let size = |(width, height): (u32, u32)| (width as usize, height as usize);
     let ((width, height), (depth_width, depth_height)) = (size(rgb.dimensions()), size(depth.dimensions()));
 
-    // A session plans its work once and then makes as many holograms as it gets frames. The display says what they are
-    // for: here the paper's, 8 µm pixels and three lasers, with as many pixels as the picture.
+    // A session plans its work once and then makes holograms of any number of frames. The display is the target: here
+    // the paper's, with 8 µm pixels and three lasers, and as many pixels as the picture.
     let display = Display::default().with_size(height, width)?;
     let session = ImageSession::new(phasefront_models::session_options(display))?;
 
-    // A frame refers to the images' bytes: so many from one row to the next, and from one pixel to the next.
+    // A frame borrows the images' bytes. A plane takes the number of bytes from one row to the next and from one pixel
+    // to the next.
     let colour = Plane::new(&rgb, 3 * width, 3);
     let colour = ColourImage::new(ColourFormat::Rgb, width, height, &[colour])?;
     let depth = Plane::new(&depth, depth_width, 1);

@@ -1,6 +1,7 @@
-//! Frames of every format through the bindings, some right, most wrong in one place or many: each becomes a hologram or
-//! is refused in one line. `PHASEFRONT_FRAMES=1000000 cargo test --release --workspace --test any_frame` is the long
-//! run.
+//! Passes frames of every format through the bindings, some valid, most invalid in one or more places. Each becomes a
+//! hologram or is refused with a one-line error.
+//!
+//! `PHASEFRONT_FRAMES=1000000 cargo test --release --workspace --test any_frame` is the long run.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
@@ -23,7 +24,7 @@ impl Random {
         self.0.random_bool(share)
     }
 
-    /// `right`, or at times near it, or anything.
+    /// Returns `right`, or occasionally a nearby or arbitrary number.
     fn number(&mut self, right: u32) -> u32 {
         match self.0.random_range(0..60) {
             0 => self.0.random(),
@@ -57,7 +58,7 @@ impl Random {
         }
     }
 
-    /// As many bytes as `plane` needs for `height` rows, and no more than a frame of a test.
+    /// Returns about as many bytes as `plane` needs for `height` rows, at most the size of a test frame.
     fn memory(&mut self, plane: &PlaneInfo, height: u32) -> Vec<u8> {
         let needed = u64::from(plane.row_stride) * u64::from(height);
         let length = match self.0.random_range(0..20) {
@@ -72,7 +73,7 @@ impl Random {
     }
 }
 
-/// Two cameras a centimetre apart, at times.
+/// Returns two cameras a centimetre apart, or sometimes none.
 fn cameras(random: &mut Random) -> Option<Cameras> {
     let camera = |random: &mut Random| Intrinsics {
         fx: random.float(20.0),
@@ -90,7 +91,7 @@ fn cameras(random: &mut Random) -> Option<Cameras> {
     })
 }
 
-/// A frame, and the memory of its three planes, its depth and its confidence.
+/// Returns a frame and the memory of its three planes, its depth and its confidence.
 fn frame(random: &mut Random, timestamp_ns: u64) -> (FrameInfo, [Vec<u8>; 5]) {
     use ColourFormat::{Bgra, Nv12, Rgb, Rgba, Yuv420};
     let format = random.of(&[Rgba, Bgra, Rgb, Nv12, Yuv420]);
@@ -127,7 +128,7 @@ fn frame(random: &mut Random, timestamp_ns: u64) -> (FrameInfo, [Vec<u8>; 5]) {
         DepthFormat::NormalizedU8 => 1,
         _ => 2,
     };
-    // As the colour, or half of it where that is whole.
+    // The size is that of the colour, or half of it if that is an integer.
     let size = random.of(&[(width, height), (width, height), half]);
     let plane = random.plane(size.0, pixel);
     memory[3] = random.memory(&plane, size.1);

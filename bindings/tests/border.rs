@@ -1,14 +1,15 @@
-//! No panic leaves a call: each that the other languages see is inside `guard`, or gives a field.
+//! Checks that no panic escapes to the other languages: each exported function runs inside `guard` or only returns a
+//! field.
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
 
-/// The exported functions of a file, each from its name to its end.
+/// Returns the exported functions of a file, each from its name to its end.
 fn exported(source: &str) -> Vec<&str> {
     let mut found = Vec::new();
     let exports = source.match_indices("#[uniffi::export").peekable();
     for (at, _) in exports {
-        // To the end of what is exported, a function or an `impl`, which stands at the margin.
+        // The block ends with the exported function or `impl`, whose closing brace is not indented.
         let block = &source[at..][..source[at..].find("\n}\n").unwrap()];
         if block.contains("pub trait ") {
             continue;

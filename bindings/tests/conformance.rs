@@ -1,8 +1,8 @@
-//! The conformance suite, run from Rust: frames in every format, and the levels that they must become. Swift, Kotlin
-//! and Python run the same from `tests/conformance/`; the bits of all four must be equal.
+//! Runs the conformance suite from Rust: frames in every format and their expected levels. Swift, Kotlin and Python run
+//! the same suite from `tests/conformance/`; the bits of all four must be equal.
 //!
-//! `PHASEFRONT_BLESS=1` writes the suite anew. Where `PHASEFRONT_CONFORMANCE` names a folder, the levels are left in
-//! its `levels.bin`, and views of the holograms in its `seen.bin`, for the other languages to compare with.
+//! `PHASEFRONT_BLESS=1` rewrites the suite. If `PHASEFRONT_CONFORMANCE` names a folder, the levels are written to its
+//! `levels.bin` and views of the holograms to its `seen.bin`, for the other languages to compare with.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
@@ -18,31 +18,31 @@ fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../tests/conformance")
 }
 
-/// The levels that `hologram` holds, read as the other languages read them.
+/// Returns the levels of `hologram`, read as the other languages read them.
 fn levels(hologram: &RawHologram) -> Vec<u8> {
     let len = hologram.plane_len().unwrap() as usize;
     (0..hologram.info().unwrap().colours)
         .flat_map(|colour| {
             let address = hologram.plane_address(colour).unwrap() as usize;
-            // SAFETY: the hologram is alive, and its plane of `len` bytes lies there.
+            // SAFETY: the hologram is alive, and `address` points to its plane of `len` bytes.
             #[allow(unsafe_code)]
             unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
         })
         .collect()
 }
 
-/// The bytes of all numbers of `planes`, read as the other languages read them.
+/// Returns the bytes of all numbers of `planes`, read as the other languages read them.
 fn numbers(planes: &RawPlanes) -> Vec<u8> {
     let sides = [planes.pixel_bytes(), planes.width(), planes.height(), planes.colours()];
     let len = sides.map(|side| side.unwrap() as usize).iter().product();
     let address = planes.plane_address(0).unwrap() as usize;
     assert!(planes.plane_address(planes.colours().unwrap()).is_err());
-    // SAFETY: the planes are alive, and lie there one after another.
+    // SAFETY: the planes are alive and contiguous at `address`.
     #[allow(unsafe_code)]
     unsafe { std::slice::from_raw_parts(address as *const u8, len) }.to_vec()
 }
 
-/// A network of `models/`.
+/// Loads a network of `models/`.
 fn model(name: &str) -> Arc<Network> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../models").join(name);
     Network::from_file(path.to_str().unwrap().into()).unwrap()
@@ -59,7 +59,7 @@ fn plane(value: &Value) -> PlaneInfo {
     }
 }
 
-/// The bytes of a plane in `frames.bin`.
+/// Returns the bytes of a plane in `frames.bin`.
 fn bytes<'a>(frames: &'a [u8], plane: &Value) -> &'a [u8] {
     match plane {
         Value::Null => &[],
@@ -177,11 +177,11 @@ fn info(frame: &Value) -> FrameInfo {
     }
 }
 
-/// What a case's frames become, one after another.
+/// The results of a case's frames, one after another.
 #[derive(Default)]
 struct CaseResult {
     levels: Vec<u8>,
-    /// Of each the amplitudes at 1.5 mm and the field at -1 mm.
+    /// The amplitudes at 1.5 mm and the field at -1 mm of each frame.
     seen: Vec<u8>,
 }
 
@@ -212,7 +212,7 @@ fn run(case: &Value, frames: &[u8]) -> CaseResult {
     all
 }
 
-/// How many levels differ, and the most that one differs by around the circle of `levels` of them.
+/// Returns the number of levels that differ, and the largest difference around the circle of `levels` levels.
 fn difference(a: &[u8], b: &[u8], levels: i32) -> (usize, i32) {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).fold((0, 0), |(count, most), (a, b)| {
@@ -235,8 +235,8 @@ fn frames_become_the_levels_that_are_expected() {
     for case in suite["cases"].as_array().unwrap() {
         let CaseResult { levels: got, seen } = run(case, &frames);
         let want = &expected[all.levels.len()..][..got.len()];
-        // Another processor rounds otherwise in the last bit, which turns a level here and there. A calibrated
-        // modulator's levels are in no order, so a turned one may be any other.
+        // Another processor may round the last bit differently, which changes a few levels. The levels of a calibrated
+        // modulator are not ordered, so a changed one may be any other.
         let (count, most) = difference(&got, want, int(&case["levels"]) as i32);
         let name = &case["name"];
         assert!(
@@ -259,13 +259,13 @@ fn frames_become_the_levels_that_are_expected() {
     }
 }
 
-/// Makes the suite: a picture and its depth, as each format holds them.
+/// Writes the suite: a picture and its depth in each format.
 mod write {
     use super::*;
 
     const DISPLAY: (usize, usize) = (48, 36);
 
-    /// Colour and metres at (x, y) of a picture whose sides are 0..1, at the time t: a ball before a striped wall.
+    /// Returns colour and metres at (x, y) of a picture with sides 0..1 at time t: a ball in front of a striped wall.
     fn scene(x: f64, y: f64, t: f64) -> ([f64; 3], f64) {
         let (dx, dy) = (x - 0.45 - 0.1 * t, (y - 0.5) * 0.75);
         let r = (dx * dx + dy * dy).sqrt() / 0.22;
@@ -292,12 +292,12 @@ mod write {
         (value.clamp(0.0, 1.0) * 255.0).round() as u8
     }
 
-    /// The whole suite's memory.
+    /// The memory of the whole suite.
     #[derive(Default)]
     struct Frames(Vec<u8>);
 
     impl Frames {
-        /// A plane whose rows and pixels have gaps, filled with what must not be read.
+        /// Writes a plane with gaps after rows and pixels, filled with bytes that must not be read.
         fn plane(
             &mut self,
             width: usize,
@@ -427,7 +427,7 @@ mod write {
         }
     }
 
-    /// The 16-bit float nearest below a value that is 0 or in 2^-14..2^15.
+    /// Returns the largest 16-bit float that is not above `value`, which is 0 or in 2^-14..2^15.
     fn f16_bits(value: f64) -> u16 {
         if value == 0.0 {
             return 0;
@@ -436,8 +436,7 @@ mod write {
         ((exponent as i32 + 15) as u16) << 10 | ((value / exponent.exp2() - 1.0) * 1024.0) as u16
     }
 
-    /// A display whose pixels turn the phase otherwise than they are told, lit unevenly, through a lens that is not
-    /// round.
+    /// Returns a calibration of a display with a nonlinear phase response, uneven illumination and an aberrated lens.
     fn calibration(display: &str) -> Vec<u8> {
         use phasefront::target::Aberration;
         use phasefront_core::display::response::per_pixel::PerPixel;

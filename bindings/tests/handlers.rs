@@ -1,4 +1,4 @@
-//! A log handler that closes the session whose frame is being computed, on the thread that computes it.
+//! Tests a log handler that closes the session whose frame is being computed, on the thread that computes it.
 #![allow(clippy::unwrap_used)]
 
 use phasefront_ffi::{
@@ -14,7 +14,7 @@ use tracing::{Event, Metadata, Subscriber};
 const W: u32 = 32;
 const H: u32 = 24;
 
-/// Logs in the midst of a frame, as wgpu and tract do.
+/// Logs in the middle of a frame, as wgpu and tract do.
 struct Logging;
 
 impl Subscriber for Logging {
@@ -84,7 +84,7 @@ fn process(session: &RawSession) -> Result<(), PhasefrontError> {
     session.process(&rgb, &[], &[], &depth, &[], info).map(|_| ())
 }
 
-/// All in one test: there is one listener a process.
+/// This is one test, because a process has only one listener.
 #[test]
 fn a_log_handler_may_close_the_session_that_computes() {
     tracing::subscriber::set_global_default(Logging).unwrap();

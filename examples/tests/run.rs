@@ -1,5 +1,5 @@
-//! The examples run on the sample scene, and what they write says what it is. That the command reads such files is
-//! tested with the examples in Python.
+//! Runs the examples on the sample scene and checks the metadata of the files that they write. The tests of the Python
+//! examples check that the command reads these files.
 #![allow(clippy::unwrap_used)]
 
 use std::fs::File;

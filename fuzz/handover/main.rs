@@ -1,6 +1,5 @@
-//! A live session's thread, queue and locks under shuttle, which runs one thread at a time and chooses, again and again
-//! anew, which one goes on at each lock. A schedule in which all wait for each other fails, and is printed to be run
-//! again.
+//! Runs a live session's thread, queue and locks under shuttle, which runs one thread at a time and chooses at each
+//! lock which one continues. A schedule that deadlocks fails and is printed so that it can be replayed.
 #![allow(dead_code)]
 
 mod session;

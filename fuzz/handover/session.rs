@@ -1,4 +1,4 @@
-//! The session's own files, with shuttle's threads and locks, and what is done with them.
+//! The session's source files with shuttle's threads and locks, and the situations that are tested.
 
 mod sync {
     pub(super) use shuttle::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -27,7 +27,7 @@ use shuttle::sync::{Arc, Mutex};
 use shuttle::thread;
 use std::panic::resume_unwind;
 
-/// Work during which others may go on, which fails or panics at times.
+/// Work that lets other threads run and sometimes fails or panics.
 struct Fake {
     broken: bool,
 }
@@ -58,7 +58,7 @@ impl Work for Fake {
     }
 }
 
-/// Two cameras, one that resets, pauses and closes, a listener that panics at times.
+/// Runs two cameras, a thread that resets, pauses and closes, and a listener that sometimes panics.
 fn cameras_and_a_hand() {
     let told = Arc::new(AtomicU64::new(0));
     let closed = Arc::new(AtomicU64::new(0));
@@ -80,7 +80,7 @@ fn cameras_and_a_hand() {
         thread::spawn(move || {
             for _ in 0..4 {
                 let now = clock.fetch_add(1, Ordering::SeqCst);
-                // Closed or late: refused.
+                // A closed session or a late frame is refused.
                 let _ = live.submit(now, |_| now);
             }
         })
@@ -110,7 +110,7 @@ fn cameras_and_a_hand() {
     assert_eq!(closed.load(Ordering::SeqCst), known + 1, "the end is told last");
 }
 
-/// Two sessions whose listeners close each other.
+/// Runs two sessions whose listeners close each other.
 fn each_closes_the_other() {
     type Sessions = [Mutex<Option<Arc<Live<Fake>>>>; 2];
     let sessions: Arc<Sessions> = Arc::new([Mutex::new(None), Mutex::new(None)]);
@@ -133,17 +133,17 @@ fn each_closes_the_other() {
     let _ = first.submit(1, |_| 1);
     first.close();
     other.join().expect("a camera that ends");
-    // They hold each other.
+    // The sessions hold references to each other.
     sessions
         .iter()
         .for_each(|session| drop(session.lock().expect("a lock").take()));
 }
 
-/// `schedules` of each situation, half of them wholly by chance.
+/// Runs `schedules` schedules of each situation, half of them uniformly random.
 pub(crate) fn check(schedules: usize) {
     for situation in [cameras_and_a_hand, each_closes_the_other] {
         shuttle::check_random(situation, schedules / 2);
-        // Those that seldom change from one thread to the next.
+        // These schedules switch threads rarely.
         shuttle::check_pct(situation, schedules / 2, 3);
     }
 }

@@ -1,4 +1,4 @@
-//! Displays' TOML, and what is planned for a small one.
+//! Parses the TOML of displays and plans a small hologram for each.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -12,7 +12,7 @@ fuzz_target!(|text: &str| {
         }
         Ok(display) => {
             let Ok(display) = display.with_size(6, 8) else { return };
-            // Wide volumes take long to plan, and nothing else than narrow ones.
+            // Deep volumes take long to plan and exercise the same code as shallow ones.
             if display.volume_depth_m() / display.pitch_m() > 300.0 {
                 return;
             }

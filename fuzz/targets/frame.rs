@@ -1,5 +1,5 @@
-//! Frames of every format, size, stride and orientation: what becomes of them before the hologram, and one in sixteen
-//! through a session in video.
+//! Converts frames of every format, size, stride and orientation up to the hologram stage, and runs one in sixteen
+//! through a video session.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -14,7 +14,7 @@ use std::num::NonZeroUsize;
 use std::sync::OnceLock;
 use std::time::Duration;
 
-/// Numbers from the front of the input, 0 behind its end; what is left is the planes' memory.
+/// Reads numbers from the front of the input, and 0 after its end. The rest is the memory of the planes.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {
@@ -28,7 +28,7 @@ impl Numbers<'_> {
         }
     }
 
-    /// Mostly small, at times any.
+    /// Returns a size, mostly small, sometimes arbitrary.
     fn size(&mut self) -> usize {
         match self.byte() {
             255 => usize::MAX - self.byte(),
@@ -37,7 +37,7 @@ impl Numbers<'_> {
         }
     }
 
-    /// Any float, often an ordinary one.
+    /// Returns an arbitrary float, often an ordinary one.
     fn float(&mut self) -> f64 {
         match self.byte() % 4 {
             0 => f64::from_bits(
@@ -58,7 +58,7 @@ fn session() -> &'static VideoSession {
     static SESSION: OnceLock<VideoSession> = OnceLock::new();
     SESSION.get_or_init(|| {
         let display = Display::default().with_size(8, 12).expect("a display");
-        // What frames become is not looked at, so little time is spent on it.
+        // The results are not checked, so the method is cheap.
         let sweep = Sweep {
             hidden_layers: 0,
             tile: 16,
@@ -141,7 +141,7 @@ fn frame<'a>(numbers: &mut Numbers<'a>) -> Result<CameraFrame<'a>> {
     Ok(frame)
 }
 
-/// A pool of this thread alone: handing work over takes longer than the work.
+/// Sets up a pool of this thread only: handing over the work takes longer than the work itself.
 fn alone() {
     static BUILT: OnceLock<()> = OnceLock::new();
     BUILT.get_or_init(|| {
@@ -150,7 +150,7 @@ fn alone() {
     });
 }
 
-/// Amplitudes and depth of a frame, twice, the second following the first.
+/// Converts the amplitudes and depth of a frame twice, the second time as its successor.
 fn take_in(frame: &CameraFrame<'_>) -> Result<()> {
     const SHAPE: (usize, usize) = (8, 12);
     frame.check()?;

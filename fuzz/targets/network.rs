@@ -1,4 +1,4 @@
-//! ONNX files: read, planned on the kernels and run on a small frame.
+//! Reads ONNX files, plans them on the kernels and runs them on a small frame.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -21,7 +21,7 @@ fuzz_target!(|file: &[u8]| {
             let why = why.to_string();
             assert!(why.chars().count() < 700 && !why.contains(char::is_control), "{why}");
         }
-        // Wide chains are right, and slow.
+        // Wide chains are valid but slow.
         Ok(network) if network.chain().macs_per_pixel() > 200_000 => {}
         Ok(network) => {
             let (height, width) = (5, 7);

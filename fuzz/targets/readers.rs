@@ -1,4 +1,4 @@
-//! What `phasefront-io` and `phasefront-lab` read: the first byte says as what, the rest is the file.
+//! Fuzzes the readers of `phasefront-io` and `phasefront-lab`: the first byte selects the reader, the rest is the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

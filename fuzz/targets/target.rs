@@ -1,4 +1,4 @@
-//! Calibrations' files: what is read is written and read again as the same.
+//! Checks that calibration files that can be read are unchanged after they are written and read again.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

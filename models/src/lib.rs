@@ -1,5 +1,5 @@
-//! The trained networks that come with Phasefront, for the display of the paper: 8 µm, 638/520/450 nm, a volume of 6
-//! mm. What each of them measures stands in its card, the `.md` beside its file.
+//! The trained networks bundled with Phasefront, for the display of the paper: 8 µm pixel pitch, 638/520/450 nm, a
+//! volume of 6 mm. The card of each network, the `.md` next to its file, has its measurements.
 //!
 //! ```
 //! use phasefront::Display;
@@ -12,17 +12,17 @@
 use phasefront::{Display, Method, Network, SessionOptions, Sweep, Target};
 use std::sync::Arc;
 
-/// Numbers that a network computes in.
+/// The number format that a network computes in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Precision {
-    /// Whole numbers of 8 bits: the fastest.
+    /// 8-bit integers, the fastest.
     #[default]
     Int8,
-    /// Floating point. Needs the feature `float32`.
+    /// 32-bit floating point. Requires the feature `float32`.
     Float32,
 }
 
-/// A file of each precision that is compiled in.
+/// The compiled-in files of a network, by precision.
 #[derive(Debug)]
 struct Files {
     int8: &'static [u8],
@@ -40,7 +40,7 @@ impl Files {
     }
 }
 
-/// The files of a network by their name.
+/// Embeds the files of the network `$name`.
 macro_rules! files {
     ($name:literal) => {
         Files {
@@ -56,13 +56,13 @@ macro_rules! files {
 /// A hologram network.
 #[derive(Debug)]
 pub struct Model {
-    /// The name of its card.
+    /// The name, which is also that of its card.
     pub name: &'static str,
     files: Files,
 }
 
 impl Model {
-    /// The network; None where float32 is not compiled in.
+    /// Returns the network, or `None` if `precision` is not compiled in.
     pub fn network(&self, precision: Precision) -> Option<Arc<Network>> {
         self.files.read(precision)
     }
@@ -80,7 +80,7 @@ pub const NETWORKS: &[Model] = &[
     },
 ];
 
-/// The network of [`NETWORKS`] called `name`, where it is compiled in in this precision.
+/// Returns the network of [`NETWORKS`] called `name`, or `None` if it does not exist or `precision` is not compiled in.
 pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
     let model = NETWORKS.iter().find(|model| model.name == name)?;
     model.network(precision)
@@ -89,15 +89,15 @@ pub fn network(name: &str, precision: Precision) -> Option<Arc<Network>> {
 /// A hologram network and the pre-filter that was trained with it, for modulators at one offset.
 #[derive(Debug)]
 pub struct Pair {
-    /// The name of its card.
+    /// The name, which is also that of its card.
     pub name: &'static str,
-    /// z of the modulator, mm.
+    /// The z of the modulator in millimetres.
     pub offset_mm: f64,
     hologram: Files,
     prefilter: Files,
 }
 
-/// A pair by the name of its files.
+/// Embeds the files of the pair `$name`.
 macro_rules! pair {
     ($offset_mm:literal, $name:literal) => {
         Pair {
@@ -125,14 +125,14 @@ pub const PAIRS: &[Pair] = &[
 /// The two networks of a [`Pair`].
 #[derive(Debug, Clone)]
 pub struct DeepPair {
-    /// Makes the midpoint hologram.
+    /// The network that computes the midpoint hologram.
     pub hologram: Arc<Network>,
-    /// Prepares it for its encoding.
+    /// The network that pre-filters it for encoding.
     pub prefilter: Arc<Network>,
 }
 
 impl Pair {
-    /// Both networks; None where float32 is not compiled in.
+    /// Returns both networks, or `None` if `precision` is not compiled in.
     pub fn networks(&self, precision: Precision) -> Option<DeepPair> {
         Some(DeepPair {
             hologram: self.hologram.read(precision)?,
@@ -141,19 +141,19 @@ impl Pair {
     }
 }
 
-/// The pair for `display`, if one was trained for it.
+/// Returns the pair that was trained for `display`, if there is one.
 pub fn pair_for(display: &Display, precision: Precision) -> Option<DeepPair> {
     let mut pairs = PAIRS.iter().filter_map(|pair| pair.networks(precision));
     pairs.find(|pair| pair.prefilter.check_prefilter(display).is_ok())
 }
 
-/// The default network for `display`: 8 layers, in int8; None where it was not trained for it.
+/// Returns the default network for `display` (8 layers, int8), or `None` if it was not trained for that display.
 pub fn default_network(display: &Display) -> Option<Arc<Network>> {
     network("rgbd-8", Precision::Int8).filter(|network| network.check_display(display).is_ok())
 }
 
-/// The default options for `target`: a network where one was trained for its display, else the plane sweep; AA-DPM with
-/// one local step.
+/// Returns the default options for `target`: a network if one was trained for its display, otherwise the plane sweep;
+/// AA-DPM with one local step.
 pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     let target = target.into();
     let method = match default_network(&target.display) {
@@ -163,7 +163,7 @@ pub fn session_options(target: impl Into<Target>) -> SessionOptions {
     SessionOptions::new(target, method)
 }
 
-/// The code of the README and of the guide compiles.
+/// Compiles the code of the README and of the guide.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 #[doc = include_str!("../../docs/rust.md")]

@@ -1,5 +1,4 @@
-//! What cameras give: a [`CameraFrame`] joins a [`ColourImage`] and a [`DepthImage`], each borrowed as it lies in the
-//! camera's memory.
+//! Camera input: a [`CameraFrame`] joins a [`ColourImage`] and a [`DepthImage`], which borrow the camera's memory.
 
 pub use phasefront_core::depth::align::{Cameras, Intrinsics};
 pub use phasefront_core::depth::camera::{Alignment, CameraFrame};

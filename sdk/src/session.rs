@@ -1,12 +1,13 @@
-//! Many frames: what an app feeds with camera frames and gets holograms from.
+//! Sessions, which take camera frames from an app and return holograms.
 //!
-//! An [`ImageSession`] answers each frame by itself. A [`VideoSession`] answers each frame too, and smooths depth and
-//! brightness over time. A [`LiveSession`] takes frames without ever waiting, works on one while the newest
-//! waits, and tells its listener of every result and every drop. What all three can do is their [`SessionHandle`]'s.
+//! An [`ImageSession`] processes each frame independently. A [`VideoSession`] also returns a hologram for each frame,
+//! and smooths depth and brightness over time. A [`LiveSession`] takes frames without waiting: it processes one frame
+//! while the newest waits, and reports every result and every drop to its listener. [`SessionHandle`] has the functions
+//! that all three share.
 //!
-//! Which frame is next is decided in `queue`, a state machine without threads; `live` is its thread; `stages` is what
-//! happens to a frame; `engine` is where CPU and GPU meet; `quality` chooses the quality level. One frame by itself,
-//! without a camera's formats, is [`phasefront_core::pipeline::Pipeline`]'s.
+//! The state machine in `queue` decides which frame is next, without threads; `live` is its thread; `stages` processes
+//! a frame; `engine` chooses between CPU and GPU; `quality` chooses the quality level.
+//! [`phasefront_core::pipeline::Pipeline`] processes a single frame without a camera's formats.
 
 mod computing;
 mod drop_reason;
@@ -53,10 +54,10 @@ use std::fmt::{Debug, Formatter};
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
 
-/// Makes a hologram of each frame by itself. Every method may be called from any thread, at any moment. A session
-/// belongs to the process that made it: in a fork of it, calls that need its threads are refused.
+/// Makes a hologram of each frame independently. Every method may be called from any thread at any time. A session
+/// belongs to the process that made it: in a forked process, calls that need its threads fail.
 ///
-/// Frames are submitted to a [`LiveSession`] only:
+/// Only a [`LiveSession`] has `submit`:
 ///
 /// ```compile_fail,E0599
 /// use phasefront::input::CameraFrame;
@@ -69,13 +70,13 @@ use std::sync::{Arc, Mutex};
 #[derive(Debug)]
 pub struct ImageSession(Answering);
 
-/// Makes a hologram of each frame of a video; depth and brightness are smoothed over time. Timestamps must
-/// rise. Threads and processes as [`ImageSession`] says.
+/// Makes a hologram of each frame of a video and smooths depth and brightness over time. Timestamps must increase. The
+/// rules of [`ImageSession`] for threads and processes apply.
 #[derive(Debug)]
 pub struct VideoSession(Answering);
 
-/// Takes a camera's frames without waiting, and tells its listener what becomes of them. Timestamps must rise. Threads
-/// and processes as [`ImageSession`] says.
+/// Takes a camera's frames without waiting, and reports the outcome of each to its listener. Timestamps must increase.
+/// The rules of [`ImageSession`] for threads and processes apply.
 ///
 /// ```no_run
 /// use phasefront::input::{CameraFrame, ColourFormat, ColourImage, DepthFormat, DepthImage, Plane};
@@ -107,48 +108,48 @@ pub struct LiveSession {
 }
 
 impl ImageSession {
-    /// A session for single images.
+    /// Creates a session for single images.
     ///
     /// # Errors
-    /// Options that cannot be meant or planned for, or threads that cannot be started.
+    /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
     pub fn new(options: SessionOptions) -> Result<Self> {
         Answering::new(options).map(ImageSession)
     }
 
-    /// Makes the hologram of `frame` and waits for it. Calls from several threads are answered one after another.
+    /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
     ///
     /// # Errors
-    /// A frame that is not usable, a session that is paused, closed or forked, or reset or closed while the frame is
-    /// computed, a call by a handler of logs or traces while a session computes on its thread, or a panic inside. None
-    /// of them harms the frames that follow.
+    /// Returns an error if the frame is not usable, if the session is paused, closed or forked, if it is reset or
+    /// closed while it computes the frame, if a log or trace handler makes the call while a session computes on its
+    /// thread, or if the computation panics. The frames that follow are not affected.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         self.0.process(frame, false)
     }
 }
 
 impl VideoSession {
-    /// A session for the frames of a video.
+    /// Creates a session for the frames of a video.
     ///
     /// # Errors
-    /// As [`ImageSession::new`].
+    /// Returns an error in the same cases as [`ImageSession::new`].
     pub fn new(options: SessionOptions) -> Result<Self> {
         Answering::new(options).map(VideoSession)
     }
 
-    /// Makes the hologram of `frame` and waits for it. Calls from several threads are answered one after another.
+    /// Makes the hologram of `frame` and waits for it. Calls from several threads run one after another.
     ///
     /// # Errors
-    /// As [`ImageSession::process`]; a frame that is not later than the last.
+    /// Returns an error in the same cases as [`ImageSession::process`], and if the frame is not later than the last.
     pub fn process(&self, frame: &CameraFrame<'_>) -> Result<Hologram> {
         self.0.process(frame, true)
     }
 
-    /// Takes up a video where it was left: does for `frame` what the frames after it need, without making its hologram,
-    /// which got `scale` ([`Hologram::scale`]). Frames that follow become what they would have become after
-    /// [`Self::process`] of it, but for what remembers more: a method chosen automatically, and steps at the midpoint.
+    /// Resumes a video: updates the state of the session with `frame`, without making its hologram, whose
+    /// [`Hologram::scale`] was `scale`. The frames that follow give the same result as after [`Self::process`] of
+    /// `frame`, except for features that keep more state: a method chosen automatically, and steps at the midpoint.
     ///
     /// # Errors
-    /// As [`Self::process`]; a scale that no hologram has.
+    /// Returns an error in the same cases as [`Self::process`], and if the scale is not positive and finite.
     pub fn replay(&self, frame: &CameraFrame<'_>, scale: f32) -> Result<()> {
         if !(scale.is_finite() && scale > 0.0) {
             return Err(Error::Setting(format!(
@@ -161,10 +162,10 @@ impl VideoSession {
 }
 
 impl LiveSession {
-    /// A session for a camera's frames, with a thread of its own, on which it calls `listener`.
+    /// Creates a session for a camera's frames, with its own thread, on which it calls `listener`.
     ///
     /// # Errors
-    /// As [`ImageSession::new`]; WebAssembly, which has no threads.
+    /// Returns an error in the same cases as [`ImageSession::new`], and on WebAssembly, which has no threads.
     pub fn new(options: SessionOptions, mut listener: impl FnMut(Event) + Send + 'static) -> Result<Self> {
         if cfg!(target_family = "wasm") {
             return Err(Error::Session(
@@ -183,12 +184,12 @@ impl LiveSession {
         Ok(LiveSession { handle, live })
     }
 
-    /// Hands `frame` to the session, which copies it and returns at once. Gives the reason where the frame was dropped;
-    /// the listener hears of it too.
+    /// Hands `frame` to the session, which copies it and returns at once. Returns the reason if the frame was dropped;
+    /// the listener is also told.
     ///
     /// # Errors
-    /// Colour and depth that do not belong together, a late frame, or a session that is closed or forked. None of them
-    /// harms the frames that follow.
+    /// Returns an error if colour and depth do not match, if the frame is late, or if the session is closed or forked.
+    /// The frames that follow are not affected.
     pub fn submit(&self, frame: &CameraFrame<'_>) -> Result<Option<DropReason>> {
         self.shared.process.check()?;
         frame.check()?;
@@ -232,7 +233,7 @@ impl Drop for LiveSession {
     }
 }
 
-/// What image and video sessions share: a caller waits for the answer to its frame.
+/// The common part of image and video sessions: a caller waits for the result of its frame.
 struct Answering {
     handle: SessionHandle,
     gate: Arc<Mutex<Gate>>,
@@ -254,7 +255,7 @@ impl Answering {
         })
     }
 
-    /// Answers one frame by `work`, which hears whether the frames before count.
+    /// Runs `work` on one frame and tells it whether the frames before count.
     fn answer<T>(
         &self,
         frame: &CameraFrame<'_>,
@@ -271,7 +272,7 @@ impl Answering {
                 }
                 gate.begin()
             };
-            // There are stages as long as the gate is open.
+            // The stages exist as long as the gate is open.
             let stages = stages.as_mut().ok_or_else(queue::closed)?;
             if fresh {
                 stages.forget();

@@ -1,4 +1,4 @@
-//! What a closed session keeps: its statistics, and no memory of frames.
+//! Checks that a closed session keeps its statistics but no memory of frames.
 #![allow(clippy::unwrap_used)]
 
 mod camera;
@@ -15,10 +15,10 @@ use std::sync::mpsc;
 
 const W: usize = 160;
 const H: usize = 120;
-/// Far less than one frame of the camera, which has 150 kB.
+/// A bound far below one camera frame, which has 150 kB.
 const LITTLE: usize = 64 << 10;
 
-/// Bytes that are allocated now and were not `before`. Threads of a pool end a moment after it.
+/// Returns the allocated bytes beyond `before`. Waits, because threads of a pool end shortly after it.
 fn more_than(before: usize) -> usize {
     let now = || HELD.load(Ordering::Relaxed).saturating_sub(before);
     for _ in 0..100 {
@@ -30,7 +30,7 @@ fn more_than(before: usize) -> usize {
     now()
 }
 
-/// All in one test: what another one allocates would be counted.
+/// This is one test, because the allocations of another would be counted.
 #[test]
 fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
     let scene = Scene::new(H, W, 10);
@@ -45,14 +45,14 @@ fn a_closed_session_gives_its_memory_back_before_it_is_dropped() {
         let (sender, events) = mpsc::channel();
         let listener = move |event| drop(sender.send(event));
         let session = LiveSession::new(options(W, H), listener).unwrap();
-        // Bursts, so that frames wait while one is computed.
+        // Submit bursts, so that frames wait while one is computed.
         for t in 1..30 {
             session.submit(&frame(t)).unwrap();
         }
         while !matches!(events.recv().unwrap(), Event::Processed(hologram) if hologram.timestamp_ns() == 29) {}
         session
     };
-    // What is made once is there.
+    // Allocate the parts that are created only once.
     drop((still(), live()));
     let before = HELD.load(Ordering::Relaxed);
     let (still, live) = (still(), live());

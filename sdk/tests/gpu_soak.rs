@@ -1,4 +1,4 @@
-//! A live session whose GPU goes again and again. A test by itself, because it measures its process.
+//! Runs a live session whose GPU is lost repeatedly. This is a separate program because it measures its process.
 //! `PHASEFRONT_SOAK=10000 cargo test --release --workspace --test gpu_soak -- --nocapture` is the long run.
 #![cfg(all(feature = "gpu", target_os = "linux"))]
 #![allow(clippy::unwrap_used)]
@@ -13,11 +13,11 @@ use phasefront::session::Event;
 use phasefront::{Error, LiveSession};
 use std::sync::mpsc;
 
-/// Each frame is answered, and memory does not grow with the losses.
+/// Every frame is answered, and memory does not grow with the losses.
 #[test]
 fn nothing_grows_where_devices_go() {
-    // glibc keeps what threads that have ended freed, for others of their kind, and each opening has a few: with one
-    // pool of memory it is seen what is held.
+    // glibc keeps freed memory of ended threads for later threads, and each opening starts some. A single arena shows
+    // the memory in use.
     if std::env::var_os("MALLOC_ARENA_MAX").is_none() {
         let mut again = std::process::Command::new(std::env::current_exe().unwrap());
         again.args(std::env::args_os().skip(1)).env("MALLOC_ARENA_MAX", "1");

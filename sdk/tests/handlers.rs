@@ -1,5 +1,5 @@
-//! Handlers of logs and traces run on the threads that compute, while the session's locks are held. What they do to the
-//! session must not leave anybody waiting. Here a collector of traces stands for them: it is called in the same places.
+//! Log and trace handlers run on the threads that compute, while the session's locks are held. A handler that calls the
+//! session must not cause a deadlock. These tests use a trace collector, which is called in the same places.
 #![allow(clippy::unwrap_used)]
 
 mod camera;
@@ -22,7 +22,7 @@ const H: usize = 48;
 
 type Handler = Arc<dyn Fn() + Send + Sync>;
 
-/// What is called where a stage of this name begins.
+/// The handler that is called when the named stage begins.
 static HANDLER: Mutex<Option<(&str, Handler)>> = Mutex::new(None);
 
 struct Collector;
@@ -49,7 +49,7 @@ impl Subscriber for Collector {
     fn exit(&self, _: &Id) {}
 }
 
-/// What `work` gives; a deadlock is a failure and not a test without end.
+/// Returns the result of `work`; a deadlock fails the test instead of blocking it.
 fn in_time<T: Send + 'static>(what: &'static str, work: impl FnOnce() -> T + Send + 'static) -> T {
     let (sender, done) = mpsc::channel();
     std::thread::spawn(move || sender.send(work()));
@@ -64,7 +64,7 @@ fn handle(stage: &'static str, handler: impl Fn() + Send + Sync + 'static) {
     *HANDLER.lock().unwrap() = Some((stage, Arc::new(handler)));
 }
 
-/// Options of two quality levels, so that the second is planned in the midst of a frame.
+/// Returns options with two quality levels, so that the second is planned during a frame.
 fn two_levels() -> SessionOptions {
     let mut options = options(W, H);
     options.quality_levels.push(options.quality_levels[0].clone());
@@ -88,7 +88,7 @@ fn submit(session: &LiveSession, time: u64) {
     session.submit(&frame(time, &scene, &metres)).unwrap();
 }
 
-/// The frame's handler closes its session: on a thread of the pool, and on the caller's.
+/// The handler closes the session that computes, on a thread of the pool and on the caller's thread.
 fn closing_a_video() {
     for stage in ["method", "plan"] {
         let before = HELD.load(Ordering::Relaxed);
@@ -106,11 +106,11 @@ fn closing_a_video() {
             assert_eq!((s.submitted, s.refused, s.pending), (3, 1, 0));
             (result.map(|_| ()), session)
         });
-        // It was given up, or done already.
+        // The frame was cancelled or had already finished.
         if let (Err(why), _) = &result {
             assert!(why.to_string().contains("given up"), "{why}");
         }
-        // The memory is back, though the close did not wait. Threads end a moment after their pool.
+        // The memory is freed although the close did not wait. Threads end shortly after their pool.
         let held = || HELD.load(Ordering::Relaxed).saturating_sub(before);
         for _ in 0..100 {
             if held() < 64 << 10 {
@@ -122,7 +122,7 @@ fn closing_a_video() {
     }
 }
 
-/// What would wait for a frame is refused, of this session and of another; what does not wait is done.
+/// Calls that would wait for a frame are refused, for this session and for another; calls that do not wait succeed.
 fn calling_back() {
     for stage in ["method", "plan"] {
         let told = in_time("calling back within process", move || {
@@ -158,7 +158,7 @@ fn calling_back() {
     }
 }
 
-/// A live session is closed by the handler; its listener hears the end.
+/// The handler closes a live session, whose listener is told of the end.
 fn closing_a_live_stream() {
     let told = in_time("closing a live stream", || {
         let (sender, events) = mpsc::channel();
@@ -184,11 +184,11 @@ fn closing_a_live_stream() {
     );
 }
 
-/// All in one test: there is one collector a process.
+/// This is one test, because a process has only one collector.
 #[test]
 fn a_handler_of_logs_may_close_and_call_any_session() {
     tracing::subscriber::set_global_default(Collector).unwrap();
-    // What is made once is there.
+    // Allocate the parts that are created only once.
     process(&video(), 1).unwrap();
     closing_a_video();
     calling_back();

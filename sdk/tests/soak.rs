@@ -1,5 +1,5 @@
-//! A live session under load and faults: every frame is reported exactly once, and neither memory nor threads nor
-//! handles grow. `PHASEFRONT_SOAK=100000 cargo test --release --workspace --test soak -- --nocapture` is the long run.
+//! Runs a live session under load and faults: every frame is reported exactly once, and memory, threads and handles do
+//! not grow. `PHASEFRONT_SOAK=100000 cargo test --release --workspace --test soak -- --nocapture` is the long run.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -24,7 +24,7 @@ use tracing::{Event as TracedEvent, Metadata, Subscriber};
 const W: usize = 32;
 const H: usize = 24;
 
-/// What the process holds: bytes that are allocated, threads, open files.
+/// The resources of the process: allocated bytes, threads, open files.
 #[derive(Debug, Clone, Copy)]
 struct Held {
     bytes: usize,
@@ -43,17 +43,17 @@ impl Held {
     }
 }
 
-/// What the listener heard.
+/// The events that the listener received.
 #[derive(Default)]
 struct Heard {
     made: AtomicU64,
     dropped: AtomicU64,
     failed: AtomicU64,
-    /// Of these by a panic of the work.
+    /// Failed frames whose work panicked.
     panicked: AtomicU64,
 }
 
-/// Panics in the midst of a frame: where one of so many stages begins, on the threads that compute.
+/// Panics in the middle of a frame: at the start of every 499th stage, on the threads that compute.
 struct Panicking(AtomicU64);
 
 impl Subscriber for Panicking {
@@ -63,7 +63,7 @@ impl Subscriber for Panicking {
 
     fn new_span(&self, _: &Attributes<'_>) -> Id {
         if self.0.fetch_add(1, Ordering::Relaxed) % 499 == 498 {
-            // Without the hook's message on stderr.
+            // This avoids the hook's message on stderr.
             std::panic::resume_unwind(Box::new("the work"));
         }
         Id::from_u64(1)
@@ -76,7 +76,7 @@ impl Subscriber for Panicking {
     fn exit(&self, _: &Id) {}
 }
 
-/// Quality levels of a network and of a sweep, so that both are used.
+/// Returns options with a network and a sweep as quality levels, so that both are used.
 fn quality_levels() -> SessionOptions {
     let mut options = options(W, H);
     let sweep = Sweep::for_display(&options.target.display);
@@ -92,18 +92,18 @@ fn quality_levels() -> SessionOptions {
     options
 }
 
-/// One frame, or a fault; the clock after it.
+/// Submits one frame or a fault; returns the clock after it.
 fn submit(session: &LiveSession, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<u8>)], now: u64) -> u64 {
     let (scene, metres) = &scenes[random.random_range(0..scenes.len())];
     let later = now + random.random_range(1..3_000_000);
     let submitted = match random.random_range(0..100) {
-        // Nothing is seen, and the frame fails.
+        // The depth has no readings, so the frame fails.
         0 => {
             let nothing = vec![0; metres.len()];
             let nothing = depth(&nothing, DepthFormat::MetresF32, W, H);
             session.submit(&CameraFrame::new(later, scene.colour(), nothing))
         }
-        // The clock goes back.
+        // The clock runs backwards.
         1 => session.submit(&frame(now / 2, scene, metres)),
         2 => {
             session.set_thermal([Thermal::Nominal, Thermal::Critical][random.random_range(0..2)]);
@@ -137,7 +137,7 @@ fn submit(session: &LiveSession, random: &mut ChaCha8Rng, scenes: &[(Scene, Vec<
     }
 }
 
-/// `frames` frames with faults through one session; its statistics agree with what was heard.
+/// Runs `frames` frames with faults through one session and compares its statistics with the reported events.
 fn run(frames: u64, seed: u64) -> Heard {
     let random = &mut ChaCha8Rng::seed_from_u64(seed);
     let scenes: Vec<_> = (0..4)
@@ -156,7 +156,7 @@ fn run(frames: u64, seed: u64) -> Heard {
             match event {
                 Event::Processed(hologram) => {
                     heard.made.fetch_add(1, Ordering::Relaxed);
-                    // An app holds on to some, in no order.
+                    // An app keeps some holograms and drops them in random order.
                     kept.push(hologram);
                     if kept.len() > 6 {
                         kept.swap_remove(random.random_range(0..6));
@@ -173,7 +173,7 @@ fn run(frames: u64, seed: u64) -> Heard {
                 _ => {}
             }
             if random.random_bool(0.02) {
-                // Without the hook's message on stderr.
+                // This avoids the hook's message on stderr.
                 std::panic::resume_unwind(Box::new("the listener"));
             }
         }
@@ -182,13 +182,13 @@ fn run(frames: u64, seed: u64) -> Heard {
     let mut now = 1;
     for sent in 0..frames {
         now = submit(&session, random, &scenes, now);
-        // At times the camera waits for what it sent, so that some frames are made.
+        // The camera sometimes waits for its frames, so that some are processed.
         while sent % 4 == 0 && session.statistics().pending > 0 {
             std::thread::yield_now();
         }
     }
     let held = HELD.load(Ordering::Relaxed);
-    // The largest plan is 4.8 MB. A frame's levels and depth are 4 kB: kept, 4000 would be 16 MB.
+    // The largest plan has 4.8 MB. A frame's levels and depth have 4 kB, so 4000 kept frames would have 16 MB.
     assert!(held < 8 << 20, "after {frames} frames {held} bytes");
     session.close();
     let s = session.statistics();
@@ -204,18 +204,18 @@ fn run(frames: u64, seed: u64) -> Heard {
 fn nothing_grows_and_nothing_is_lost_under_load_and_faults() {
     let frames: u64 = std::env::var("PHASEFRONT_SOAK").map_or(4000, |n| n.parse().unwrap());
     tracing::subscriber::set_global_default(Panicking(AtomicU64::new(0))).unwrap();
-    // Two short runs first, so that all that is made once is there.
+    // Two short runs first create everything that is created only once.
     (0..2).for_each(|seed| _ = run(1000, seed));
     let before = Held::now();
     let heard = run(frames, 2);
-    // A short run may drop each of its few frames that show nothing.
+    // A short run may drop all of its few frames without depth.
     let [failed, panicked] = [&heard.failed, &heard.panicked].map(|count| count.load(Ordering::Relaxed));
     assert!(
         failed > panicked && panicked > 0,
         "{failed} failed, {panicked} of them by panics"
     );
     let mut after = Held::now();
-    // Threads end a moment after their pool.
+    // Threads end shortly after their pool.
     for _ in 0..100 {
         if after.threads <= before.threads {
             break;

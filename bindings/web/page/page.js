@@ -1,4 +1,4 @@
-// The page: what is dropped, the camera, the slider. The worker has the session.
+// Handles the page: dropped files, the camera, the slider. The worker owns the session.
 const at = (id) => document.getElementById(id);
 const DEPTH_MM = 6;
 const STEPS = Number(at("focus").max);
@@ -36,7 +36,8 @@ function work(change) {
   document.documentElement.setAttribute("aria-busy", String(busy > 0));
 }
 
-// The newest wish alone is fulfilled: what the slider passed meanwhile is not. Who wishes waits until all are.
+// Wraps `fulfil` so that only the newest request is fulfilled and those in between are skipped. The wrapper returns a
+// promise that resolves when no request is left.
 function newest(fulfil) {
   let running, next;
   async function run() {
@@ -60,7 +61,7 @@ const zOf = (focus) => (0.5 - focus / STEPS) * DEPTH_MM;
 function draw(id, width, height, pixels) {
   const canvas = at(id).querySelector("canvas");
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-  // The controls stay in sight.
+  // Keep the controls in sight.
   canvas.style.maxWidth = `calc(72vh * ${width / height})`;
   canvas.getContext("2d").putImageData(new ImageData(new Uint8ClampedArray(pixels.buffer), width), 0, 0);
 }
@@ -88,7 +89,7 @@ async function show() {
   const height = Math.round((width * picture.depth.height) / picture.depth.width);
   const options = { method, localSteps, width, height, video: Boolean(stream) };
   const colour = pixels(picture.colour, width, height, true);
-  // Depth between two depths is at neither: it is not smoothed.
+  // Depth is not interpolated, because a mean of two depths lies on neither surface.
   const depth = pixels(picture.depth, width, height, false);
   if (at("white").checked) depth.data = depth.data.map((value) => 255 - value);
   const timestampNs = BigInt(Math.round(performance.now() * 1e6));
@@ -99,7 +100,7 @@ async function show() {
 }
 const refresh = newest(show);
 
-// The middle of a picture, which has these sides' ratio, as so many pixels.
+// Crops the middle of a picture to the aspect ratio of `width` and `height`, and scales it to that size.
 function pixels(source, width, height, smooth) {
   const across = Math.min(source.width, (source.height * width) / height);
   const down = (across * height) / width;
@@ -157,7 +158,7 @@ function stopCamera() {
   at("camera").setAttribute("aria-pressed", "false");
 }
 
-// The camera's colour on the depth that is there: cameras of computers have none.
+// Combines the camera's colour with the existing depth, because computers' cameras have none.
 async function camera() {
   const was = stream;
   stopCamera();

@@ -1,4 +1,4 @@
-// The session, away from the page, which stays live while a frame is computed.
+// Runs the session in a worker, so that the page stays responsive while a frame is computed.
 import { Frame, Network, Session, load } from "./phasefront/phasefront.js";
 
 const METHODS = {

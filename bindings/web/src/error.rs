@@ -1,25 +1,25 @@
-//! Errors as JavaScript has them, and plain objects of numbers.
+//! Converts errors to JavaScript's, and creates plain objects.
 
 use js_sys::{Object, Reflect};
 use wasm_bindgen::prelude::*;
 
-/// What a call gives, or an `Error` with a `kind`.
+/// The result of a call, or an `Error` with a `kind`.
 pub(crate) type Answer<T> = Result<T, JsValue>;
 
-/// An `Error` of `kind` that says `message`.
+/// Creates an `Error` of `kind` with `message`.
 pub(crate) fn error(kind: &str, message: &str) -> JsValue {
     let error = js_sys::Error::new(message);
-    // A property of an object of our own can always be set.
+    // Setting a property of our own object cannot fail.
     let _ = Reflect::set(&error, &"kind".into(), &kind.into());
     error.into()
 }
 
-/// A refused setting or argument.
+/// Creates the error for an invalid setting or argument.
 pub(crate) fn setting(message: &str) -> JsValue {
     error("setting", message)
 }
 
-/// The core's error.
+/// Converts an error of the core.
 pub(crate) fn of_core(core: phasefront::Error) -> JsValue {
     use phasefront::Error;
     let kind = match &core {
@@ -34,7 +34,7 @@ pub(crate) fn of_core(core: phasefront::Error) -> JsValue {
     error(kind, &core.to_string())
 }
 
-/// A plain object.
+/// Creates a plain object.
 pub(crate) fn object<const N: usize>(fields: [(&str, JsValue); N]) -> Object {
     let object = Object::new();
     for (name, value) in fields {
@@ -43,7 +43,7 @@ pub(crate) fn object<const N: usize>(fields: [(&str, JsValue); N]) -> Object {
     object
 }
 
-/// Makes panics errors that are thrown; called once, when the module is loaded.
+/// Converts panics to errors that are thrown. Called once when the module is loaded.
 #[wasm_bindgen(start)]
 pub fn start() {
     std::panic::set_hook(Box::new(|info| {
@@ -53,7 +53,7 @@ pub fn start() {
     }));
 }
 
-/// The version of the library.
+/// Returns the version of the library.
 #[wasm_bindgen]
 pub fn version() -> String {
     env!("CARGO_PKG_VERSION").to_owned()

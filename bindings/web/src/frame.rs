@@ -1,4 +1,4 @@
-//! Camera frames: bytes, and what lies where in them.
+//! Camera frames: bytes and their layout.
 
 use crate::error::{Answer, error, of_core};
 use phasefront::input::{
@@ -7,7 +7,7 @@ use phasefront::input::{
 };
 use wasm_bindgen::prelude::*;
 
-/// Bytes in the module's memory, and where pixels lie in them.
+/// Bytes in the module's memory, with strides.
 struct Bytes {
     bytes: Vec<u8>,
     row_stride: usize,
@@ -28,7 +28,7 @@ impl Bytes {
     }
 }
 
-/// An image of one plane.
+/// An image with one plane.
 struct Image<F> {
     format: F,
     /// (width, height).
@@ -36,7 +36,7 @@ struct Image<F> {
     memory: Bytes,
 }
 
-/// One frame, put together part by part, then given to a session.
+/// One frame, which is assembled part by part and then passed to a session.
 #[wasm_bindgen]
 pub struct RawFrame {
     timestamp_ns: u64,
@@ -59,11 +59,11 @@ fn unknown(what: &str, name: &str, known: &str) -> JsValue {
 
 #[wasm_bindgen]
 impl RawFrame {
-    /// A frame with a colour image of `format`, whose planes follow; `bt709` and `video_range` say what luma and
-    /// chroma are.
+    /// Creates a frame with a colour image of `format`, whose planes are added afterwards. `bt709` and `video_range`
+    /// define the encoding of luma and chroma.
     ///
     /// # Errors
-    /// `frame`: an unknown format.
+    /// Throws an error of kind `frame` if the format is unknown.
     #[wasm_bindgen(constructor)]
     pub fn new(
         timestamp_ns: u64,
@@ -95,16 +95,17 @@ impl RawFrame {
         })
     }
 
-    /// The next plane of the colour image: bytes from one row to the next, and from one pixel to the next.
+    /// Adds the next plane of the colour image. Strides are the bytes from one row to the next and from one pixel to
+    /// the next.
     #[wasm_bindgen(js_name = colourPlane)]
     pub fn colour_plane(&mut self, bytes: Vec<u8>, row_stride: u32, pixel_stride: u32) {
         self.colour.push(Bytes::new(bytes, row_stride, pixel_stride));
     }
 
-    /// The depth image; strides as [`Self::colour_plane`] takes them.
+    /// Sets the depth image, with strides as in [`Self::colour_plane`].
     ///
     /// # Errors
-    /// `frame`: an unknown format.
+    /// Throws an error of kind `frame` if the format is unknown.
     pub fn depth(
         &mut self,
         format: &str,
@@ -137,10 +138,10 @@ impl RawFrame {
         Ok(())
     }
 
-    /// How sure the depth is: an image of its size; strides as [`Self::colour_plane`] takes them.
+    /// Sets the confidence of the depth, an image of the same size, with strides as in [`Self::colour_plane`].
     ///
     /// # Errors
-    /// `frame`: an unknown format.
+    /// Throws an error of kind `frame` if the format is unknown.
     pub fn confidence(
         &mut self,
         format: &str,
@@ -163,10 +164,11 @@ impl RawFrame {
         Ok(())
     }
 
-    /// How the sensor's picture becomes the one that is shown: turned clockwise by `degrees`, then mirrored.
+    /// Sets the orientation of the displayed picture relative to the sensor's: rotated clockwise by `degrees`, then
+    /// mirrored.
     ///
     /// # Errors
-    /// `frame`: another turn than 0, 90, 180, 270.
+    /// Throws an error of kind `frame` if `degrees` is not 0, 90, 180 or 270.
     pub fn orientation(&mut self, degrees: u32, mirrored: bool) -> Answer<()> {
         let rotation = match degrees {
             0 => Rotation::Upright,
@@ -179,11 +181,11 @@ impl RawFrame {
         Ok(())
     }
 
-    /// How depth and colour camera stand to each other: fx, fy, cx, cy of the colour, the same of the depth, then, for
-    /// cameras apart, the nine numbers of the rotation and the three of the translation.
+    /// Sets the relation of the depth and the colour camera: fx, fy, cx, cy of the colour camera, then those of the
+    /// depth camera, then, for separate cameras, the nine numbers of the rotation and the three of the translation.
     ///
     /// # Errors
-    /// `frame`: another count of numbers.
+    /// Throws an error of kind `frame` if the count of numbers is wrong.
     pub fn cameras(&mut self, numbers: &[f64]) -> Answer<()> {
         let of = |n: &[f64; 4]| Intrinsics {
             fx: n[0],
@@ -211,10 +213,10 @@ impl RawFrame {
 }
 
 impl RawFrame {
-    /// The core's frame.
+    /// Returns the frame for the core.
     ///
     /// # Errors
-    /// `frame`: what [`ColourImage::new`] or [`DepthImage::new`] refuses, or a frame without depth.
+    /// Throws an error of kind `frame` if [`ColourImage::new`] or [`DepthImage::new`] fails or the frame has no depth.
     pub(crate) fn frame(&self) -> Answer<CameraFrame<'_>> {
         let planes: Vec<Plane<'_>> = self.colour.iter().map(Bytes::plane).collect();
         let (width, height) = self.colour_size;

@@ -7,7 +7,7 @@ use phasefront::session::{FrameTimes, Hologram};
 use std::time::Duration;
 use wasm_bindgen::prelude::*;
 
-/// Times as an object of the form `FrameTimes`.
+/// Converts times to an object of the form `FrameTimes`.
 pub(crate) fn times(times: FrameTimes) -> Object {
     let ms = |time: Duration| JsValue::from(time.as_secs_f64() * 1e3);
     object([
@@ -28,7 +28,7 @@ pub struct RawHologram {
 
 #[wasm_bindgen]
 impl RawHologram {
-    /// What is known of it: an object of the form `HologramInfo`.
+    /// Returns the metadata: an object of the form `HologramInfo`.
     pub fn info(&self) -> Object {
         let (height, width) = self.core.shape();
         let range = self.core.range_m().map(|(near, far)| [near, far].map(JsValue::from));
@@ -48,21 +48,21 @@ impl RawHologram {
         ])
     }
 
-    /// The modulator levels, (C, H, W).
+    /// Returns the modulator levels, (C, H, W).
     pub fn levels(&self) -> Uint8Array {
         Uint8Array::from(self.core.levels())
     }
 
-    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1, in mm.
+    /// Returns the z in mm of the scene point at (`x`, `y`) of the picture, each from 0 to 1.
     #[wasm_bindgen(js_name = zAt)]
     pub fn z_at(&self, x: f64, y: f64) -> f64 {
         self.core.z_at(x, y) * 1e3
     }
 
-    /// What an eye focused at `z_mm` sees: rows of red, green, blue, alpha.
+    /// Returns the view of an eye focused at `z_mm`: rows of red, green, blue and alpha.
     ///
     /// # Errors
-    /// `setting`: as [`Hologram::preview`].
+    /// Throws an error of kind `setting` in the cases of [`Hologram::preview`].
     pub fn preview(&self, z_mm: f64, width: u32, height: u32) -> Answer<Uint8ClampedArray> {
         let (w, h) = (width as usize, height as usize);
         let mut rgba = vec![0; Hologram::preview_bytes(h, w).map_err(of_core)?];
@@ -70,30 +70,32 @@ impl RawHologram {
         Ok(Uint8ClampedArray::from(&rgba[..]))
     }
 
-    /// What an eye focused at `z_mm` sees of the whole hologram: amplitudes, of which 1 is white, (C, H, W).
+    /// Returns the view of an eye focused at `z_mm` at full resolution: amplitudes where 1 is white, (C, H, W).
     ///
     /// # Errors
-    /// `setting`: a z too far away.
+    /// Throws an error of kind `setting` if z is too far away.
     pub fn refocus(&self, z_mm: f64) -> Answer<Float32Array> {
         let amplitudes = self.core.refocus(z_mm / 1e3).map_err(of_core)?;
         Ok(Float32Array::from(&amplitudes[..]))
     }
 
-    /// The complex field behind the aperture at `z_mm`: real and imaginary part of each pixel, (C, H, W, 2).
+    /// Returns the real and imaginary part of each pixel of the complex field behind the aperture at `z_mm`, (C, H, W,
+    /// 2).
     ///
     /// # Errors
-    /// `setting`: a z too far away.
+    /// Throws an error of kind `setting` if z is too far away.
     pub fn field(&self, z_mm: f64) -> Answer<Float32Array> {
         let field = self.core.field(z_mm / 1e3).map_err(of_core)?;
         let parts: Vec<f32> = field.iter().flat_map(|value| [value.re, value.im]).collect();
         Ok(Float32Array::from(&parts[..]))
     }
 
-    /// One of the images that the modulator's driver takes: an object of the form `OutputImage`. `flips` are those of
-    /// x and y, `shift` is right and down, pixels.
+    /// Returns one of the images for the modulator's driver: an object of the form `OutputImage`. `flips` are the flips
+    /// of x and y; `shift` is the offset to the right and down in pixels.
     ///
     /// # Errors
-    /// `setting`: an unknown layout, an image that it has not, or as [`Output::new`].
+    /// Throws an error of kind `setting` if the layout is unknown, if it does not have the image, or if [`Output::new`]
+    /// fails.
     pub fn output(&self, layout: &str, flips: &[u8], shift: &[i32], image: u32) -> Answer<Object> {
         let (&[flip_x, flip_y], &[shift_x, shift_y]) = (flips, shift) else {
             return Err(setting("a placement has two flips and two shifts"));

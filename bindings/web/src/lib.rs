@@ -1,12 +1,12 @@
-//! Phasefront for browsers. This crate only translates: what a call does, is the core's. The npm package puts a layer
-//! of TypeScript over it (`package/src`), which alone calls what is here: objects named `Raw…`, formats by the names
-//! that the TypeScript has, lengths in its units. Rules of this border:
+//! Phasefront for browsers. This crate only translates calls to the core. Only the TypeScript layer of the npm package
+//! (`package/src`) calls it: it uses objects named `Raw…`, the format names of the TypeScript and lengths in its units.
+//! The rules of this interface:
 //!
-//! - Images come in as bytes that are copied once into the module's memory, and go out as copies, for memory that grows
-//!   moves, and a page hands arrays to its workers.
-//! - Every error is a JavaScript `Error` with the core's line and its `kind`. A panic cannot be caught in WebAssembly:
-//!   it throws an error of the kind `panic`, after which the module must not be called again; the layer above sees to
-//!   that.
+//! - Images are passed in as bytes that are copied once into the module's memory, and returned as copies: memory moves
+//!   when it grows, and a page transfers arrays to its workers.
+//! - Every error is a JavaScript `Error` with the core's one-line message and its `kind`. A panic cannot be caught in
+//!   WebAssembly: it throws an error of the kind `panic`, after which the module must not be called again. The
+//!   TypeScript layer ensures that.
 
 #[cfg(target_arch = "wasm32")]
 mod error;

@@ -1,4 +1,4 @@
-//! Networks: from bytes, or built in.
+//! Networks, loaded from bytes or built in.
 
 use crate::error::{Answer, error, object, of_core};
 use phasefront::{Display, Network};
@@ -14,20 +14,20 @@ pub struct RawNetwork {
 
 #[wasm_bindgen]
 impl RawNetwork {
-    /// A network from the bytes of an `.onnx` file.
+    /// Loads a network from the bytes of an `.onnx` file.
     ///
     /// # Errors
-    /// `network`: what is no hologram network, or one that the kernels do not take.
+    /// Throws an error of kind `network` if the file is not a hologram network or the kernels do not support it.
     #[wasm_bindgen(js_name = fromBytes)]
     pub fn from_bytes(onnx: &[u8]) -> Answer<RawNetwork> {
         let core = Network::from_onnx(onnx).map_err(of_core)?;
         Ok(RawNetwork { core: Arc::new(core) })
     }
 
-    /// The int8 network of this name that is in the module.
+    /// Returns the built-in int8 network called `name`.
     ///
     /// # Errors
-    /// `network`: another name.
+    /// Throws an error of kind `network` for any other name.
     #[wasm_bindgen(js_name = builtIn)]
     pub fn built_in(name: &str) -> Answer<RawNetwork> {
         let core = phasefront_models::network(name, Int8).ok_or_else(|| {
@@ -43,10 +43,10 @@ impl RawNetwork {
         Ok(RawNetwork { core })
     }
 
-    /// The hologram network of the pair for a modulator at `offset_mm`, and its pre-filter.
+    /// Returns the hologram network and the pre-filter of the pair for a modulator at `offset_mm`.
     ///
     /// # Errors
-    /// `display`: an offset that cannot be. `network`: one that no pair was trained for.
+    /// Throws an error of kind `display` if the offset is invalid, or of kind `network` if no pair was trained for it.
     #[wasm_bindgen(js_name = builtInPair)]
     pub fn built_in_pair(offset_mm: f64) -> Answer<Vec<RawNetwork>> {
         let display = Display::default().with_offset_m(offset_mm * 1e-3).map_err(of_core)?;
@@ -67,7 +67,7 @@ impl RawNetwork {
         ])
     }
 
-    /// What it is: an object of the form `NetworkInfo`.
+    /// Returns the properties: an object of the form `NetworkInfo`.
     pub fn info(&self) -> js_sys::Object {
         let display = self.core.display();
         object([

@@ -1,4 +1,4 @@
-//! What a session makes, and how.
+//! The options of a session.
 
 use crate::error::{Answer, setting};
 use crate::network::RawNetwork;
@@ -9,30 +9,30 @@ use phasefront::{Brightness, EncoderOptions, Encoding, Method, Network, Sweep};
 use std::sync::Arc;
 use wasm_bindgen::prelude::*;
 
-/// What makes holograms; of a sweep it is known for which display only where it is used.
+/// The method of a session. The display of a sweep is known only when the sweep is used.
 enum Maker {
     Trained(Arc<Network>),
     Sweep,
     Auto(Arc<Network>),
 }
 
-/// What makes holograms.
+/// The method that computes holograms.
 #[wasm_bindgen]
 pub struct RawMethod(Maker);
 
 #[wasm_bindgen]
 impl RawMethod {
-    /// A trained network.
+    /// Creates the method of a trained network.
     pub fn trained(network: &RawNetwork) -> RawMethod {
         RawMethod(Maker::Trained(network.core.clone()))
     }
 
-    /// The plane sweep.
+    /// Creates the plane sweep.
     pub fn sweep() -> RawMethod {
         RawMethod(Maker::Sweep)
     }
 
-    /// What suits each frame's depth.
+    /// Creates the method that chooses between the network and the sweep by each frame's depth.
     pub fn auto(network: &RawNetwork) -> RawMethod {
         RawMethod(Maker::Auto(network.core.clone()))
     }
@@ -48,7 +48,8 @@ impl RawMethod {
     }
 }
 
-/// Options of a session. Encoding, then the corrections, then quality levels: each takes up what was set before.
+/// The options of a session. Set the encoding first, then the corrections, then the quality levels: each uses what was
+/// set before.
 #[wasm_bindgen]
 pub struct RawOptions {
     pub(crate) core: SessionOptions,
@@ -56,7 +57,7 @@ pub struct RawOptions {
 
 #[wasm_bindgen]
 impl RawOptions {
-    /// The default options for `target`.
+    /// Returns the default options for `target`.
     #[wasm_bindgen(js_name = withDefaults)]
     pub fn with_defaults(target: &RawTarget) -> RawOptions {
         RawOptions {
@@ -64,7 +65,7 @@ impl RawOptions {
         }
     }
 
-    /// The same with `method`.
+    /// Returns the default options for `target` with `method`.
     #[wasm_bindgen(js_name = withMethod)]
     pub fn with_method(target: &RawTarget, method: &RawMethod) -> RawOptions {
         RawOptions {
@@ -72,11 +73,11 @@ impl RawOptions {
         }
     }
 
-    /// `double-phase`; `anti-alias` with a standard deviation in pixels and a count of taps; `band-limit` with its
-    /// bound. Those that are not given are as published.
+    /// Sets the encoding: `double-phase`; `anti-alias` with a standard deviation in pixels and a number of taps; or
+    /// `band-limit` with its bound. Omitted values are those of the publication.
     ///
     /// # Errors
-    /// `setting`: an unknown name.
+    /// Throws an error of kind `setting` if the name is unknown.
     pub fn encoding(&mut self, name: &str, sigma_or_k: Option<f32>, width: Option<u32>) -> Answer<()> {
         self.core.encoder = EncoderOptions::from(match name {
             "double-phase" => Encoding::DoublePhase,
@@ -96,15 +97,15 @@ impl RawOptions {
         Ok(())
     }
 
-    /// The encoding `deep`, with its pre-filter.
+    /// Sets the encoding `deep` with its pre-filter.
     pub fn deep(&mut self, prefilter: &RawNetwork) {
         self.core.encoder = EncoderOptions::from(Encoding::Deep(prefilter.core.clone()));
     }
 
-    /// `smoothed`, `frame-max`, or `fixed` at an amplitude.
+    /// Sets the brightness: `smoothed`, `frame-max`, or `fixed` at an amplitude.
     ///
     /// # Errors
-    /// `setting`: an unknown name, or a fixed brightness without its amplitude.
+    /// Throws an error of kind `setting` if the name is unknown, or if a fixed brightness has no amplitude.
     pub fn brightness(&mut self, name: &str, scale: Option<f32>) -> Answer<()> {
         self.core.encoder.brightness = match (name, scale) {
             ("smoothed", _) => Brightness::Smoothed,
@@ -119,38 +120,38 @@ impl RawOptions {
         Ok(())
     }
 
-    /// Corrections; none for what suits the encoding.
+    /// Sets the corrections. Omitted values are the defaults of the encoding.
     pub fn corrections(&mut self, dark_threshold: Option<f32>, local_steps: Option<u32>, midpoint_steps: Option<u32>) {
         let encoder = &mut self.core.encoder;
         encoder.dark_threshold = dark_threshold.unwrap_or(encoder.dark_threshold);
         *encoder = stepped(encoder, local_steps, midpoint_steps);
     }
 
-    /// Metres that are shown at the ends of the volume.
+    /// Sets the depths in metres at the near and the far end of the volume.
     #[wasm_bindgen(js_name = depthRange)]
     pub fn depth_range(&mut self, near_m: f32, far_m: f32) {
         self.core.depth.range = DepthRange::Fixed { near_m, far_m };
     }
 
-    /// Readings less sure than this, in 0..=1, are none.
+    /// Sets the confidence, from 0 to 1, below which readings are ignored.
     #[wasm_bindgen(js_name = leastConfidence)]
     pub fn least_confidence(&mut self, least: f32) {
         self.core.depth.least_confidence = least;
     }
 
-    /// Frames a second that are aimed at.
+    /// Sets the target rate in frames per second.
     #[wasm_bindgen(js_name = targetRateHz)]
     pub fn target_rate_hz(&mut self, rate: f64) {
         self.core.target_rate_hz = Some(rate);
     }
 
-    /// Most pixels of a quality level and of the modulator.
+    /// Sets the maximum number of pixels of a quality level and of the modulator.
     #[wasm_bindgen(js_name = mostPixels)]
     pub fn most_pixels(&mut self, pixels: u32) {
         self.core.most_pixels = pixels as usize;
     }
 
-    /// The quality level that the session stays at; none lets it change.
+    /// Fixes the quality level of the session; without one, the session may change it.
     pub fn quality(&mut self, quality_level: Option<u32>) {
         self.core.quality = quality(quality_level);
     }
@@ -161,7 +162,7 @@ impl RawOptions {
         self.core.quality_levels.clear();
     }
 
-    /// Adds a quality level, below those that are there.
+    /// Adds a quality level below the existing ones.
     #[wasm_bindgen(js_name = pushQualityLevel)]
     pub fn push_quality_level(
         &mut self,
@@ -181,7 +182,7 @@ impl RawOptions {
     }
 }
 
-/// `encoder` with other counts of steps, where they are given.
+/// Returns `encoder` with other numbers of steps, where given.
 fn stepped(encoder: &EncoderOptions, local_steps: Option<u32>, midpoint_steps: Option<u32>) -> EncoderOptions {
     let steps = |asked: Option<u32>, defaults: usize| asked.map_or(defaults, |steps| steps as usize);
     EncoderOptions {
@@ -191,7 +192,7 @@ fn stepped(encoder: &EncoderOptions, local_steps: Option<u32>, midpoint_steps: O
     }
 }
 
-/// The quality level that a session stays at, or none.
+/// Returns the `Quality` for a fixed quality level, or the adaptive one for `None`.
 pub(crate) fn quality(quality_level: Option<u32>) -> Quality {
     quality_level.map_or(Quality::Adaptive, |quality_level| {
         Quality::Fixed(quality_level as usize)

@@ -1,4 +1,4 @@
-//! Sessions: frames in, holograms out.
+//! Sessions, which make holograms of frames.
 
 use crate::error::{Answer, object, of_core, setting};
 use crate::frame::RawFrame;
@@ -16,7 +16,7 @@ pub struct RawSession {
     core: Core,
 }
 
-/// A session of either running mode: JavaScript has one type for both.
+/// A session of either running mode. JavaScript has one type for both.
 enum Core {
     Image(ImageSession),
     Video(VideoSession),
@@ -35,10 +35,11 @@ impl Deref for Core {
 
 #[wasm_bindgen]
 impl RawSession {
-    /// A session that runs in `mode`: `image` or `video`.
+    /// Creates a session that runs in `mode`: `image` or `video`.
     ///
     /// # Errors
-    /// `setting` and others: a mode that there is not, or options that cannot be meant or planned for.
+    /// Throws an error, of kind `setting` among others, if the mode is unknown or the options are invalid or cannot be
+    /// planned for.
     #[wasm_bindgen(constructor)]
     pub fn new(options: &RawOptions, mode: &str) -> Answer<RawSession> {
         let options = options.core.clone();
@@ -55,10 +56,10 @@ impl RawSession {
         Ok(RawSession { core })
     }
 
-    /// The hologram of a frame.
+    /// Returns the hologram of a frame.
     ///
     /// # Errors
-    /// As [`ImageSession::process`]; a late frame in a video session.
+    /// Throws an error in the cases of [`ImageSession::process`], and for a late frame in a video session.
     pub fn process(&self, frame: &RawFrame) -> Answer<RawHologram> {
         let frame = frame.frame()?;
         let made = match &self.core {
@@ -72,13 +73,13 @@ impl RawSession {
     /// Runs an empty frame through the stages.
     ///
     /// # Errors
-    /// As [`SessionHandle::warm_up`].
+    /// Throws an error in the cases of [`SessionHandle::warm_up`].
     #[wasm_bindgen(js_name = warmUp)]
     pub fn warm_up(&self) -> Answer<()> {
         self.core.warm_up().map_err(of_core)
     }
 
-    /// Forgets all frames so far.
+    /// Forgets all previous frames.
     pub fn reset(&self) {
         self.core.reset();
     }
@@ -86,13 +87,13 @@ impl RawSession {
     /// Fixes the quality level, or lets the session change it.
     ///
     /// # Errors
-    /// `setting`: a quality level that the session does not have.
+    /// Throws an error of kind `setting` if the session does not have the quality level.
     #[wasm_bindgen(js_name = setQuality)]
     pub fn set_quality(&self, quality_level: Option<u32>) -> Answer<()> {
         self.core.set_quality(quality(quality_level)).map_err(of_core)
     }
 
-    /// What the session has done so far: an object of the form `Statistics`.
+    /// Returns the statistics so far: an object of the form `Statistics`.
     pub fn statistics(&self) -> Object {
         let core = self.core.statistics();
         let count = |count: u64| JsValue::from(count as f64);

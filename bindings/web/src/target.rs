@@ -1,4 +1,4 @@
-//! What holograms are made for.
+//! The target of a hologram.
 
 use crate::error::{Answer, object, of_core, setting};
 use js_sys::{Array, Object};
@@ -6,7 +6,7 @@ use phasefront::target::Response;
 use phasefront::{Display, Target};
 use wasm_bindgen::prelude::*;
 
-/// A display, its modulator's response, its lasers' light, what corrects its optics.
+/// A display with its modulator response, laser light and correction of the optics.
 #[wasm_bindgen]
 pub struct RawTarget {
     pub(crate) core: Target,
@@ -14,21 +14,21 @@ pub struct RawTarget {
 
 #[wasm_bindgen]
 impl RawTarget {
-    /// A display in its TOML form, with levels in equal steps of phase.
+    /// Parses a display from TOML, with levels in equal phase steps.
     ///
     /// # Errors
-    /// `display`: a text that is none, or a display that cannot be.
+    /// Throws an error of kind `display` if the text is not a display or the display is invalid.
     #[wasm_bindgen(js_name = fromToml)]
     pub fn from_toml(toml: &str) -> Answer<RawTarget> {
         let core = Display::from_toml(toml).map_err(of_core)?.into();
         Ok(RawTarget { core })
     }
 
-    /// The same display, whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase
+    /// Returns the same display with a global calibration of the modulator: the i-th of 256 levels gives the phase
     /// 2πi/256.
     ///
     /// # Errors
-    /// `setting`: another number of levels.
+    /// Throws an error of kind `setting` for another number of levels.
     #[wasm_bindgen(js_name = withLookUpTable)]
     pub fn with_look_up_table(&self, levels: &[u8]) -> Answer<RawTarget> {
         let levels = <[u8; 256]>::try_from(levels).map_err(|_| {
@@ -44,20 +44,20 @@ impl RawTarget {
         Ok(RawTarget { core })
     }
 
-    /// A calibration's file.
+    /// Reads a calibration file.
     ///
     /// # Errors
-    /// As [`Target::from_bytes`].
+    /// Throws an error in the cases of [`Target::from_bytes`].
     #[wasm_bindgen(js_name = fromBytes)]
     pub fn from_bytes(file: &[u8]) -> Answer<RawTarget> {
         let core = Target::from_bytes(file).map_err(of_core)?;
         Ok(RawTarget { core })
     }
 
-    /// Its display: an object of the form `Display`.
+    /// Returns the display: an object of the form `Display`.
     pub fn display(&self) -> Object {
         let display = &self.core.display;
-        // Metres times 1e9 leave the last digit off (637.9999…).
+        // Metres times 1e9 lose the last digit (637.9999…).
         let round = |value: f64| JsValue::from((value * 1e6).round() / 1e6);
         let lasers = display.wavelengths_m().iter().map(|l| round(l * 1e9));
         object([

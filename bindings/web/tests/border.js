@@ -1,4 +1,5 @@
-// What the border refuses: each fault with its kind and the start of its one line, and that what follows is not harmed.
+// Tests that the API refuses each fault with its kind and the start of its one-line message, and that later calls still
+// work.
 import { Frame, Network, PhasefrontError, Session, Target, load, version } from "/phasefront/phasefront.js";
 
 const bytes = (n) => new Uint8Array(n).fill(90);
@@ -22,7 +23,7 @@ function refused(kind, start, call) {
   throw new Error(`not refused: ${start}`);
 }
 
-/** Runs all; throws where something is not as it should be. */
+/** Runs all tests and throws if one fails. */
 export async function run() {
   refused("session", "not loaded", () => version());
   await load();
@@ -68,7 +69,7 @@ export async function run() {
   const same = grey.data.every((level, index) => level === levels[16 * 12 + index]);
   if (levels.length !== 3 * 16 * 12 || !same || info.rangeM !== null || info.times.totalMs <= 0)
     throw new Error(JSON.stringify(info));
-  // What is seen is the field's amplitude, whose 1 is white.
+  // The view is the amplitude of the field, where 1 is white.
   const [seen, field] = [hologram.refocus(1), hologram.field(1)];
   const worst = Math.max(
     ...seen.map((amplitude, i) => Math.abs(amplitude - Math.hypot(field[2 * i], field[2 * i + 1]))),
@@ -90,7 +91,7 @@ export async function run() {
   deep.process(new Frame(colour(), depth()));
   const said = version();
 
-  // What no memory holds ends the module, in order: this call says so, and every other.
+  // A request for too much memory ends the module cleanly: this call and every later one report it.
   const huge = { target: { width: 40000, height: 40000 }, method: { kind: "sweep" }, mostPixels: 2 ** 32 - 1 };
   refused("internal", "the module cannot go on", () => new Session(huge));
   refused("internal", "the module cannot go on", () => version());

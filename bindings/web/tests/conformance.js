@@ -1,4 +1,4 @@
-// The conformance suite, run in a browser: gives the levels of each case, for the test to compare.
+// Runs the conformance suite in a browser and returns the levels of each case for the test to compare.
 import { Frame, Network, Session, Target, displayFromToml, load } from "/phasefront/phasefront.js";
 
 const bytes = async (path) => new Uint8Array(await (await fetch(path)).arrayBuffer());
@@ -46,7 +46,7 @@ function frameOf(said, memory) {
   });
 }
 
-/** The levels of each case's frames, in base64. */
+/** Returns the levels of each case's frames in base64. */
 export async function run() {
   await load();
   const { cases } = await (await fetch("/suite/cases.json")).json();

@@ -1,4 +1,4 @@
-// Compiled, not run: the types as an app sees them.
+// Checks the public types. This file is compiled but not run.
 import { Frame, Network, Session, Target, load, type Display, type SessionOptions } from "phasefront";
 
 const display: Display = { width: 640, height: 480, wavelengthsNm: [532] };
@@ -23,11 +23,11 @@ export async function show(context: CanvasRenderingContext2D, metres: Float32Arr
   return new ImageData(hologram.preview(hologram.zAt(0.5, 0.5), 640, 480), 640);
 }
 
-// @ts-expect-error: there is no such mode
+// @ts-expect-error: there is no mode `live`
 new Session(options, "live");
-// @ts-expect-error: an encoding has a kind of its own
+// @ts-expect-error: an encoding is an object with a kind
 new Session({ encoding: "anti-alias" });
-// @ts-expect-error: networks are made by name or bytes
+// @ts-expect-error: networks are created by name or from bytes
 new Network();
-// @ts-expect-error: what is raw is nobody's business
+// @ts-expect-error: `raw` is internal
 Network.builtIn().raw;

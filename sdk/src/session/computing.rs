@@ -1,16 +1,17 @@
-//! Threads that compute for a session. While they do, wgpu, tract and this crate log and trace, so handlers of the app
-//! run on them. Such a handler may call any session, but a call that waited for one there might wait for ever.
+//! Tracks which threads compute for a session. During the computation wgpu, tract and this crate log and trace, so the
+//! app's log handlers run on these threads. A handler may call any session, but a call that waits for a session could
+//! deadlock.
 
 use super::sync::thread_local;
 use phasefront_core::runtime::error::{Error, Result};
 use std::cell::Cell;
 
 thread_local! {
-    /// Work on sessions that this thread is in the midst of.
+    /// The number of nested session computations on this thread.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Marks this thread as computing until it is dropped.
+/// Marks this thread as computing until the value is dropped.
 pub(super) struct Computing(());
 
 impl Computing {
@@ -26,13 +27,13 @@ impl Drop for Computing {
     }
 }
 
-/// Whether this thread computes for a session.
+/// Checks whether this thread computes for a session.
 pub(super) fn here() -> bool {
     DEPTH.with(Cell::get) > 0
 }
 
 /// # Errors
-/// A thread that computes for a session.
+/// Returns an error if this thread computes for a session.
 pub(super) fn check() -> Result<()> {
     if here() {
         return Err(Error::Session(

@@ -1,17 +1,17 @@
-//! Why a frame becomes no hologram.
+//! The reasons for which a session drops a frame.
 
-/// Why a frame was not made into a hologram, without fault.
+/// The reason why a session dropped a frame without an error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum DropReason {
-    /// A newer frame came while it waited.
+    /// A newer frame arrived while this one waited.
     Superseded,
-    /// It came sooner than the target rate asks for.
+    /// The frame arrived sooner than the target rate allows.
     AboveTargetRate,
     /// The session was paused.
     Paused,
-    /// The session was reset before it was done.
+    /// The session was reset before the frame was finished.
     Reset,
-    /// The session was closed before it was done.
+    /// The session was closed before the frame was finished.
     Closed,
 }

@@ -1,5 +1,5 @@
-//! Where CPU and GPU meet: what takes a frame on one quality level from amplitudes and depth to levels, and which
-//! of the two it is. The one place that falls back from the GPU to the CPU.
+//! Computes the levels of a frame from amplitudes and depth at one quality level, on the CPU or the GPU. Only this
+//! module falls back from the GPU to the CPU.
 
 mod brightness;
 mod frame_io;
@@ -22,8 +22,8 @@ use on_gpu::{Failure, OnGpu};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
-/// What a session knows of its GPU: quality levels share the device, and none of them tries one again that is of no
-/// use.
+/// The GPU state of a session. Quality levels share the device, and a GPU that turned out to be unusable is not tried
+/// again.
 #[derive(Default)]
 pub(super) struct GpuState {
     #[cfg(feature = "gpu")]
@@ -32,21 +32,21 @@ pub(super) struct GpuState {
     refusal: Option<String>,
 }
 
-/// What a quality level is planned from.
+/// The inputs for planning a quality level.
 pub(super) struct LevelContext<'a> {
     pub(super) options: &'a SessionOptions,
     pub(super) quality_level: &'a QualityLevel,
     pub(super) gpu: &'a mut GpuState,
-    /// Gives up a frame on the CPU.
+    /// Cancels a frame on the CPU.
     pub(super) cancel: &'a Cancel,
 }
 
 /// The plan of a quality level.
 pub(super) struct Engine {
     processor: Processor,
-    /// Why it is the CPU though the GPU was asked for.
+    /// The reason for using the CPU although the GPU was requested.
     refusal: Option<String>,
-    /// Whether [`Engine::report`] gives something new.
+    /// Whether [`Engine::report`] has changed.
     pub(super) report_is_new: bool,
 }
 
@@ -57,10 +57,10 @@ enum Processor {
 }
 
 impl Engine {
-    /// Plans a quality level where it is asked for, or on the CPU where the GPU does not serve.
+    /// Plans a quality level for the requested backend, or for the CPU if the GPU is unusable.
     ///
     /// # Errors
-    /// What the CPU refuses too.
+    /// Returns an error if the CPU refuses the quality level too.
     pub(super) fn new(context: &mut LevelContext<'_>) -> Result<Self> {
         let asked = context.quality_level.backend.unwrap_or(context.options.backend);
         let on_cpu = |context: &LevelContext<'_>| -> Result<Processor> {
@@ -81,7 +81,7 @@ impl Engine {
         })
     }
 
-    /// The GPU, or why not.
+    /// Plans the quality level on the GPU, or returns the reason why that is impossible.
     #[cfg(feature = "gpu")]
     fn on_gpu(context: &mut LevelContext<'_>) -> Result<std::result::Result<Processor, String>> {
         let LevelContext {
@@ -109,7 +109,7 @@ impl Engine {
         Ok(Err("no GPU: this library was built without it (feature gpu)".into()))
     }
 
-    /// What runs the frames, and why.
+    /// Returns the backend that computes the frames, and the reason for it.
     pub(super) fn report(&self) -> BackendReport {
         let mut report = match &self.processor {
             Processor::Cpu(cpu) => cpu.report(),
@@ -128,11 +128,11 @@ impl Engine {
         report
     }
 
-    /// Makes the levels of a frame. Where the GPU turns out to be of no use, on the CPU, from this frame on.
+    /// Computes the levels of a frame. If the GPU turns out to be unusable, switches to the CPU from this frame on.
     ///
     /// # Errors
-    /// A frame of another shape, or one that was lost with its GPU.
-    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // The context is for falling back.
+    /// Returns an error if the frame has another shape or was lost with its GPU.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables))] // Only the fallback uses the context.
     pub(super) fn process(
         &mut self,
         context: &mut LevelContext<'_>,
@@ -159,7 +159,7 @@ impl Engine {
                     Ok(made) => Ok(made),
                     Err(Failure::Frame(why)) => Err(why),
                     Err(Failure::Gpu(why)) => {
-                        // The GPU's memory goes first.
+                        // Free the GPU's memory first.
                         gpu.release();
                         context.gpu.device = None;
                         self.refusal = Some(context.gpu.refuse(&why));
@@ -176,7 +176,7 @@ impl Engine {
 
 #[cfg(feature = "gpu")]
 impl GpuState {
-    /// The reason in words; one that holds for all quality levels is kept.
+    /// Returns the reason as text, and stores it if it holds for all quality levels.
     fn refuse(&mut self, why: &phasefront_gpu::GpuError) -> String {
         use phasefront_gpu::GpuError;
         let reason = why.to_string();
@@ -186,7 +186,7 @@ impl GpuState {
         reason
     }
 
-    /// The device that quality levels share.
+    /// Returns the device that the quality levels share.
     pub(super) fn device(&self) -> Option<std::sync::Arc<phasefront_gpu::Device>> {
         self.device.clone()
     }

@@ -1,12 +1,12 @@
-//! What a live session tells its listener.
+//! Events that a live session reports to its listener.
 
 use super::drop_reason::DropReason;
 use super::hologram::Hologram;
 use super::quality::QualityReason;
 use phasefront_core::runtime::error::Error;
 
-/// One thing that happened in a live session. Events come one after another, on the session's own thread, in the
-/// order in which things happened. While the listener is busy no frame is processed.
+/// Something that happened in a live session. Events arrive one after another, in the order in which they happened, on
+/// the session's own thread. No frame is processed while the listener is busy.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum Event {
@@ -14,30 +14,30 @@ pub enum Event {
     Processed(Hologram),
     /// A frame was dropped.
     Dropped {
-        /// Its timestamp.
-        timestamp_ns: u64,
-        /// Why.
-        reason: DropReason,
-    },
-    /// A frame could not be processed. The session goes on.
-    Failed {
-        /// Its timestamp.
-        timestamp_ns: u64,
-        /// What is wrong with it.
-        error: Error,
-    },
-    /// The frames after this one are made at another quality level.
-    QualityChanged {
         /// The timestamp of the frame.
         timestamp_ns: u64,
-        /// The quality level before.
+        /// The reason.
+        reason: DropReason,
+    },
+    /// A frame could not be processed. The session continues.
+    Failed {
+        /// The timestamp of the frame.
+        timestamp_ns: u64,
+        /// The error.
+        error: Error,
+    },
+    /// The session uses another quality level from the next frame on.
+    QualityChanged {
+        /// The timestamp of the last frame before the change.
+        timestamp_ns: u64,
+        /// The previous quality level.
         from: usize,
-        /// The quality level now; the one before where the step was [`QualityReason::Refused`].
+        /// The new quality level; the previous one if the reason is [`QualityReason::Refused`].
         to: usize,
-        /// Why.
+        /// The reason.
         reason: QualityReason,
     },
-    /// The session is closed and its memory is given back. This is the last event, told exactly once, also where
+    /// The session is closed and its memory is freed. This is the last event, reported exactly once, even if
     /// [`super::SessionHandle::close`] does not wait for it.
     Closed,
 }

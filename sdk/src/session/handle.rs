@@ -1,4 +1,4 @@
-//! Controls of a session that all three kinds share.
+//! The controls that all three kinds of session share.
 
 use super::computing::{self, Computing};
 #[cfg(doc)]
@@ -14,25 +14,26 @@ use phasefront_core::runtime::error::Result;
 use std::fmt::{Debug, Formatter};
 use std::sync::{Arc, Mutex};
 
-/// Controls a session: every kind of session dereferences to it. A clone controls the same session from any thread, a
-/// listener's too. It does not keep the session open: a session closes when it is dropped, whatever handles there are.
+/// Controls a session. Every kind of session dereferences to it. A clone controls the same session from any thread,
+/// including a listener's. It does not keep the session open: a session closes when it is dropped, even if handles
+/// remain.
 #[derive(Clone)]
 pub struct SessionHandle {
     pub(super) shared: Arc<Shared>,
     pub(super) frames: Frames,
 }
 
-/// What lets frames into a session.
+/// The way in which frames enter a session.
 #[derive(Clone)]
 pub(super) enum Frames {
-    /// Each is answered while its caller waits.
+    /// The caller waits for the result of each frame.
     Answered(Arc<Mutex<Gate>>),
-    /// A thread takes them from a queue.
+    /// A thread takes frames from a queue.
     Live(Arc<Live<LiveWork>>),
 }
 
 impl SessionHandle {
-    /// Lets `work` have the stages, once nobody else has them.
+    /// Runs `work` with exclusive access to the stages.
     pub(super) fn with_stages<T>(&self, work: impl FnOnce(&mut Option<Stages>) -> Result<T>) -> Result<T> {
         self.shared.process.check()?;
         computing::check()?;
@@ -40,7 +41,7 @@ impl SessionHandle {
             let _computing = Computing::begin();
             work(&mut lock(&self.shared.stages))
         };
-        // A handler of logs that closed the session meanwhile did not wait.
+        // A log handler that closed the session in the meantime did not wait.
         if let Frames::Answered(gate) = &self.frames
             && lock(gate).closed
         {
@@ -49,10 +50,11 @@ impl SessionHandle {
         result
     }
 
-    /// Runs an empty frame through the stages, so that the first real one is as fast as the others. Waits for it.
+    /// Runs an empty frame through the stages and waits for it, so that the first real frame is as fast as the others.
     ///
     /// # Errors
-    /// A session that is closed, a call by a handler of logs while a session computes, or a panic inside.
+    /// Returns an error if the session is closed, if a log handler makes the call while a session computes, or if the
+    /// computation panics.
     pub fn warm_up(&self) -> Result<()> {
         self.with_stages(|stages| {
             let stages = stages.as_mut().ok_or_else(queue::closed)?;
@@ -64,9 +66,10 @@ impl SessionHandle {
         })
     }
 
-    /// Forgets all frames so far: what waits or is in flight is dropped, and the next frame, of any timestamp, is the
-    /// first again. A frame that is being computed is given up, on the CPU within a row, tile or plane of its work; a
-    /// GPU and a network on tract end it first. The `process` that waits for it then gives an error.
+    /// Forgets all previous frames: drops the frames that wait or are in flight, and treats the next frame, with any
+    /// timestamp, as the first. A frame that is being computed is cancelled: on the CPU within a row, tile or plane of
+    /// its work; a GPU or a network on tract finishes it first. The `process` call that waits for it then returns an
+    /// error.
     pub fn reset(&self) {
         match &self.frames {
             Frames::Answered(gate) => lock(gate).reset(),
@@ -74,8 +77,8 @@ impl SessionHandle {
         }
     }
 
-    /// Takes no frames until [`Self::resume`]. A live session drops what waits, ends what is in flight, and drops what
-    /// is submitted; the others refuse to process.
+    /// Stops taking frames until [`Self::resume`]. A live session drops the waiting frame, finishes the frame in
+    /// flight, and drops frames that are submitted; the other sessions refuse to process.
     pub fn pause(&self) {
         match &self.frames {
             Frames::Answered(gate) => lock(gate).paused = true,
@@ -83,7 +86,7 @@ impl SessionHandle {
         }
     }
 
-    /// Takes frames again.
+    /// Resumes taking frames.
     pub fn resume(&self) {
         match &self.frames {
             Frames::Answered(gate) => lock(gate).paused = false,
@@ -94,11 +97,11 @@ impl SessionHandle {
         }
     }
 
-    /// Takes no more frames and gives the memory back; the statistics stay. A frame that is being computed is given up,
-    /// as by [`Self::reset`]. A live session drops what waits or is in flight; when this returns, its listener has
-    /// heard everything, [`Event::Closed`](super::Event::Closed) last, and will not be called again. Called by a
-    /// listener, of this session or another, or by a handler of logs while a session computes, it does not wait for
-    /// that. Results that were handed out stay valid. Dropping a session closes it.
+    /// Stops taking frames and frees the memory; the statistics remain. A frame that is being computed is cancelled as
+    /// by [`Self::reset`]. A live session drops the frames that wait or are in flight. When this function returns, the
+    /// listener has received all events, [`Event::Closed`](super::Event::Closed) last, and will not be called again. It
+    /// does not wait for that if it is called by a listener, of this session or another, or by a log handler while a
+    /// session computes. Results that were handed out stay valid. Dropping a session closes it.
     pub fn close(&self) {
         match &self.frames {
             Frames::Answered(gate) => {
@@ -111,15 +114,15 @@ impl SessionHandle {
         }
     }
 
-    /// Says how hot the device is; an adaptive session follows it from the next frame on.
+    /// Sets the thermal state of the device, which an adaptive session follows from the next frame on.
     pub fn set_thermal(&self, thermal: Thermal) {
         lock(&self.shared.control).thermal = thermal;
     }
 
-    /// Allows or forbids changes of the quality level, from the next frame on.
+    /// Allows or forbids changes of the quality level from the next frame on.
     ///
     /// # Errors
-    /// A quality level that the session does not have.
+    /// Returns an error if the session does not have the quality level.
     pub fn set_quality(&self, quality: Quality) -> Result<()> {
         let mut control = lock(&self.shared.control);
         quality.check(control.quality_levels)?;
@@ -127,9 +130,9 @@ impl SessionHandle {
         Ok(())
     }
 
-    /// The GPU that frames are computed on, if it is one; waits for a frame that is being processed, and gives none to
-    /// a handler of logs while a session computes. Its [`phasefront_gpu::Device::programs`], kept for [`GpuOptions`] of
-    /// the next start, save compiling.
+    /// Returns the GPU that computes the frames, if there is one. Waits for a frame that is being processed; returns
+    /// `None` to a log handler that calls it while a session computes. Its [`phasefront_gpu::Device::programs`] can be
+    /// stored and passed to [`GpuOptions`] at the next start, to save compiling.
     #[cfg(feature = "gpu")]
     #[doc(hidden)]
     pub fn gpu(&self) -> Option<Arc<phasefront_gpu::Device>> {
@@ -137,7 +140,7 @@ impl SessionHandle {
         gpu.ok().flatten()
     }
 
-    /// What the session has done so far. Never waits for a frame.
+    /// Returns the statistics so far. Never waits for a frame.
     pub fn statistics(&self) -> Statistics {
         let counts = match &self.frames {
             Frames::Answered(gate) => lock(gate).counts,

@@ -1,4 +1,4 @@
-//! A session's result: a handle whose planes are read in place and whose memory goes back to the session.
+//! The result of a session: a hologram whose planes are read in place and whose memory returns to the session.
 
 use super::computing::{self, Computing};
 use super::live::lock;
@@ -14,10 +14,10 @@ use phasefront_core::view::preview::{Preview, PreviewScratch, check_screen};
 use phasefront_core::view::refocus::seen_field;
 use std::sync::{Arc, Mutex, Weak};
 
-/// Buffers that a session keeps for the results to come; what is over goes back to the system.
+/// The number of buffers that a session keeps for future results. Further buffers are freed.
 const KEPT: usize = 4;
 
-/// Memory that results give back.
+/// A pool for the buffers of dropped results.
 #[derive(Debug)]
 pub(super) struct Pool<T>(Arc<Mutex<Vec<Vec<T>>>>);
 
@@ -28,10 +28,10 @@ impl<T> Default for Pool<T> {
 }
 
 impl<T: Copy + Default> Pool<T> {
-    /// A buffer of `len` values of any content.
+    /// Returns a buffer of `len` values with arbitrary content.
     pub(super) fn take(&self, len: usize) -> Pooled<T> {
         let mut kept = lock(&self.0);
-        // Buffers of another quality level's size are of no use any more.
+        // Buffers sized for another quality level are no longer needed.
         kept.retain(|buffer| buffer.len() == len);
         let values = kept.pop().unwrap_or_else(|| vec![T::default(); len]);
         Pooled {
@@ -41,7 +41,7 @@ impl<T: Copy + Default> Pool<T> {
     }
 }
 
-/// A buffer that goes back to its pool.
+/// A buffer that returns to its pool when it is dropped.
 #[derive(Debug)]
 pub(super) struct Pooled<T> {
     pub(super) values: Vec<T>,
@@ -59,11 +59,11 @@ impl<T> Drop for Pooled<T> {
     }
 }
 
-/// What looking at results needs; shared by all of a session's.
+/// The state for computing views, shared by all results of a session.
 pub(super) struct Viewer {
     process: ProcessId,
     target: Target,
-    /// The session's threads, so that views are computed on no others.
+    /// The session's threads, on which views are computed.
     pool: Arc<Threads>,
     plan: Mutex<Option<ViewPlan>>,
 }
@@ -86,15 +86,15 @@ impl Viewer {
     }
 }
 
-/// The hologram of one frame: modulator levels and what is known of them. Cheap to keep and to send to another thread;
-/// its memory goes back to the session when it is dropped, also after the session's end.
+/// The hologram of one frame: modulator levels and their metadata. It is cheap to keep and to send to another thread.
+/// Its memory returns to the session when it is dropped, even after the session's end.
 pub struct Hologram {
     pub(super) timestamp_ns: u64,
     pub(super) shape: (usize, usize),
     pub(super) levels: Pooled<u8>,
-    /// Where the display has over 8 bits.
+    /// The levels of a display with more than 8 bits.
     pub(super) words: Option<Pooled<u16>>,
-    /// d·65535.
+    /// Normalized depth as d·65535.
     pub(super) depth: Pooled<u16>,
     pub(super) scale: f32,
     pub(super) times: FrameTimes,
@@ -116,33 +116,34 @@ impl std::fmt::Debug for Hologram {
 }
 
 impl Hologram {
-    /// The frame's timestamp.
+    /// Returns the timestamp of the frame.
     pub fn timestamp_ns(&self) -> u64 {
         self.timestamp_ns
     }
 
-    /// (H, W).
+    /// Returns the shape (H, W).
     pub fn shape(&self) -> (usize, usize) {
         self.shape
     }
 
-    /// How many colours its levels have, C.
+    /// Returns C, the number of colours of the levels.
     pub fn colours(&self) -> usize {
         self.viewer.target.display.colours()
     }
 
-    /// The modulator levels, (C, H, W): red, green, blue, or those of the one laser; of a display of over 8 bits the
-    /// upper 8.
+    /// Returns the modulator levels, (C, H, W): red, green and blue, or those of the only laser. For a display with
+    /// more than 8 bits, these are the upper 8 bits.
     pub fn levels(&self) -> &[u8] {
         &self.levels.values
     }
 
-    /// The levels of a display of over 8 bits, (C, H, W), whose upper 8 bits [`Self::levels`] has; None for others.
+    /// Returns the levels of a display with more than 8 bits, (C, H, W), or `None` for other displays. [`Self::levels`]
+    /// has their upper 8 bits.
     pub fn words(&self) -> Option<&[u16]> {
         self.words.as_ref().map(|words| &words.values[..])
     }
 
-    /// The levels as [`phasefront_core::output::Output`] takes them.
+    /// Returns the levels in the form that [`phasefront_core::output::Output`] takes.
     pub fn output_levels(&self) -> Levels<'_> {
         match self.words() {
             Some(words) => Levels::Words(words),
@@ -150,10 +151,10 @@ impl Hologram {
         }
     }
 
-    /// The levels of one colour, (H, W): 0 red, 1 green, 2 blue, or 0 of one laser.
+    /// Returns the levels of one colour, (H, W): 0 is red, 1 green, 2 blue; with one laser, 0 is its plane.
     ///
     /// # Errors
-    /// Another colour.
+    /// Returns an error for any other colour.
     pub fn plane(&self, colour: usize) -> Result<&[u8]> {
         let size = self.shape.0 * self.shape.1;
         self.levels()
@@ -165,38 +166,38 @@ impl Hologram {
             })
     }
 
-    /// The amplitude that full light stands for.
+    /// Returns the amplitude that full light represents.
     pub fn scale(&self) -> f32 {
         self.scale
     }
 
-    /// How long each stage took.
+    /// Returns the time that each stage took.
     pub fn times(&self) -> FrameTimes {
         self.times
     }
 
-    /// Metres at the near and the far end of the volume; None for normalized depth.
+    /// Returns the distances of the near and the far end of the volume in metres; `None` for normalized depth.
     pub fn range_m(&self) -> Option<(f32, f32)> {
         self.range_m
     }
 
-    /// The share of the depth sensor's pixels that had a usable reading.
+    /// Returns the share of the depth sensor's pixels that had a usable reading.
     pub fn valid_depth(&self) -> f32 {
         self.valid_depth
     }
 
-    /// The quality level that it was made at, 0 the best.
+    /// Returns the quality level of the hologram; 0 is the best.
     pub fn quality_level(&self) -> usize {
         self.quality_level
     }
 
-    /// What it is for.
+    /// Returns the target of the hologram.
     pub fn target(&self) -> &Target {
         &self.viewer.target
     }
 
-    /// z of what is seen at (`x`, `y`) of the picture, each 0 to 1 from its upper left corner, metres: where to focus
-    /// when it is tapped on. What lies beyond an edge is the edge.
+    /// Returns the z in metres of the scene point at (`x`, `y`) of the picture, for example to focus where the user
+    /// taps. Coordinates run from 0 to 1 from the upper left corner; values outside are clamped to the edge.
     pub fn z_at(&self, x: f64, y: f64) -> f64 {
         let (height, width) = self.shape;
         let at = |share: f64, n: usize| ((share.clamp(0.0, 1.0) * n as f64) as usize).min(n - 1);
@@ -204,21 +205,23 @@ impl Hologram {
         self.viewer.target.display.z_of_depth(f64::from(d) / 65535.0)
     }
 
-    /// Bytes of the image that [`Self::preview`] fills.
+    /// Returns the number of bytes of the image that [`Self::preview`] fills.
     ///
     /// # Errors
-    /// A preview over 2²⁶ pixels, or over 2¹⁴ a side.
+    /// Returns an error if the preview has over 2²⁶ pixels or a side over 2¹⁴.
     pub fn preview_bytes(height: usize, width: usize) -> Result<usize> {
         check_screen((height, width))?;
         Ok(4 * height * width)
     }
 
-    /// What an eye focused at `z_m` sees, as (`height`, `width`) rows of red, green, blue, alpha 255 into `rgba`. The
-    /// plan is kept for the next call, of this or another result of the session, with the same z and size.
+    /// Fills `rgba` with the view of an eye focused at `z_m`: `height` rows of `width` pixels of red, green, blue and
+    /// alpha 255. The plan is kept for the next call with the same z and size, on this or another result of the
+    /// session.
     ///
     /// # Errors
-    /// An empty image or one over 2²⁶ pixels or 2¹⁴ a side, a length of `rgba` other than 4·height·width, a z too far
-    /// away, a process that was forked from the session's, or a call by a handler of logs while a session computes.
+    /// Returns an error if the image is empty, has over 2²⁶ pixels or a side over 2¹⁴, if the length of `rgba` is not
+    /// 4·height·width, if z is too far away, in a process that was forked from the session's, or if a log handler makes
+    /// the call while a session computes.
     pub fn preview(&self, z_m: f64, height: usize, width: usize, rgba: &mut [u8]) -> Result<()> {
         if rgba.len() != Self::preview_bytes(height, width)? {
             return Err(Error::Setting(format!(
@@ -229,7 +232,8 @@ impl Hologram {
         self.viewer.process.check()?;
         computing::check()?;
         let _computing = Computing::begin();
-        // Locked before the pool is entered, whose threads may else take up another view while this one waits.
+        // Lock the plan before entering the pool, whose threads could otherwise start another view while this one
+        // waits.
         let mut plan = lock(&self.viewer.plan);
         let fits = |plan: &&mut ViewPlan| {
             plan.shape == self.shape && plan.z_m == z_m && plan.preview.screen() == (height, width)
@@ -256,23 +260,24 @@ impl Hologram {
         Ok(())
     }
 
-    /// The field that the levels make behind the aperture, through the optics, at `z_m`, (C, H, W): 0 is the midpoint.
-    /// Without the carrier exp(i2πz/λ). Six transforms of padded planes: a view for study, not for every frame.
+    /// Returns the field that the levels produce behind the aperture, through the optics, at `z_m`, (C, H, W); z = 0 is
+    /// the midpoint. The carrier exp(i2πz/λ) is left out. This takes six transforms of padded planes; use it for study,
+    /// not for every frame.
     ///
     /// # Errors
-    /// A z too far away, whose padded plane would have over 2²⁷ values, or a process that was forked from the
-    /// session's.
+    /// Returns an error if z is so far away that the padded plane would have over 2²⁷ values, or in a process that was
+    /// forked from the session's.
     pub fn field(&self, z_m: f64) -> Result<Vec<Complex32>> {
         self.viewer.process.check()?;
         let seen = || seen_field(self.output_levels(), self.scale, self.target(), self.shape, z_m);
         self.viewer.pool.install(seen)
     }
 
-    /// What an eye focused at `z_m` sees, at full resolution, as amplitudes (C, H, W) of which 1 is white:
-    /// [`Self::field`] without its phases.
+    /// Returns the view of an eye focused at `z_m` at full resolution, as amplitudes (C, H, W) where 1 is white: the
+    /// absolute values of [`Self::field`].
     ///
     /// # Errors
-    /// As [`Self::field`].
+    /// Returns an error in the same cases as [`Self::field`].
     pub fn refocus(&self, z_m: f64) -> Result<Vec<f32>> {
         let amplitudes = |field: Vec<Complex32>| field.iter().map(|value| value.norm()).collect();
         self.field(z_m).map(amplitudes)

@@ -1,5 +1,5 @@
-//! The thread of a live session: takes frames from the queue, processes them, tells the listener. What processing is,
-//! is not known here.
+//! The thread of a live session, which takes frames from the queue, processes them and reports to the listener. It does
+//! not know how frames are processed.
 
 use super::computing;
 use super::drop_reason::DropReason;
@@ -12,24 +12,24 @@ use phasefront_core::runtime::error::{Error, Result};
 use std::cell::Cell;
 use std::sync::PoisonError;
 
-/// What a live session does with its frames.
+/// The work that a live session does on its frames.
 pub(super) trait Work: Send + 'static {
     /// A frame in the session's own memory.
     type Frame: Send + 'static;
-    /// What it becomes.
+    /// The result of a frame.
     type Output;
 
-    /// Makes `frame` into what it becomes; `fresh` says that it has no past.
+    /// Processes `frame`; `fresh` means that it has no past.
     fn process(&mut self, frame: &Self::Frame, fresh: bool) -> Result<Self::Output>;
 
-    /// Makes good what a panic may have left half done.
+    /// Restores a consistent state after a panic.
     fn recover(&mut self);
 
-    /// What gives up a frame while it is processed.
+    /// Returns the handle that cancels a frame while it is processed.
     fn cancel(&self) -> Cancel;
 }
 
-/// What the listener of a [`Live`] hears.
+/// A report to the listener of a [`Live`].
 #[derive(Debug)]
 pub(super) enum Report<O> {
     Done {
@@ -44,16 +44,16 @@ pub(super) enum Report<O> {
         timestamp_ns: u64,
         error: Error,
     },
-    /// The listener itself panicked at the report before.
+    /// The listener panicked while it handled the previous report.
     ListenerPanicked,
-    /// Nothing follows but [`Report::ListenerPanicked`] of this one.
+    /// The session is closed. Only a [`Report::ListenerPanicked`] for this report can follow.
     Closed,
 }
 
 struct Shared<F> {
     queue: Mutex<Queue<F>>,
     wake: Condvar,
-    /// Memory for frames to come; None when none will.
+    /// Memory for future frames; `None` after the session's end.
     spare: Mutex<Option<Vec<F>>>,
 }
 
@@ -67,16 +67,16 @@ impl<F> Shared<F> {
     }
 }
 
-/// Most frames that are kept for their memory: as many as there are with one camera, being copied, waiting and in
-/// flight. A burst from many threads has more for a moment.
+/// The maximum number of frames kept for their memory: with one camera, one is being copied, one waits and one is in
+/// flight. A burst from many threads may briefly use more.
 const KEPT: usize = 3;
 
-/// Locks also after a panic: what is behind these locks is whole between any two statements.
+/// Locks `mutex` even after a panic: the data behind these locks is consistent between any two statements.
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// `process`, with a panic made an error.
+/// Runs `process` and converts a panic to an error. Also returns whether it panicked.
 pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, bool) {
     match caught(process) {
         Ok(result) => (result, false),
@@ -85,7 +85,7 @@ pub(super) fn guarded<O>(process: impl FnOnce() -> Result<O>) -> (Result<O>, boo
 }
 
 thread_local! {
-    /// Whether this is the thread of a live session, which its listener is called on.
+    /// Whether this is the thread of a live session, which calls its listener.
     static LISTENS: Cell<bool> = const { Cell::new(false) };
 }
 
@@ -100,7 +100,7 @@ impl<W: Work> Live<W> {
     /// Starts the thread.
     ///
     /// # Errors
-    /// A thread that cannot be started.
+    /// Returns an error if the thread cannot be started.
     pub(super) fn start(
         work: W,
         period_ns: Option<u64>,
@@ -125,17 +125,17 @@ impl<W: Work> Live<W> {
         })
     }
 
-    /// Lets a frame in: `fill` makes it, from memory of an earlier one where there is some. Never waits for a frame to
-    /// be processed. Gives why it was dropped, if it was.
+    /// Submits a frame, which `fill` creates from the memory of an earlier frame, if available. Never waits for a frame
+    /// to be processed. Returns the reason if the frame was dropped.
     ///
     /// # Errors
-    /// A closed session, or a frame that is not later than the last.
+    /// Returns an error if the session is closed or the frame is not later than the last.
     pub(super) fn submit(
         &self,
         timestamp_ns: u64,
         fill: impl FnOnce(Option<W::Frame>) -> W::Frame,
     ) -> Result<Option<DropReason>> {
-        /// An admitted frame is put or, should copying panic, given up: the thread waits for each at the end.
+        /// Gives up an admitted frame if copying panics. The thread waits for every admitted frame at the end.
         struct Copying<'a, F>(&'a Shared<F>, Option<Ticket>);
         impl<F> Drop for Copying<'_, F> {
             fn drop(&mut self) {
@@ -163,21 +163,21 @@ impl<W: Work> Live<W> {
         Ok(None)
     }
 
-    /// What `change` does to the queue; the thread hears of it. A frame that it gives back is kept for its memory.
+    /// Applies `change` to the queue and wakes the thread. Keeps the memory of a frame that `change` returns.
     pub(super) fn change(&self, change: impl FnOnce(&mut Queue<W::Frame>) -> Option<W::Frame>) {
         let unneeded = change(&mut lock(&self.shared.queue));
         self.keep(unneeded);
     }
 
-    /// What `look` sees of the queue.
+    /// Returns the result of `look` on the queue.
     pub(super) fn look<T>(&self, look: impl FnOnce(&Queue<W::Frame>) -> T) -> T {
         look(&lock(&self.shared.queue))
     }
 
-    /// Drops what is on its way and ends the thread; when it is back, all events have been told. Called by a listener
-    /// it does not wait for that: not for its own thread, which cannot end before it returns, nor for another's, whose
-    /// listener may be waiting for this one. Nor does it wait on a thread that computes, which the session's may be
-    /// waiting for.
+    /// Drops all pending frames and ends the thread; when this returns, all events have been reported. It does not wait
+    /// for that on the thread of any live session, this one's or another's: its own thread cannot end before this
+    /// returns, and another listener may be waiting for this one. It does not wait on a thread that computes either,
+    /// because the session's thread may be waiting for that thread.
     pub(super) fn close(&self) {
         if !self.process.is_current() {
             return;
@@ -186,7 +186,7 @@ impl<W: Work> Live<W> {
         if LISTENS.with(Cell::get) || computing::here() {
             return;
         }
-        // Held while joining, so that whoever closes too waits as well.
+        // The lock is held while joining, so that concurrent callers wait too.
         if let Some(thread) = lock(&self.thread).take() {
             // Panics of work and listener are caught inside.
             let _ = thread.join();
@@ -235,7 +235,7 @@ fn run<W: Work>(shared: &Shared<W::Frame>, mut work: W, mut listener: impl FnMut
         drop(queue);
         match next {
             Next::End => {
-                // The memory goes back before the last event.
+                // Free the memory before the last event.
                 let _ = caught(|| drop(work));
                 lock(&shared.spare).take();
                 tell(Report::Closed);
@@ -269,7 +269,7 @@ mod tests {
     use std::sync::atomic::{AtomicU64, Ordering};
     use std::sync::mpsc;
 
-    /// Work that costs a few turns of the scheduler, fails at times and panics at times.
+    /// Work that yields a few times and sometimes fails or panics.
     struct Fake {
         random: ChaCha8Rng,
         broken: bool,
@@ -288,7 +288,7 @@ mod tests {
                 0 => Err(Error::Frame("bad".into())),
                 1 => {
                     self.broken = true;
-                    // Without the hook's message on stderr.
+                    // This avoids the hook's message on stderr.
                     std::panic::resume_unwind(Box::new("worse"))
                 }
                 _ => Ok(frame[0]),
@@ -304,7 +304,7 @@ mod tests {
         }
     }
 
-    /// Two cameras, one that resets and pauses, and a close at any moment, on real threads.
+    /// Two cameras, one thread that resets and pauses, and a close at a random moment, on real threads.
     #[test]
     fn any_schedule_ends_with_every_frame_told() {
         for seed in 0..1500 {
@@ -343,7 +343,7 @@ mod tests {
                     scope.spawn(|| {
                         for _ in 0..frames {
                             let now = clock.fetch_add(1, Ordering::Relaxed);
-                            // Closed or late: refused.
+                            // A closed session or a late frame is refused.
                             let _ = live.submit(now, |spare: Option<Vec<u64>>| {
                                 let mut frame = spare.unwrap_or_default();
                                 frame.clear();
@@ -413,7 +413,7 @@ mod tests {
         assert!(done > 300 && internal > 5);
     }
 
-    /// What is told of two sessions goes to listeners that close the other one.
+    /// Two sessions have listeners that close each other's session.
     #[test]
     fn listeners_may_close_each_others_session() {
         let fake = || Fake {
@@ -442,7 +442,7 @@ mod tests {
         }
     }
 
-    /// Copying that panics leaves no frame behind that the thread would wait for.
+    /// A panic while copying leaves no frame that the thread would wait for.
     #[test]
     fn a_frame_that_cannot_be_copied_is_given_up() {
         let fake = Fake {

@@ -1,4 +1,4 @@
-//! What the thread of a live session does with frames, and what its listener hears.
+//! Processes the frames of a live session and converts the results to events.
 
 use super::computing::Computing;
 use super::event::Event;
@@ -44,7 +44,7 @@ impl Drop for LiveWork {
     }
 }
 
-/// Tells `listener` the events of a report.
+/// Passes the events of a report to `listener`.
 pub(super) fn tell(shared: &Shared, listener: &mut dyn FnMut(Event), report: Report<FrameResult>) {
     match report {
         Report::Done { timestamp_ns, output } => {

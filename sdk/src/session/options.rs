@@ -1,4 +1,4 @@
-//! What a session makes, and how.
+//! The options of a session.
 
 #[cfg(feature = "gpu")]
 use super::engine::GpuOptions;
@@ -10,47 +10,49 @@ use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
 use std::num::NonZeroUsize;
 
-/// What a session makes, and how. [`SessionOptions::new`] gives the defaults; change what differs.
+/// The options of a session. [`SessionOptions::new`] sets the defaults.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct SessionOptions {
-    /// What holograms are for.
+    /// The target of the holograms.
     pub target: Target,
-    /// Quality levels, the best first, [`Self::MOST_QUALITY_LEVELS`] at most.
+    /// The quality levels, best first; at most [`Self::MOST_QUALITY_LEVELS`].
     pub quality_levels: Vec<QualityLevel>,
     /// Whether the session may change its quality level by itself.
     pub quality: Quality,
-    /// Frames a second that are aimed at: a live session drops frames that come sooner, and an adaptive one steps down
-    /// where it cannot hold it. None takes every frame and never steps.
+    /// The target rate in frames per second. A live session drops frames that arrive sooner; an adaptive session steps
+    /// down if it cannot hold the rate. With `None`, a session takes every frame and does not adapt its quality level
+    /// to frame times.
     pub target_rate_hz: Option<f64>,
-    /// How fields become levels.
+    /// The conversion of fields to levels.
     pub encoder: EncoderOptions,
-    /// What becomes of depth.
+    /// The processing of depth.
     pub depth: DepthOptions,
-    /// Where frames are computed, unless their quality level says it.
+    /// The backend of quality levels that do not set their own.
     pub backend: Backend,
-    /// Which GPU, and how.
+    /// The options of the GPU.
     #[cfg(feature = "gpu")]
     pub gpu: GpuOptions,
-    /// Threads to compute with, [`Self::MOST_THREADS`] at most; None for as many as the device has, and no more than
-    /// that.
+    /// The number of threads to compute with, at most [`Self::MOST_THREADS`]; with `None`, as many as the device has,
+    /// up to that maximum.
     pub threads: Option<NonZeroUsize>,
-    /// Most pixels of a quality level and of the modulator: what a session allocates is a multiple of them.
+    /// The maximum number of pixels of a quality level and of the modulator. The memory of a session is a multiple of
+    /// it.
     pub most_pixels: usize,
 }
 
 impl SessionOptions {
-    /// Most threads of a session's pool. A live session has one more.
+    /// The maximum number of threads in a session's pool. A live session has one more thread.
     pub const MOST_THREADS: usize = 256;
 
-    /// Most quality levels of a session: each is planned once when the session is made.
+    /// The maximum number of quality levels. Each is planned once when the session is created.
     pub const MOST_QUALITY_LEVELS: usize = 16;
 
-    /// The default of [`Self::most_pixels`]: 8192×4096, which holds 8K UHD.
+    /// The default of [`Self::most_pixels`]: 8192×4096, which includes 8K UHD.
     pub const MOST_PIXELS: usize = 1 << 25;
 
-    /// Holograms of the modulator's resolution by `method`: AA-DPM, smoothed brightness, near and far by percentiles,
-    /// no target rate.
+    /// Returns the default options for holograms at the modulator's resolution by `method`: AA-DPM, smoothed
+    /// brightness, near and far limits by percentiles, no target rate.
     pub fn new(target: impl Into<Target>, method: Method) -> Self {
         let target = target.into();
         let (height, width) = target.modulator();

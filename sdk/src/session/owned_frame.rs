@@ -1,12 +1,12 @@
-//! A camera frame copied into the session's own memory: what a live session keeps when the camera takes its buffer
-//! back.
+//! A copy of a camera frame in the session's own memory, which a live session keeps when the camera reclaims its
+//! buffer.
 
 use phasefront_core::depth::camera::{Alignment, CameraFrame};
 use phasefront_core::depth::image::{ConfidenceFormat, DepthFormat, DepthImage};
 use phasefront_core::frame::{ColourFormat, ColourImage, Orientation, Plane};
 use phasefront_core::runtime::error::Result;
 
-/// Memory of one plane, with its strides.
+/// The memory and strides of one plane.
 #[derive(Debug, Default)]
 struct OwnedPlane {
     bytes: Vec<u8>,
@@ -27,7 +27,7 @@ impl OwnedPlane {
     }
 }
 
-/// What is not in the planes.
+/// The properties of a frame other than its planes.
 #[derive(Debug)]
 struct Description {
     timestamp_ns: u64,
@@ -38,7 +38,7 @@ struct Description {
     alignment: Alignment,
 }
 
-/// A copied frame; its memory serves the next.
+/// A copied frame, whose memory is reused for the next.
 #[derive(Debug)]
 pub(super) struct OwnedFrame {
     description: Description,
@@ -48,7 +48,7 @@ pub(super) struct OwnedFrame {
 }
 
 impl OwnedFrame {
-    /// Copies `frame` into the memory of an earlier one, where there is some.
+    /// Copies `frame`, into the memory of an earlier one if available.
     pub(super) fn copy(frame: &CameraFrame<'_>, spare: Option<OwnedFrame>) -> Self {
         let description = Description {
             timestamp_ns: frame.timestamp_ns,
@@ -77,10 +77,10 @@ impl OwnedFrame {
         copy
     }
 
-    /// The frame, borrowed.
+    /// Returns the frame, borrowed from this copy.
     ///
     /// # Errors
-    /// None that the original had not.
+    /// Returns an error only if the original frame was invalid.
     pub(super) fn frame(&self) -> Result<CameraFrame<'_>> {
         let d = &self.description;
         let (format, (height, width)) = d.colour;

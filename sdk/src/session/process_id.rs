@@ -1,26 +1,26 @@
-//! The process that a session was made in. A fork copies a session but not its threads, so that its copy would wait for
-//! them for ever.
+//! The process that created a session. A fork copies a session but not its threads, so the copy would wait for them
+//! forever.
 
 use phasefront_core::runtime::error::{Error, Result};
 
-/// A process.
+/// The ID of a process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ProcessId(u32);
 
 impl ProcessId {
-    /// The one that runs.
+    /// Returns the current process.
     pub(super) fn current() -> Self {
-        // Only Unix forks processes, and WebAssembly has no ids.
+        // Only Unix forks processes, and WebAssembly has no process IDs.
         ProcessId(if cfg!(unix) { std::process::id() } else { 0 })
     }
 
-    /// Whether this is still the process.
+    /// Checks whether this is the current process.
     pub(super) fn is_current(self) -> bool {
         self == ProcessId::current()
     }
 
     /// # Errors
-    /// Another process.
+    /// Returns an error in another process.
     pub(super) fn check(self) -> Result<()> {
         if !self.is_current() {
             return Err(Error::Session(

@@ -1,4 +1,4 @@
-//! Quality levels, and when a session changes between them.
+//! Quality levels and the rules for changing between them.
 
 use super::SessionOptions;
 use phasefront_core::encode::EncoderOptions;
@@ -6,56 +6,56 @@ use phasefront_core::method::Method;
 use phasefront_core::runtime::error::{Error, Result};
 use std::time::Duration;
 
-/// One quality: a method, a resolution, and how levels are made. A hologram smaller than the modulator is shown in its
-/// middle.
+/// A quality level: a method, a resolution and an encoder. A hologram smaller than the modulator is displayed in its
+/// centre.
 #[derive(Debug, Clone)]
 pub struct QualityLevel {
-    /// What makes the midpoint hologram.
+    /// The method that computes the midpoint hologram.
     pub method: Method,
-    /// Height of the hologram, pixels.
+    /// The height of the hologram in pixels.
     pub height: usize,
-    /// Width of the hologram, pixels.
+    /// The width of the hologram in pixels.
     pub width: usize,
-    /// Where it is computed; None for where all of the session is.
+    /// The backend; `None` for the session's backend.
     pub backend: Option<Backend>,
-    /// How its field becomes levels; None for what the session has. So a quality level may have fewer steps of
-    /// correction.
+    /// The conversion of the field to levels; `None` for the session's encoder. For example, a lower quality level can
+    /// use fewer correction steps.
     pub encoder: Option<EncoderOptions>,
 }
 
 impl QualityLevel {
-    /// How its field becomes levels in a session of `options`.
+    /// Returns the encoder of this quality level in a session with `options`.
     pub(super) fn encoder<'a>(&'a self, options: &'a SessionOptions) -> &'a EncoderOptions {
         self.encoder.as_ref().unwrap_or(&options.encoder)
     }
 }
 
-/// Where frames are computed.
+/// The backend that computes frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Backend {
-    /// On the CPU.
+    /// Computes on the CPU.
     #[default]
     Cpu,
-    /// On the GPU, where this library was built for it (feature `gpu`), there is one, and it answers as the CPU does;
-    /// else on the CPU. Levels over 8 bits, sweeps whose steps have over 21 taps, and methods chosen automatically are
-    /// the CPU's. [`super::Statistics::backend`] says which it is, and why.
+    /// Computes on the GPU if the library was built with the feature `gpu`, a GPU exists and its results agree with the
+    /// CPU's; otherwise on the CPU. The CPU also computes levels over 8 bits, sweeps whose steps have over 21 taps, and
+    /// methods chosen automatically. [`super::Statistics::backend`] reports the backend in use and the reason.
     Gpu,
 }
 
-/// Whether a session may change its quality.
+/// Determines whether a session may change its quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Quality {
-    /// It changes the quality level: down where frames take longer than the target rate allows or the device is hot, up
-    /// where there is room.
+    /// The session lowers the quality level if frames take longer than the target rate allows or the device is hot, and
+    /// raises it if there is time left.
     #[default]
     Adaptive,
-    /// It stays at this quality level.
+    /// The session stays at this quality level.
     Fixed(usize),
 }
 
 impl Quality {
     /// # Errors
-    /// A fixed level that is not among `quality_levels`.
+    /// Returns an error for a fixed level that is not among `quality_levels`.
     pub(super) fn check(self, quality_levels: usize) -> Result<()> {
         match self {
             Quality::Fixed(quality_level) if quality_level >= quality_levels => Err(Error::Setting(format!(
@@ -66,22 +66,23 @@ impl Quality {
     }
 }
 
-/// How hot the device is, as its system says (iOS' ProcessInfo.thermalState, Android's PowerManager).
+/// The thermal state of the device as reported by its system (ProcessInfo.thermalState on iOS, PowerManager on
+/// Android).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Thermal {
-    /// Not warm: nothing is limited.
+    /// The device is not warm; nothing is limited.
     #[default]
     Nominal,
-    /// Warm: frames may take 85 % of the time that the target rate allows.
+    /// The device is warm; frames may take 85 % of the time that the target rate allows.
     Fair,
-    /// Hot: half of it.
+    /// The device is hot; frames may take 50 % of that time.
     Serious,
-    /// Too hot: the lowest quality level.
+    /// The device is too hot; the session uses the lowest quality level.
     Critical,
 }
 
 impl Thermal {
-    /// The share of a frame's time that may be used.
+    /// Returns the share of a frame's time that may be used.
     fn share(self) -> f64 {
         match self {
             Thermal::Nominal => 1.0,
@@ -92,46 +93,45 @@ impl Thermal {
     }
 }
 
-/// Why a session changed its quality.
+/// The reason why a session changed its quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QualityReason {
     /// Frames took longer than the target rate allows.
     TooSlow,
-    /// There was room for more.
+    /// There was time for a higher quality.
     Room,
     /// The device is hot.
     Thermal,
-    /// The caller said so.
+    /// The caller requested the change.
     Asked,
-    /// The quality level that was to be taken cannot be planned: the session stays where it was, and does not try it
-    /// again.
+    /// The new quality level cannot be planned. The session stays at its level and does not try the new one again.
     Refused,
 }
 
 /// A change of the quality level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct QualityChange {
-    /// The quality level before.
+    /// The previous quality level.
     pub(super) from: usize,
-    /// The quality level now; the one before where the step was [`QualityReason::Refused`].
+    /// The new quality level; the previous one if the reason is [`QualityReason::Refused`].
     pub(super) to: usize,
-    /// Why.
+    /// The reason.
     pub(super) reason: QualityReason,
 }
 
-/// Frames over their time before a step down.
+/// The number of consecutive slow frames before a step down.
 const SLOW_FRAMES: u32 = 6;
-/// Frames with room before a step up; doubled with each step up that had to be taken back.
+/// The number of frames with time left before a step up; doubled after each step up that had to be undone.
 const ROOMY_FRAMES: u32 = 60;
-/// Frames with room that one without outweighs.
+/// The number of frames with time left that a single frame without time left cancels.
 const TIGHT_FRAME: u32 = 20;
-/// The most frames with room that a step up may need.
+/// The maximum number of frames with time left that a step up may need.
 const MOST_ROOMY_FRAMES: u32 = 60 * 32;
-/// A step up is tried where frames take less than this share of their time.
+/// A step up is tried if frames take less than this share of their time.
 const ROOM: f64 = 0.7;
 
-/// Decides on steps from what frames cost. Knows no clock and no frames.
+/// Decides on quality changes from the times of frames. Uses no clock and no frames itself.
 #[derive(Debug)]
 pub(super) struct LevelControl {
     /// Whether each quality level can be planned, as far as is known.
@@ -140,7 +140,7 @@ pub(super) struct LevelControl {
     slow: u32,
     roomy: u32,
     roomy_needed: u32,
-    /// Frames since the last step up, while it may still have to be taken back.
+    /// The number of frames since the last step up, while that step may still be undone.
     since_up: Option<u32>,
 }
 
@@ -160,7 +160,8 @@ impl LevelControl {
         self.quality_level
     }
 
-    /// Hears that a frame took `cost` of the `period` that the target rate allows; says whether to step.
+    /// Records that a frame took `cost` of the `period` that the target rate allows, and returns a change of the
+    /// quality level, if one is due.
     pub(super) fn observe(
         &mut self,
         cost: Duration,
@@ -177,7 +178,7 @@ impl LevelControl {
         }
         let used = cost.as_secs_f64() / (period?.as_secs_f64() * thermal.share());
         self.slow = if used > 1.0 { self.slow + 1 } else { 0 };
-        // A frame that took long for another reason does not undo all room before it.
+        // A single slow frame with another cause must not reset the count.
         self.roomy = match used < ROOM {
             true => self.roomy + 1,
             false => self.roomy.saturating_sub(TIGHT_FRAME),
@@ -185,7 +186,7 @@ impl LevelControl {
         if let Some(frames) = &mut self.since_up {
             *frames += 1;
             if *frames > self.roomy_needed {
-                // It held: the next step up is tried as readily as the first.
+                // The step up succeeded, so the next one needs no more frames than the first.
                 self.since_up = None;
                 self.roomy_needed = ROOMY_FRAMES;
             }
@@ -215,7 +216,7 @@ impl LevelControl {
         None
     }
 
-    /// Takes back a step to a quality level that cannot be planned, which is not tried again.
+    /// Undoes a step to a quality level that cannot be planned, and excludes that level from now on.
     pub(super) fn refuse(&mut self, QualityChange { from, to, .. }: QualityChange) -> QualityChange {
         self.quality_levels[to] = false;
         self.quality_level = from;
@@ -240,8 +241,8 @@ impl LevelControl {
 }
 
 /// # Errors
-/// No quality levels or too many, a fixed one that is not among them, or one with no pixels or more than the modulator
-/// has.
+/// Returns an error if there are no quality levels or too many, if a fixed one is not among them, or if one has no
+/// pixels or is larger than the modulator.
 pub(super) fn check(quality_levels: &[QualityLevel], quality: Quality, modulator: (usize, usize)) -> Result<()> {
     if quality_levels.is_empty() {
         return Err(Error::Setting(
@@ -274,8 +275,7 @@ mod tests {
 
     const PERIOD: Duration = Duration::from_millis(33);
 
-    /// Runs `frames` frames on a device whose quality levels cost these milliseconds; gives the steps and the frame of
-    /// each.
+    /// Runs `frames` frames on a device whose quality levels take `costs_ms`; returns the steps and the frame of each.
     fn run(
         control: &mut LevelControl,
         costs_ms: &[u64],
@@ -284,7 +284,7 @@ mod tests {
     ) -> Vec<(usize, QualityChange)> {
         (0..frames)
             .filter_map(|frame| {
-                // Every 50th frame takes long for another reason.
+                // Every 50th frame is slow for another reason.
                 let extra = if frame % 50 == 49 { 40 } else { 0 };
                 let cost = Duration::from_millis(costs_ms[control.quality_level()] + extra);
                 let change = control.observe(cost, Some(PERIOD), thermal, Quality::Adaptive);
@@ -308,7 +308,7 @@ mod tests {
         let steps = run(&mut control, &[10, 10, 10], Thermal::Nominal, 500);
         assert_eq!(control.quality_level(), 0);
         assert!(steps.iter().all(|(_, c)| c.reason == QualityReason::Room));
-        // Quality level 1 leaves room, quality level 0 is too slow: the classic seesaw.
+        // Quality level 1 leaves time, quality level 0 is too slow: the classic oscillation.
         let mut control = LevelControl::new(2, 0);
         let steps = run(&mut control, &[40, 15], Thermal::Nominal, 20_000);
         assert!(steps.len() < 40, "{}", steps.len());
@@ -353,7 +353,7 @@ mod tests {
         };
         assert_eq!(asked(&mut control, 1), None);
         assert_eq!(asked(&mut control, 2).map(|c| c.to), Some(2));
-        // The lowest, too: heat takes the lowest that there is.
+        // If the lowest level is refused too, heat selects the lowest level that can be planned.
         let change = QualityChange { from: 0, to: 2, ..down };
         control.refuse(change);
         assert!(run(&mut control, &[90; 3], Thermal::Critical, 50).is_empty());
@@ -369,7 +369,7 @@ mod tests {
         }
         let asked = control.observe(slow, None, Thermal::Nominal, Quality::Fixed(2));
         assert_eq!(asked.map(|c| (c.to, c.reason)), Some((2, QualityReason::Asked)));
-        // Without a target rate there is nothing to hold.
+        // Without a target rate the session does not adapt to frame times.
         for _ in 0..100 {
             assert_eq!(control.observe(slow, None, Thermal::Nominal, Quality::Adaptive), None);
         }

@@ -1,5 +1,5 @@
-//! Which frame is next: one in flight, the newest waiting, the others dropped with a reason. A state machine without
-//! threads; [`super::live`] runs it, and its tests run it through every order of events.
+//! Decides which frame is next: one is in flight, the newest waits, and the others are dropped with a reason. This is a
+//! state machine without threads. [`super::live`] runs it, and its tests run random orders of events.
 
 use super::drop_reason::DropReason;
 use super::statistics::Counts;
@@ -7,7 +7,7 @@ use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::{Error, Result};
 use std::collections::VecDeque;
 
-/// What each call must pass first: open, and later than the last frame.
+/// The check that each frame must pass first: the session is open and the frame is later than the last.
 #[derive(Debug, Default)]
 pub(super) struct Gate {
     pub(super) counts: Counts,
@@ -16,7 +16,7 @@ pub(super) struct Gate {
     /// Whether the next frame has no past.
     pub(super) fresh: bool,
     last_ns: Option<u64>,
-    /// Gives up the frame that is being computed.
+    /// Cancels the frame that is being computed.
     cancel: Cancel,
 }
 
@@ -29,7 +29,7 @@ impl Gate {
         }
     }
 
-    /// Counts a frame, and refuses it where the session is closed or, `in_order`, the frame is late.
+    /// Counts a frame. Refuses it if the session is closed or, with `in_order`, if the frame is late.
     pub(super) fn admit(&mut self, timestamp_ns: u64, in_order: bool) -> Result<()> {
         self.counts.submitted += 1;
         let refusal = match self.last_ns {
@@ -48,20 +48,20 @@ impl Gate {
         Ok(())
     }
 
-    /// Begins a frame; says whether it has no past.
+    /// Begins a frame; returns whether it has no past.
     pub(super) fn begin(&mut self) -> bool {
         self.cancel.clear();
         std::mem::take(&mut self.fresh)
     }
 
-    /// Forgets the past, and gives up what is being computed.
+    /// Forgets the past and cancels the frame that is being computed.
     pub(super) fn reset(&mut self) {
         self.last_ns = None;
         self.fresh = true;
         self.cancel.request();
     }
 
-    /// Lets nothing in any more, and gives up what is being computed.
+    /// Refuses all further frames and cancels the frame that is being computed.
     pub(super) fn close(&mut self) {
         self.closed = true;
         self.cancel.request();
@@ -72,7 +72,7 @@ pub(super) fn closed() -> Error {
     Error::Session("it is closed; make a new one".into())
 }
 
-/// A frame's leave to enter the queue, while it is being copied.
+/// A frame's permission to enter the queue, held while the frame is copied.
 #[derive(Debug)]
 #[must_use]
 pub(super) struct Ticket {
@@ -98,23 +98,23 @@ pub(super) struct Taken<F> {
 pub(super) struct Queue<F> {
     pub(super) gate: Gate,
     waiting: Option<Waiting<F>>,
-    /// Timestamp and epoch of the frame that is being processed.
+    /// The timestamp and epoch of the frame that is being processed.
     in_flight: Option<(u64, u64)>,
-    /// Timestamp of the last frame that was taken in this epoch.
+    /// The timestamp of the last frame that was taken in this epoch.
     taken_ns: Option<u64>,
-    /// Frames admitted and not yet put.
+    /// The number of frames that were admitted and not yet put.
     copying: usize,
-    /// How often the session was reset.
+    /// The number of resets so far.
     epoch: u64,
-    /// Nanoseconds between frames at the target rate.
+    /// The time between frames at the target rate, in nanoseconds.
     period_ns: Option<u64>,
-    /// When the next frame is due at the target rate.
+    /// The time at which the next frame is due at the target rate.
     due_ns: Option<u64>,
     dropped: VecDeque<(u64, DropReason)>,
 }
 
 impl<F> Queue<F> {
-    /// An open queue that lets frames in no more often than every `period_ns`.
+    /// Creates an open queue that admits at most one frame per `period_ns`.
     pub(super) fn new(period_ns: Option<u64>, cancel: Cancel) -> Self {
         Queue {
             gate: Gate::new(cancel),
@@ -129,23 +129,23 @@ impl<F> Queue<F> {
         }
     }
 
-    /// Lets a frame in or drops it.
+    /// Admits a frame or drops it.
     ///
     /// # Errors
-    /// A closed session, or a frame that is not later than the last.
+    /// Returns an error if the session is closed or the frame is not later than the last.
     pub(super) fn admit(&mut self, timestamp_ns: u64) -> Result<std::result::Result<Ticket, DropReason>> {
         self.gate.admit(timestamp_ns, true)?;
         if self.gate.paused {
             return Ok(Err(self.drop(timestamp_ns, DropReason::Paused)));
         }
         if let Some(period) = self.period_ns {
-            // A camera's clock jitters: an eighth of a period too soon is in time.
+            // Cameras' clocks jitter, so up to an eighth of a period too soon is still on time.
             if let Some(due) = self.due_ns
                 && timestamp_ns.saturating_add(period / 8) < due
             {
                 return Ok(Err(self.drop(timestamp_ns, DropReason::AboveTargetRate)));
             }
-            // Frames that are in time keep the beat, so that 30 a second become 20 and not 15.
+            // Frames that are on time keep the beat, so that 30 frames per second become 20 and not 15.
             let beat = self
                 .due_ns
                 .map_or(timestamp_ns, |due| due.max(timestamp_ns.saturating_sub(period)));
@@ -158,7 +158,8 @@ impl<F> Queue<F> {
         }))
     }
 
-    /// Puts an admitted frame; it waits, unless something happened meanwhile. Gives back a frame that is not needed.
+    /// Puts an admitted frame into the queue, unless the session was closed, reset or paused in the meantime or a newer
+    /// frame overtook it. Returns a frame that is no longer needed.
     pub(super) fn put(&mut self, ticket: Ticket, frame: F) -> Option<F> {
         self.copying -= 1;
         let Ticket { timestamp_ns, epoch } = ticket;
@@ -172,7 +173,7 @@ impl<F> Queue<F> {
             self.drop(timestamp_ns, reason);
             return Some(frame);
         }
-        // Of frames that were copied at the same time a newer one may have overtaken this one.
+        // A newer frame that was copied at the same time may have overtaken this one.
         let newest = (self.waiting.as_ref().map(|w| w.timestamp_ns)).max(self.taken_ns);
         if newest.is_some_and(|newest| newest > timestamp_ns) {
             self.drop(timestamp_ns, DropReason::Superseded);
@@ -187,14 +188,14 @@ impl<F> Queue<F> {
         Some(before.frame)
     }
 
-    /// Ends an admission whose frame could not be made.
+    /// Ends the admission of a frame that could not be created.
     pub(super) fn give_up(&mut self, ticket: Ticket) {
         self.copying -= 1;
         let Ticket { timestamp_ns, .. } = ticket;
         self.drop(timestamp_ns, DropReason::Superseded);
     }
 
-    /// Takes the waiting frame into flight.
+    /// Takes the waiting frame and marks it as in flight.
     pub(super) fn take(&mut self) -> Option<Taken<F>> {
         debug_assert!(self.in_flight.is_none());
         let waiting = self.waiting.take()?;
@@ -207,8 +208,8 @@ impl<F> Queue<F> {
         })
     }
 
-    /// Ends the frame in flight; says whether its result, or its error where it `failed`, is to be told. If not, its
-    /// drop is.
+    /// Ends the frame in flight. Returns whether to report its result (or its error if it `failed`); otherwise its drop
+    /// is reported.
     pub(super) fn finish(&mut self, failed: bool) -> bool {
         let Some((timestamp_ns, epoch)) = self.in_flight.take() else {
             return false;
@@ -228,7 +229,7 @@ impl<F> Queue<F> {
         false
     }
 
-    /// Drops what is on its way, and forgets the past. Gives back a frame that is not needed.
+    /// Drops all pending frames and forgets the past. Returns a frame that is no longer needed.
     pub(super) fn reset(&mut self) -> Option<F> {
         self.epoch += 1;
         self.due_ns = None;
@@ -237,29 +238,29 @@ impl<F> Queue<F> {
         self.drop_waiting(DropReason::Reset)
     }
 
-    /// Drops the waiting frame and all that come until [`Self::resume`]. Gives back a frame that is not needed.
+    /// Drops the waiting frame and all frames until [`Self::resume`]. Returns a frame that is no longer needed.
     pub(super) fn pause(&mut self) -> Option<F> {
         self.gate.paused = true;
         self.drop_waiting(DropReason::Paused)
     }
 
-    /// Lets frames in again.
+    /// Admits frames again.
     pub(super) fn resume(&mut self) {
         self.gate.paused = false;
     }
 
-    /// Drops what is on its way and lets nothing in any more. Gives back a frame that is not needed.
+    /// Drops all pending frames and refuses further frames. Returns a frame that is no longer needed.
     pub(super) fn close(&mut self) -> Option<F> {
         self.gate.close();
         self.drop_waiting(DropReason::Closed)
     }
 
-    /// A drop that has not been told yet.
+    /// Returns the next drop that has not been reported yet.
     pub(super) fn next_drop(&mut self) -> Option<(u64, DropReason)> {
         self.dropped.pop_front()
     }
 
-    /// Whether nothing will come any more.
+    /// Checks whether the queue is closed and has nothing left to report.
     pub(super) fn is_done(&self) -> bool {
         self.gate.closed && self.copying == 0 && self.in_flight.is_none() && self.dropped.is_empty()
     }
@@ -285,14 +286,15 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use std::collections::BTreeMap;
 
-    /// A queue under a random order of all that may happen, and what must be so at each moment.
+    /// A queue under random events, with the invariants that must hold at each moment.
     struct Run {
         random: ChaCha8Rng,
         queue: Queue<u64>,
         clock: u64,
         tickets: Vec<Ticket>,
         flying: Option<(u64, u64)>,
-        /// What was told of each admitted frame, which is reported exactly once. Timestamps begin anew with each epoch.
+        /// The reported outcome of each admitted frame, which is reported exactly once. Timestamps restart with each
+        /// epoch.
         told: BTreeMap<(u64, u64), Option<DropReason>>,
         admitted: Vec<(u64, u64)>,
         drops: Vec<(u64, DropReason)>,
@@ -375,7 +377,7 @@ mod tests {
                 } else {
                     self.queue.put(ticket, timestamp);
                 }
-                // What waits never becomes older.
+                // The waiting frame is never replaced by an older one.
                 let after = self.queue.waiting.as_ref().map(|w| w.timestamp_ns);
                 assert!(before.is_none() || after >= before);
             }
@@ -403,7 +405,7 @@ mod tests {
             if let Some((epoch, timestamp)) = self.flying.take() {
                 let failed = self.random.random_bool(0.2);
                 let told = self.queue.finish(failed);
-                // A result of before a reset or a close is never told.
+                // A result from before a reset or close is never reported.
                 assert_eq!(told, epoch == self.epoch && !self.queue.gate.closed);
                 if told {
                     let before = self.told.insert((epoch, timestamp), None);
@@ -422,7 +424,7 @@ mod tests {
             }
         }
 
-        /// Closes, ends what is on its way, and counts.
+        /// Closes the queue, ends all pending frames and checks the counts.
         fn end(mut self) {
             self.queue.close();
             assert!(self.queue.admit(self.clock + 1).is_err());
@@ -453,7 +455,7 @@ mod tests {
         }
     }
 
-    /// Five thousand random orders of submitting, copying, processing, resetting, pausing and closing.
+    /// Runs 5000 random orders of submitting, copying, processing, resetting, pausing and closing.
     #[test]
     fn every_frame_is_told_once_whatever_happens() {
         for seed in 0..5000 {
@@ -467,7 +469,7 @@ mod tests {
 
     #[test]
     fn the_target_rate_is_kept_by_timestamps() {
-        // A camera of 30 frames a second with a jitter of a millisecond.
+        // The camera gives 30 frames per second with a jitter of a millisecond.
         for (target, least, most) in [
             (30.0, 300, 300),
             (20.0, 195, 205),
@@ -487,7 +489,7 @@ mod tests {
             }
             assert!((least..=most).contains(&kept), "{target}: {kept}");
             assert_eq!(queue.gate.counts.dropped.above_target_rate, 300 - kept);
-            // After a gap the next frame is in time at once.
+            // After a gap the next frame is on time at once.
             assert!(queue.admit(100_000_000_000).unwrap().is_ok());
         }
     }

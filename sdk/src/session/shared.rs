@@ -1,4 +1,4 @@
-//! What callers of a session and its thread share.
+//! The state that a session's callers and its thread share.
 
 use super::computing::{self, Computing};
 use super::live::lock;
@@ -13,20 +13,20 @@ use phasefront_core::runtime::clock::Instant;
 use phasefront_core::runtime::error::Result;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-/// What callers and the session's thread share.
+/// The state that a session's callers and its thread share.
 pub(super) struct Shared {
     pub(super) process: ProcessId,
-    /// None when the session has ended: its memory went back.
+    /// The stages; `None` after the session has ended and freed its memory.
     pub(super) stages: Mutex<Option<Stages>>,
     pub(super) control: Mutex<Control>,
     pub(super) recent: Mutex<Recent>,
     pub(super) cancel: Cancel,
 }
 
-/// What the caller may change while a session runs.
+/// The settings that a caller may change while a session runs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Control {
-    /// How many quality levels there are.
+    /// The number of quality levels.
     pub(super) quality_levels: usize,
     pub(super) quality: Quality,
     pub(super) thermal: Thermal,
@@ -34,7 +34,7 @@ pub(super) struct Control {
 
 impl Shared {
     /// # Errors
-    /// Options that cannot be meant or planned for, or threads that cannot be started.
+    /// Returns an error if the options are invalid or cannot be planned for, or if threads cannot be started.
     pub(super) fn new(options: SessionOptions) -> Result<Arc<Self>> {
         options.check()?;
         let control = Control {
@@ -73,8 +73,8 @@ impl Shared {
         }
     }
 
-    /// Gives back all memory but the statistics'; waits for a frame that is being processed, but not on a thread that
-    /// computes: whoever processes it does this when the frame is done.
+    /// Frees all memory except the statistics. Waits for a frame that is being processed, but not on a thread that
+    /// computes: the thread that processes the frame calls this when the frame is done.
     pub(super) fn end(&self) {
         let stages = if computing::here() {
             match self.stages.try_lock() {
@@ -85,7 +85,7 @@ impl Shared {
         } else {
             lock(&self.stages).take()
         };
-        // Not under the lock: what is logged meanwhile may come back here.
+        // Drop outside the lock: log handlers may call this session again.
         drop(stages);
     }
 }

@@ -1,4 +1,5 @@
-//! All stages of a session's frames, and what one frame leaves for the next. Which frame is next is not known here.
+//! All stages of a session's frames, and the state from one frame to the next. This module does not decide which frame
+//! is next.
 
 use super::SessionOptions;
 use super::engine::BrightnessTracker;
@@ -21,21 +22,21 @@ use phasefront_core::runtime::stage::stage;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A gap between frames after which the past is no guide.
+/// The longest gap between frames after which the past still counts.
 const LONGEST_GAP: Duration = Duration::from_secs(1);
 
-/// Plans and memory of one quality level.
+/// The plans and memory of one quality level.
 struct LevelPlan {
     engine: Engine,
     frame: RgbdFrame,
     depth: DepthStream,
     colour: Option<(ColourPlan, ColourScratch)>,
-    /// The picture's red, green and blue, along whose edges depth is refined, where the display has one laser.
+    /// The picture's red, green and blue, if the display has one laser. Depth is refined along its edges.
     picture: Vec<f32>,
 }
 
 impl LevelPlan {
-    /// Colour and depth of `frame` become those of the hologram.
+    /// Converts the colour and depth of `frame` to those of the hologram.
     fn take_in(
         &mut self,
         frame: &CameraFrame<'_>,
@@ -76,11 +77,11 @@ impl LevelPlan {
 /// The stages of a session.
 pub(super) struct Stages {
     options: SessionOptions,
-    /// Shared with the viewer, so that views need no other threads.
+    /// The session's threads, shared with the viewer so that views need no other threads.
     pool: Arc<Threads>,
     level_control: LevelControl,
     gpu: GpuState,
-    /// None after a panic: it is made anew.
+    /// The plan; `None` after a panic, so that it is created again.
     plan: Option<LevelPlan>,
     brightness: BrightnessTracker,
     viewer: Arc<Viewer>,
@@ -91,21 +92,21 @@ pub(super) struct Stages {
     cancel: Cancel,
 }
 
-/// What a frame became.
+/// The result of a frame.
 pub(super) struct FrameResult {
     pub(super) hologram: Hologram,
     pub(super) change: Option<QualityChange>,
 }
 
 impl Stages {
-    /// Frames are given up where `cancel` is requested.
+    /// Plans the stages. Requesting `cancel` gives up the current frame.
     pub(super) fn new(options: SessionOptions, cancel: Cancel) -> Result<Self> {
         let pool = Arc::new(Threads::start(options.threads)?);
         let start = match options.quality {
             Quality::Adaptive => 0,
             Quality::Fixed(quality_level) => quality_level,
         };
-        // A quality level that cannot be planned is better known now than at the first step down.
+        // Check all quality levels now, so that one that cannot be planned is reported before the first step down.
         for (i, quality_level) in options.quality_levels.iter().enumerate().filter(|(i, _)| *i != start) {
             let planned = pool.install(|| OnCpu::check(&options, quality_level));
             planned.map_err(|why| why.of(&format!("quality level {i}")))?;
@@ -160,13 +161,13 @@ impl Stages {
         })
     }
 
-    /// Forgets half-done work after a panic.
+    /// Discards unfinished work after a panic.
     pub(super) fn recover(&mut self) {
         self.forget();
         self.plan = None;
     }
 
-    /// Forgets the frames so far: the next one has no past, whatever becomes of those in between.
+    /// Forgets previous frames: the next frame has no past, even if frames in between fail.
     pub(super) fn forget(&mut self) {
         self.last_ns = None;
     }
@@ -175,7 +176,7 @@ impl Stages {
         self.level_control.quality_level()
     }
 
-    /// What runs the frames, where that is not what it was when this was last asked.
+    /// Returns the backend report if it changed since the last call.
     pub(super) fn new_report(&mut self) -> Option<BackendReport> {
         let engine = &mut self.plan.as_mut()?.engine;
         std::mem::take(&mut engine.report_is_new).then(|| engine.report())
@@ -258,22 +259,23 @@ impl Stages {
         Ok(FrameResult { hologram, change })
     }
 
-    /// Plans the quality level that was chosen; where that fails, stays on the one before. The frame is made either
-    /// way.
+    /// Plans the chosen quality level; if that fails, stays at the previous one. The frame's hologram is made in both
+    /// cases.
     fn step(&mut self, change: QualityChange) -> QualityChange {
-        // The memory of the quality level before goes first.
+        // Free the memory of the previous quality level first.
         self.plan = None;
         if let (Ok(plan), _) = guarded(|| self.plan_level()) {
             self.plan = Some(plan);
             return change;
         }
         let change = self.level_control.refuse(change);
-        // Should even this fail, the next frame tries it again, and says why.
+        // If this fails too, the next frame tries it again and returns the reason.
         self.plan = guarded(|| self.plan_level()).0.ok();
         change
     }
 
-    /// Does of [`Self::process`] what the frames after `frame` need, where its hologram is known to have got `scale`.
+    /// Updates the state as [`Self::process`] does, for a `frame` whose hologram is known to have `scale`, without
+    /// making the hologram.
     pub(super) fn replay(&mut self, frame: &CameraFrame<'_>, past: bool, scale: f32) -> Result<()> {
         let elapsed = self.elapsed(frame, past);
         let mut plan = self.take_plan()?;
@@ -288,7 +290,7 @@ impl Stages {
         Ok(())
     }
 
-    /// Since the frame before, where the past counts.
+    /// Returns the time since the previous frame, if the past counts.
     fn elapsed(&self, frame: &CameraFrame<'_>, past: bool) -> Option<Duration> {
         (self.last_ns.filter(|_| past))
             .and_then(|last| frame.timestamp_ns.checked_sub(last))
@@ -393,7 +395,7 @@ mod tests {
         let best = options.quality_levels[0].clone();
         options.quality_levels.push(best.clone());
         let mut stages = Stages::new(options, Cancel::default()).unwrap();
-        // What was fine at the start is not any more.
+        // The second quality level was valid at the start and becomes invalid.
         let worse = Sweep { planes: 0, ..sweep };
         stages.options.quality_levels[1] = QualityLevel {
             method: Method::Sweep(worse),

@@ -1,4 +1,4 @@
-//! What a session has done so far, and how fast.
+//! Statistics of a session: counts of frames and their times.
 
 use super::drop_reason::DropReason;
 use phasefront_core::pipeline::FrameTimes;
@@ -6,26 +6,26 @@ use phasefront_core::runtime::clock::Instant;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Results over which rates and times are averaged.
+/// The number of results over which rates and times are averaged.
 const RECENT: usize = 30;
 
-/// How many frames were dropped for each reason.
+/// The number of dropped frames for each reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Drops {
-    /// [`DropReason::Superseded`].
+    /// Frames dropped for [`DropReason::Superseded`].
     pub superseded: u64,
-    /// [`DropReason::AboveTargetRate`].
+    /// Frames dropped for [`DropReason::AboveTargetRate`].
     pub above_target_rate: u64,
-    /// [`DropReason::Paused`].
+    /// Frames dropped for [`DropReason::Paused`].
     pub paused: u64,
-    /// [`DropReason::Reset`].
+    /// Frames dropped for [`DropReason::Reset`].
     pub reset: u64,
-    /// [`DropReason::Closed`].
+    /// Frames dropped for [`DropReason::Closed`].
     pub closed: u64,
 }
 
 impl Drops {
-    /// All of them.
+    /// Returns the number of dropped frames for all reasons.
     pub fn total(&self) -> u64 {
         self.superseded + self.above_target_rate + self.paused + self.reset + self.closed
     }
@@ -41,7 +41,7 @@ impl Drops {
     }
 }
 
-/// How many frames came and what became of them.
+/// The number of frames for each outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Counts {
     pub(super) submitted: u64,
@@ -52,47 +52,47 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    /// Frames that were submitted and of which nothing is known yet.
+    /// Returns the number of submitted frames without an outcome yet.
     pub(super) fn pending(&self) -> u64 {
         self.submitted - self.processed - self.failed - self.refused - self.dropped.total()
     }
 }
 
-/// What runs the frames.
+/// The backend that computes the frames.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct BackendReport {
-    /// Its name: an instruction set, "tract", or that of a GPU.
+    /// The name: an instruction set, "tract", or a GPU's name.
     pub name: String,
-    /// Why this one.
+    /// The reason for using this backend.
     pub why: String,
 }
 
-/// A session's statistics at one moment. Every frame that was submitted is counted once more: `submitted` =
+/// The statistics of a session at one moment. Every submitted frame is counted exactly once more: `submitted` =
 /// `processed` + `failed` + `refused` + `dropped` + `pending`.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Statistics {
-    /// Frames that came.
+    /// Frames that were submitted.
     pub submitted: u64,
     /// Frames that became holograms.
     pub processed: u64,
     /// Frames that could not be processed.
     pub failed: u64,
-    /// Frames that were not let in: late ones, or after the session was closed.
+    /// Frames that were refused because they were late or the session was closed.
     pub refused: u64,
     /// Frames that were dropped.
     pub dropped: Drops,
     /// Frames that wait or are being processed.
     pub pending: u64,
-    /// Holograms a second, over the last 30; 0 before the second.
+    /// Holograms per second over the last 30; 0 before the second hologram.
     pub rate_hz: f64,
-    /// Mean times of the stages, over the last 30 holograms.
+    /// The mean times of the stages over the last 30 holograms.
     pub times: FrameTimes,
-    /// What runs the frames.
+    /// The backend that computes the frames.
     pub backend: BackendReport,
-    /// The quality level, 0 the best.
+    /// The quality level; 0 is the best.
     pub quality_level: usize,
-    /// How often the listener panicked.
+    /// The number of panics of the listener.
     pub listener_panics: u64,
 }
 

@@ -1,4 +1,5 @@
-//! Threads and locks of a live session, in one place: `fuzz/handover` puts a checker's here, which tries their orders.
+//! Threads and locks of a live session, collected here so that `fuzz/handover` can replace them with a model checker's,
+//! which tries all thread orders.
 
 pub(super) use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 pub(super) use std::thread::{Builder, JoinHandle};

@@ -1,4 +1,4 @@
-//! The threads that a session computes with.
+//! The threads on which a session computes.
 
 use super::SessionOptions;
 use super::computing::Computing;
@@ -7,14 +7,14 @@ use rayon::ThreadPool;
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-/// A pool of threads; None where there are none to start, as in WebAssembly: then the caller's computes.
+/// A pool of threads; `None` on platforms without threads, such as WebAssembly, where the caller's thread computes.
 pub(super) struct Threads(Option<ThreadPool>);
 
 impl Threads {
-    /// So many threads, or as many as the device has.
+    /// Starts `threads` threads, or as many as the device has.
     ///
     /// # Errors
-    /// Threads that cannot be started.
+    /// Returns an error if threads cannot be started.
     pub(super) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
         if cfg!(target_family = "wasm") {
             return match threads.map_or(1, NonZeroUsize::get) {
@@ -26,7 +26,7 @@ impl Threads {
         }
         let pool = rayon::ThreadPoolBuilder::new()
             .thread_name(|i| format!("phasefront {i}"))
-            // These threads do nothing else.
+            // These threads do nothing but compute.
             .start_handler(|_| std::mem::forget(Computing::begin()));
         let device = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
         let pool = match threads {
@@ -38,7 +38,7 @@ impl Threads {
         Ok(Threads(Some(started)))
     }
 
-    /// What `work` gives, computed on these threads.
+    /// Runs `work` on these threads and returns its result.
     pub(super) fn install<R: Send>(&self, work: impl FnOnce() -> R + Send) -> R {
         match &self.0 {
             Some(pool) => pool.install(work),

@@ -1,4 +1,5 @@
-//! Each colour format, fast against naive: random strides, odd sizes, every orientation, crops both ways.
+//! Compares the fast conversion of each colour format with a naive one: random strides, odd sizes, every orientation,
+//! crops in both directions.
 use crate::camera;
 
 use camera::{Noise, colour_formats};
@@ -66,7 +67,7 @@ fn a_plan_refuses_an_image_of_another_size_or_format() {
                 .contains("this plan takes Rgba of 10×8")
         );
     }
-    // Other strides are no other plan.
+    // The plan does not depend on the strides.
     let wide = Noise::new(0, formats[0], (8, 10), 5);
     assert!(
         plan.convert(&wide.image().unwrap(), &mut rgb, &mut plan.scratch())

@@ -1,4 +1,5 @@
-//! The same frames give the same levels, on every run and on any number of threads, by every method and encoding.
+//! Checks that the same frames give the same levels on every run and with any number of threads, for every method and
+//! encoding.
 use crate::camera;
 use crate::network_models;
 
@@ -9,7 +10,7 @@ use phasefront::{Display, EncoderOptions, Encoding, Method, Network, SessionOpti
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-/// Odd, and more than one tile, so that parts meet where no power of two does.
+/// An odd size of more than one tile, so that tiles do not meet at powers of two.
 const W: usize = 291;
 const H: usize = 67;
 
@@ -21,7 +22,7 @@ fn display() -> Display {
     Display::default().with_size(H, W).unwrap().with_offset_m(2e-3).unwrap()
 }
 
-/// The levels of three frames of a video in which something moves.
+/// Returns the levels of three frames of a video with a moving object.
 fn video(options: SessionOptions) -> Vec<u8> {
     let session = VideoSession::new(options).unwrap();
     let mut levels = Vec::new();

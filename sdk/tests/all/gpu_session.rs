@@ -1,5 +1,5 @@
-//! Sessions on the GPU beside sessions on the CPU: the same frames, nearly the same levels; what the GPU does not do;
-//! and devices that go. Any device there is will do, Mesa's driver in software too.
+//! Compares GPU sessions with CPU sessions: the levels of the same frames are nearly equal, unsupported work falls back
+//! to the CPU, and sessions survive lost devices. Any device will do, including Mesa's software driver.
 use crate::camera;
 use crate::on_gpu;
 
@@ -19,8 +19,8 @@ use std::time::Duration;
 const W: usize = 64;
 const H: usize = 48;
 
-/// Compares levels around the circle of `steps`: gives the share that differs, and asserts that none does by over one
-/// step but for a share of `far`.
+/// Compares levels around the circle of `steps`: returns the share that differs, and asserts that no level differs by
+/// more than one step, except for a share of `far`.
 fn differing(levels: &[u8], expected: &[u8], far: f64) -> f64 {
     let apart = |(a, b): (&u8, &u8)| {
         let d = a.abs_diff(*b);
@@ -55,8 +55,8 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
         let expected = cpu.process(&frame).unwrap();
         let made = gpu.process(&frame).unwrap();
         assert!((made.scale() - expected.scale()).abs() < 1e-4 * expected.scale());
-        // In 8 bits the network has the bits of the CPU where its input has; colour that is converted on the GPU may be
-        // rounded the other way, and the field around it changes.
+        // With equal inputs, the 8-bit network gives the same bits as on the CPU. Colour converted on the GPU may round
+        // the other way, which changes the field around it.
         let share = differing(made.levels(), expected.levels(), 0.002);
         assert!(share < 0.01, "{brightness:?}: {share}");
         assert_eq!(made.range_m(), expected.range_m());
@@ -72,12 +72,12 @@ fn images_are_those_of_the_cpu_in_every_way_to_make_them() {
         assert!(there.backend.why.contains("int8"), "{:?}", there.backend);
         assert_ne!(there.backend.name, here.backend.name);
         assert!(cpu.gpu().is_none());
-        // Times of stages add up to no more than the frame took.
+        // The stage times add up to no more than the frame's time.
         assert!(made.times().method > Duration::ZERO);
     }
 }
 
-/// f32 networks: in 32 bits nearly the CPU's levels, in 16 bits near it.
+/// f32 networks give nearly the CPU's levels in 32 bits, and similar levels in 16 bits.
 #[test]
 fn images_of_an_f32_network_are_near_the_cpus() {
     let mut plain = options(W, H);
@@ -103,7 +103,7 @@ fn images_of_an_f32_network_are_near_the_cpus() {
     }
 }
 
-/// The plane sweep, by itself and under a network, at quality levels of their own, from camera frames.
+/// Runs the plane sweep, alone and under a network, at separate quality levels, on camera frames.
 #[test]
 fn sweeps_are_those_of_the_cpu() {
     let mut plain = options(W, H);
@@ -126,7 +126,7 @@ fn sweeps_are_those_of_the_cpu() {
     }
 }
 
-/// Each colour format, turned and not, as frames of one session: only its input is planned again.
+/// Runs each colour format, rotated and not, as frames of one session, which plans only its input again.
 #[test]
 fn cameras_may_change_their_format() {
     let plain = options(W, H);
@@ -162,7 +162,7 @@ fn video_is_as_smooth_as_on_the_cpu() {
     let mut scales = Vec::new();
     for i in 0..8u64 {
         let mut scene = Scene::new(H, W, 4 + 3 * i as usize);
-        // It grows dark at once.
+        // The scene darkens abruptly.
         if i > 3 {
             scene.rgba.iter_mut().for_each(|v| *v /= 2);
         }
@@ -170,7 +170,7 @@ fn video_is_as_smooth_as_on_the_cpu() {
         let frame = frame(33_000_000 * (i + 1), &scene, &metres);
         let expected = cpu.process(&frame).unwrap();
         let made = gpu.process(&frame).unwrap();
-        // A bin of the histogram, should an amplitude lie on its bound.
+        // The tolerance is one bin of the histogram, because an amplitude may lie on its bound.
         assert!(
             (made.scale() - expected.scale()).abs() < 4.0 / 2048.0,
             "{} {}",
@@ -183,7 +183,7 @@ fn video_is_as_smooth_as_on_the_cpu() {
     }
     let late = gpu.process(&frame_at(1)).unwrap_err();
     assert!(matches!(late, Error::Timestamp { .. }));
-    // Brightness follows slowly.
+    // The brightness follows slowly.
     let step = |i: usize| (scales[i + 1] - scales[i]).abs();
     assert!(step(3) < 0.05 * scales[3], "{scales:?}");
     assert!(scales[7] < scales[3], "{scales:?}");
@@ -200,7 +200,7 @@ fn frame_at(timestamp_ns: u64) -> CameraFrame<'static> {
     frame(timestamp_ns, scene, metres)
 }
 
-/// The device goes in mid-stream, again and again: frames on it fail as lost, all others are answered.
+/// Destroys the device repeatedly in mid-stream: frames on it fail as lost, and all others are answered.
 #[test]
 fn a_live_session_outlives_its_device() {
     let options = on_gpu(options(W, H));
@@ -215,7 +215,7 @@ fn a_live_session_outlives_its_device() {
             let device = session.gpu();
             session.submit(&frame_at(timestamp)).unwrap();
             if let (1, Some(device)) = (i, device) {
-                // Sooner or later into the frame.
+                // Destroy the device at different moments of the frame.
                 std::thread::sleep(Duration::from_millis(2 * round));
                 device.wgpu().0.destroy();
             }
@@ -242,12 +242,12 @@ fn a_live_session_outlives_its_device() {
     assert_eq!((statistics.processed, statistics.failed), (made, lost));
     assert_eq!(made + lost, 9);
     assert!(made >= 6, "{made}");
-    // Each loss was followed by a frame that came through, so the GPU is still in use.
+    // A frame succeeded after each loss, so the GPU is still in use.
     assert!(statistics.backend.why.contains("opened again after"));
     session.close();
 }
 
-/// What the GPU does not do goes to the CPU, which says why; the levels are the CPU's to the bit.
+/// Work that the GPU does not support runs on the CPU, which reports the reason; the levels are exactly the CPU's.
 #[test]
 fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let cpu = |mut options: SessionOptions| {
@@ -279,7 +279,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     let mut one = SessionOptions::new(Display::from_toml(text).unwrap(), gpu.quality_levels[0].method.clone());
     (one.backend, one.gpu) = (gpu.backend, gpu.gpu.clone());
     cases.push((one, "one laser"));
-    // A line that no workgroup's memory holds.
+    // One line is too long for any workgroup's memory.
     let mut long = gpu.clone();
     let text = "width = 9000\nheight = 4\noffset_mm = 2";
     long.target.display = Display::from_toml(text).unwrap();
@@ -302,7 +302,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
         assert_eq!(session.process(&frame_at(1)).unwrap().levels(), expected);
         assert!(session.gpu().is_none() || word != "no GPU");
     }
-    // What the CPU refuses too is an error.
+    // Options that the CPU refuses too are an error.
     let mut wrong = options(W, H);
     wrong.backend = Backend::Gpu;
     wrong.gpu.device.name = Some("no such card".into());
@@ -310,7 +310,7 @@ fn where_the_gpu_does_not_serve_the_cpu_does_and_says_why() {
     assert!(ImageSession::new(wrong).is_err());
 }
 
-/// Quality levels that lie on the GPU and on the CPU.
+/// Runs quality levels on the GPU and on the CPU in one session.
 #[test]
 fn quality_levels_say_where_they_are_computed() {
     let mut options = on_gpu(options(W, H));
@@ -334,7 +334,7 @@ fn quality_levels_say_where_they_are_computed() {
     assert_eq!((&names[0], &names[1]), (&device.name(), &device.name()));
     assert_ne!(names[2], names[0]);
     assert_eq!((&names[3], &names[4]), (&names[2], &names[0]));
-    // One device for all of them.
+    // All levels share one device.
     assert!(Arc::ptr_eq(&device, &session.gpu().unwrap()));
 }
 

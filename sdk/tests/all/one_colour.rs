@@ -1,5 +1,5 @@
-//! A display of one laser: what it gives is what that laser gives among three, to the bit where the laser among three
-//! is the longest, for which all that the three share is planned.
+//! Checks that a display with one laser gives the same result as that laser among three. The results are equal to the
+//! bit if that laser has the longest wavelength of the three, for which the shared parts are planned.
 use crate::camera;
 use crate::network_models;
 
@@ -35,7 +35,7 @@ fn display(wavelengths_nm: &str, offset_mm: f64) -> Display {
     Display::from_toml(&text).unwrap()
 }
 
-/// Surfaces with edges, of which `colours` planes of three are shown.
+/// Returns a frame of surfaces with edges, with the first `colours` of three planes.
 fn rgbd(colours: usize) -> RgbdFrame {
     let rgb = Array3::from_shape_fn((colours, H, W), |(c, y, x)| {
         ((c * 5 + y * 3 + x * x + y * x) % 11) as f32 / 10.0
@@ -51,7 +51,8 @@ fn depth() -> Array2<f32> {
     })
 }
 
-/// A target with all that a calibration and a bench may put there, alike in all colours but for what is looked up.
+/// Returns a target with every part that a calibration and a test bench can add, the same in all colours except the
+/// look-up tables.
 fn calibrated(wavelengths_nm: &str, offset_mm: f64) -> Target {
     let display = display(wavelengths_nm, offset_mm);
     let colours = display.colours();
@@ -89,7 +90,7 @@ fn options(encoding: Encoding, midpoint_steps: usize) -> EncoderOptions {
     }
 }
 
-/// The field at the modulator, and levels.
+/// Returns the field at the modulator, and the levels.
 fn made(frame: &RgbdFrame, method: Method, target: &Target, options: &EncoderOptions) -> (Vec<Complex32>, Vec<u8>) {
     let pipeline = Pipeline::new((H, W), method, target, options).unwrap();
     assert_eq!(pipeline.colours(), frame.colours());
@@ -104,7 +105,7 @@ fn made(frame: &RgbdFrame, method: Method, target: &Target, options: &EncoderOpt
 
 #[test]
 fn every_stage_gives_one_laser_the_bits_that_it_has_among_three() {
-    // A sweep to the modulator and one to the midpoint.
+    // The sweep runs to the modulator or to the midpoint.
     for offset_mm in [0.0, 3.0, 9.0] {
         for (encoding, midpoint_steps) in [
             (Encoding::DoublePhase, 0),
@@ -127,12 +128,12 @@ fn every_stage_gives_one_laser_the_bits_that_it_has_among_three() {
     }
 }
 
-/// Green shares what is planned for red: the same light to the rounding. Hidden surfaces are searched as far as red's
-/// light reaches, so they are left out.
+/// Green shares the plans made for red and gives the same light up to rounding. Hidden surfaces are left out, because
+/// their search radius is the reach of red's light.
 #[test]
 fn a_laser_in_the_middle_of_three_gives_the_same_light() {
     let options = options(Encoding::ANTI_ALIAS, 0);
-    // Far away, light that comes back around the padding differs, which is red's or green's own.
+    // At large offsets, light that wraps around the padding differs between a plan for red and one for green.
     for (offset_mm, most) in [(0.0, 1e-3), (9.0, 0.05)] {
         let [one, three] = ["[532]", "[638, 532, 450]"].map(|nm| display(nm, offset_mm));
         let sweep = Method::Sweep(Sweep {
@@ -164,7 +165,7 @@ fn a_network_sees_grey_and_gives_the_colour_of_the_nearest_wavelength() {
         head: "amplitude-phase",
         ..Model::new(4, 8)
     };
-    // The last runs on tract.
+    // The last network runs on tract.
     for model in [Model::int8(5, 8), Model::new(6, 12), tanh, Model::new(3, 5)] {
         let network = network(&model);
         for (wavelengths_nm, colour) in [("[638]", 0), ("[520]", 1), ("[450]", 2)] {
@@ -184,7 +185,7 @@ fn a_network_serves_a_laser_within_the_depths_that_it_was_trained_for() {
     let network = network(&Model::new(3, 8));
     let of = |text: &str| Display::from_toml(text).unwrap();
     for (text, colour, scale) in [
-        // Green's depths would have to reach farther.
+        // Green's depth range would have to be longer.
         ("wavelengths_nm = [532]", 0, 532.0 / 638.0),
         (
             "wavelengths_nm = [532]\nvolume_depth_mm = 5",
@@ -210,7 +211,7 @@ fn a_network_serves_a_laser_within_the_depths_that_it_was_trained_for() {
         .unwrap_err()
         .to_string();
     assert!(why.contains("1.22 times the range"), "{why}");
-    // A frame of other colours is not taken.
+    // A frame with another number of colours is refused.
     let target = Target::from(display(ONE, 0.0));
     let plan = Pipeline::new((H, W), Method::Network(network), &target, &Encoding::ANTI_ALIAS.into()).unwrap();
     let mut field = vec![Complex32::ZERO; SIZE];
@@ -282,7 +283,7 @@ fn views_and_images_of_one_laser_are_those_of_its_colour() {
     images(&calibrated(ONE, 0.0), &calibrated(THREE, 0.0));
 }
 
-/// Images of smaller holograms, so that there is darkness around them.
+/// Checks the output images of holograms smaller than the modulator, which are surrounded by black.
 fn images(one: &Target, three: &Target) {
     let shape @ (h, w) = (H - 6, W - 9);
     let levels: Vec<u8> = (0..3 * h * w).map(|i| (i * 7 % 251) as u8).collect();
@@ -297,7 +298,7 @@ fn images(one: &Target, three: &Target) {
         };
         let (bytes, read) = image(one, &levels[..h * w]);
         assert!(read.iter().zip(&levels).all(|(read, level)| *read == u16::from(*level)));
-        // The same of three equal colours, but for tables of their own.
+        // The image equals that of three equal colours, unless each colour has its own table.
         if one.response.shape().is_none() || layout.images(3) == 3 {
             assert!(bytes == image(three, &levels[..h * w].repeat(3)).0, "{layout:?}");
         }
@@ -321,7 +322,7 @@ fn a_session_shows_a_pictures_luminance() {
     one.warm_up().unwrap();
     for time in 0..2u64 {
         let mut scene = Scene::new(H, W, 10 + 5 * time as usize);
-        // Grey, so that luminance is each colour.
+        // The scene is grey, so that the luminance equals each colour.
         for pixel in scene.rgba.chunks_exact_mut(4) {
             let green = pixel[1];
             pixel[..3].fill(green);

@@ -1,4 +1,4 @@
-//! Sessions end to end with the shipped network: formats, modes, bad frames, what is reported.
+//! Tests sessions end to end with the bundled network: formats, modes, invalid frames and reports.
 use crate::camera;
 
 use camera::{DEPTH_FORMATS, Scene, depth, frame, options, with_confidence};
@@ -41,12 +41,12 @@ fn an_image_becomes_a_hologram_that_shows_it() {
     let (near, far) = hologram.range_m().unwrap();
     assert!((near - 1.0).abs() < 0.01 && (far - 3.0).abs() < 0.05, "{near} {far}");
     assert_eq!(hologram.valid_depth(), 1.0);
-    // A tap on the square focuses near, one on the wall's right end far.
+    // A tap on the square focuses near; a tap on the right end of the wall focuses far.
     let display = &hologram.target().display;
     assert!((hologram.z_at(0.3, 0.4) - display.z_of_depth(0.0)).abs() < 1e-4);
     assert!(hologram.z_at(0.99, 0.9) < display.z_of_depth(0.9));
     assert_eq!(hologram.z_at(-3.0, f64::NAN), hologram.z_at(0.0, 0.0));
-    // The square is bright and yellow in the preview, the wall is not.
+    // The square is bright and yellow in the preview; the wall is not.
     let mut rgba = vec![0; 4 * 24 * 32];
     hologram.preview(hologram.z_at(0.3, 0.4), 24, 32, &mut rgba).unwrap();
     let pixel = |x: usize, y: usize| &rgba[4 * (y * 32 + x)..][..4];
@@ -86,7 +86,7 @@ fn frames_are_turned_upright_colour_and_depth_together() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let upright = session.process(&frame(1, &scene, &metres)).unwrap();
     let turned = |values: &[u8], n: usize| -> Vec<u8> {
-        // Upside down: the last pixel comes first.
+        // The image is upside down, so the last pixel comes first.
         values.chunks_exact(n).rev().flatten().copied().collect()
     };
     let (rgba, depth_bytes) = (turned(&scene.rgba, 4), turned(&metres, 4));
@@ -116,7 +116,7 @@ fn cameras_apart_are_aligned() {
     frame.alignment = Alignment::Cameras(cameras);
     let same = session.process(&frame).unwrap();
     assert!(same.z_at(0.4, 0.4) > 2.5e-3);
-    // The colour camera stands 0.2 m to the left: it sees the square 12 pixels farther right.
+    // The colour camera is 0.2 m to the left, so it sees the square 12 pixels farther right.
     cameras.translation_m = [0.2, 0.0, 0.0];
     frame.alignment = Alignment::Cameras(cameras);
     let moved = session.process(&frame).unwrap();
@@ -138,7 +138,7 @@ fn a_display_of_ten_bits_gets_words() {
     let words = ten.words().unwrap();
     for ((word, upper), level) in words.iter().zip(ten.levels()).zip(eight.levels()) {
         assert_eq!(word >> 2, u16::from(*upper));
-        // The rounding to 8 bits of the same phase, around the circle.
+        // The words are the same phase, rounded to 10 bits instead of 8, around the circle.
         let apart = (i32::from(*word) - 4 * i32::from(*level)).rem_euclid(1024);
         assert!(apart <= 3 || apart >= 1021, "{word} {level}");
     }
@@ -150,7 +150,7 @@ fn a_display_of_ten_bits_gets_words() {
     assert!(ImageSession::new(options).is_err());
 }
 
-/// Hands a session one bad frame after another, and a good one after each.
+/// Submits invalid frames to a session, each followed by a valid one.
 struct Trial<'a> {
     session: VideoSession,
     scene: &'a Scene,
@@ -170,7 +170,7 @@ impl<'a> Trial<'a> {
         trial
     }
 
-    /// A timestamp that is right.
+    /// Returns a valid timestamp.
     fn next(&self) -> u64 {
         self.timestamp + 50
     }
@@ -181,7 +181,8 @@ impl<'a> Trial<'a> {
         self.session.process(&frame).unwrap();
     }
 
-    /// The frame of that name is refused by one line with `word`, and the next good one works.
+    /// Asserts that the frame called `name` is refused with one line that contains `word`, and that the next valid
+    /// frame works.
     fn refuses(&mut self, name: &str, word: &str, frame: phasefront::Result<CameraFrame<'_>>) {
         let made = frame.and_then(|frame| self.session.process(&frame));
         let message = made.unwrap_err().to_string();
@@ -278,7 +279,7 @@ fn late_frames_are_named_and_counted() {
     trial.refuses("the last again", late, Ok(frame(last, &scene, &metres)));
     let statistics = trial.session.statistics();
     assert_eq!(statistics.pending, 0);
-    // Two late frames, and the one that asked for the last timestamp.
+    // Two frames were late, and `timestamp_of` submitted the third.
     assert_eq!(statistics.refused, 3);
     assert_eq!(
         statistics.submitted,
@@ -289,7 +290,7 @@ fn late_frames_are_named_and_counted() {
     trial.session.process(&first).unwrap();
 }
 
-/// The last timestamp taken, from the refusal of an old one.
+/// Returns the last accepted timestamp, from the refusal of an old one.
 fn timestamp_of(session: &VideoSession) -> u64 {
     let scene = Scene::new(H, W, 10);
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
@@ -299,7 +300,7 @@ fn timestamp_of(session: &VideoSession) -> u64 {
     }
 }
 
-/// One who resets or closes a session does not wait for a frame that nobody wants any more.
+/// A reset or close does not wait for a frame that is no longer needed.
 #[test]
 fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
     let (height, width) = (480, 640);
@@ -307,7 +308,7 @@ fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let session = VideoSession::new(options(width, height)).unwrap();
     let first = session.process(&frame(1, &scene, &metres)).unwrap();
-    // Again and again, until a frame is met while it is computed.
+    // Repeats until the call hits a frame that is being computed.
     let met = |end: &(dyn Fn() + Sync)| {
         let processing = std::sync::atomic::AtomicBool::new(true);
         std::thread::scope(|scope| {
@@ -329,7 +330,7 @@ fn a_frame_is_given_up_when_its_session_is_reset_or_closed() {
     session.reset();
     let again = session.process(&frame(1, &scene, &metres)).unwrap();
     assert!(again.levels() == first.levels());
-    // Closed before a frame begins it refuses the frame; either way nothing is pending.
+    // A session that is closed before a frame begins refuses the frame; in both cases nothing is pending.
     let why = met(&|| session.close());
     assert!(why.contains("given up") || why.contains("closed"), "{why}");
     let s = session.statistics();
@@ -342,7 +343,7 @@ fn pause_and_close_are_kept_to() {
     let metres = scene.depth_bytes(DepthFormat::MetresF32);
     let frame = |t| frame(t, &scene, &metres);
     let image = image_session();
-    // Without a past, timestamps do not matter and equal frames are equal.
+    // Without a past, timestamps do not matter and equal frames give equal results.
     let (a, b) = (image.process(&frame(9)).unwrap(), image.process(&frame(3)).unwrap());
     assert_eq!(a.levels(), b.levels());
     image.pause();
@@ -358,7 +359,7 @@ fn pause_and_close_are_kept_to() {
     live.close();
 }
 
-/// What was before a reset does not come back, not even where the first frame after it comes to nothing.
+/// A reset discards the past even if the first frame after it fails.
 #[test]
 fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
     let scene = Scene::new(H, W, 10);
@@ -368,7 +369,7 @@ fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
         ..Scene::new(H, W, 10)
     };
     let far_metres = far.depth_bytes(DepthFormat::MetresF32);
-    // Colour and depth that do not belong together.
+    // Colour and depth do not match.
     let odd = |t| CameraFrame::new(t, scene.colour(), depth(&metres, DepthFormat::MetresF32, H, W));
     let new = || VideoSession::new(options(W, H)).unwrap();
     let alone = new().process(&frame(30, &far, &far_metres)).unwrap();
@@ -381,7 +382,7 @@ fn a_reset_forgets_the_past_also_where_the_next_frame_fails() {
     assert!(after.levels() == alone.levels());
 }
 
-/// A frame that is replayed passes the same gate as one that is processed.
+/// A replayed frame passes the same checks as a processed one.
 #[test]
 fn a_replay_is_refused_where_a_frame_is() {
     let scene = Scene::new(H, W, 10);
@@ -399,7 +400,7 @@ fn a_replay_is_refused_where_a_frame_is() {
     session.replay(&frame(2, &scene, &metres), 0.7).unwrap();
     let s = session.statistics();
     assert_eq!((s.submitted, s.processed, s.dropped.paused), (2, 1, 1));
-    // It is given up by a reset, as a frame is.
+    // A reset cancels it, as it cancels a frame.
     let session = VideoSession::new(options(640, 480)).unwrap();
     let large = Scene::new(480, 640, 10);
     let metres = large.depth_bytes(DepthFormat::MetresF32);
@@ -420,7 +421,8 @@ fn a_replay_is_refused_where_a_frame_is() {
     assert_eq!((s.dropped.reset, s.failed, s.pending), (1, 0, 0));
 }
 
-/// How many frames up to `last` were made, superseded and, of the time 7, dropped in a pause.
+/// Returns the numbers of frames up to `last` that were processed, superseded and, for timestamp 7, dropped during a
+/// pause.
 fn burst(events: &mpsc::Receiver<Event>, last: u64) -> (u64, u64, u64) {
     let (mut done, mut superseded, mut paused) = (0, 0, 0);
     loop {
@@ -453,7 +455,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     let (sender, events) = mpsc::channel();
     let listener = move |event| sender.send(event).unwrap();
     let session = LiveSession::new(options(W, H), listener).unwrap();
-    // One at a time, every frame is answered.
+    // If submitted one at a time, every frame is answered.
     for timestamp in 1..=5 {
         assert_eq!(session.submit(&frame(timestamp, &scene, &metres)).unwrap(), None);
         match events.recv().unwrap() {
@@ -461,14 +463,14 @@ fn a_live_session_answers_or_drops_every_frame() {
             other => panic!("{other:?}"),
         }
     }
-    // A frame without depth fails, and the next works.
+    // A frame without depth fails, and the next one works.
     let blind = CameraFrame::new(6, scene.colour(), depth(&nan, DepthFormat::MetresF32, W, H));
     session.submit(&blind).unwrap();
     match events.recv().unwrap() {
         Event::Failed { timestamp_ns: 6, error } => assert!(error.to_string().contains("no usable")),
         other => panic!("{other:?}"),
     }
-    // Late ones are refused, and the next works.
+    // Late frames are refused, and the next one works.
     for late in [6, 2] {
         match session.submit(&frame(late, &scene, &metres)) {
             Err(Error::Timestamp { given_ns, last_ns: 6 }) => assert_eq!(given_ns, late),
@@ -479,7 +481,7 @@ fn a_live_session_answers_or_drops_every_frame() {
     let paused = session.submit(&frame(7, &scene, &metres)).unwrap();
     assert_eq!(paused, Some(DropReason::Paused));
     session.resume();
-    // A burst: the newest is answered, the others are dropped for it.
+    // In a burst, the newest frame is answered, and it supersedes the others.
     let last = 100;
     for timestamp in 8..=last {
         session.submit(&frame(timestamp, &scene, &metres)).unwrap();
@@ -541,7 +543,7 @@ fn a_listener_may_panic_and_may_close() {
     assert_eq!(live.statistics().processed, 2);
 }
 
-/// Panics as it ends.
+/// Panics when it is dropped.
 struct Bomb;
 
 impl Drop for Bomb {
@@ -557,7 +559,7 @@ fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
     let (sender, events) = mpsc::channel();
     let listener = move |event| {
         sender.send(format!("{event:?}")).unwrap();
-        // Without the hook's message on stderr.
+        // This avoids the hook's message on stderr.
         std::panic::resume_unwind(Box::new(Bomb));
     };
     let session = LiveSession::new(options(W, H), listener).unwrap();
@@ -571,7 +573,7 @@ fn a_listener_whose_panic_panics_again_hears_the_next_frame() {
     assert_eq!(session.statistics().listener_panics, 4);
 }
 
-/// Closing does not wait on the listener's thread. The end is told all the same, behind every drop.
+/// Closing on the listener's thread does not wait, and the end is still reported after every drop.
 #[test]
 fn a_listener_that_closes_its_session_hears_the_end_last() {
     let scene = Scene::new(H, W, 10);
@@ -592,7 +594,7 @@ fn a_listener_that_closes_its_session_hears_the_end_last() {
     let live = LiveSession::new(options(W, H), listener).unwrap();
     let live = session.get_or_init(|| live);
     live.submit(&frame(1, &scene, &metres)).unwrap();
-    // Wait until the first is a hologram; the others can only be dropped then.
+    // Wait until the first frame is a hologram; only then can the others be dropped.
     while live.statistics().processed == 0 {
         std::thread::yield_now();
     }

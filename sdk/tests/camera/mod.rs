@@ -1,4 +1,4 @@
-//! A camera for tests: frames of a synthetic scene in every format, with strides and gaps.
+//! A camera for tests, with frames of a synthetic scene in every format, with strides and gaps.
 #![allow(dead_code)]
 
 use phasefront::input::{
@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
 
-/// Every colour format.
+/// Returns every colour format.
 pub(crate) fn colour_formats() -> Vec<ColourFormat> {
     let mut formats = vec![ColourFormat::Rgba, ColourFormat::Bgra, ColourFormat::Rgb];
     for matrix in [YuvMatrix::Bt601, YuvMatrix::Bt709] {
@@ -21,7 +21,7 @@ pub(crate) fn colour_formats() -> Vec<ColourFormat> {
     formats
 }
 
-/// Every depth format.
+/// All depth formats.
 pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::MetresF32,
     DepthFormat::MetresF16,
@@ -33,7 +33,7 @@ pub(crate) const DEPTH_FORMATS: [DepthFormat; 8] = [
     DepthFormat::NormalizedU16,
 ];
 
-/// Memory of one plane.
+/// The memory of one plane.
 pub(crate) struct Memory {
     pub(crate) bytes: Vec<u8>,
     pub(crate) row_stride: usize,
@@ -41,8 +41,8 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// Bytes at random for (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and after rows, and
-    /// not one byte behind the last pixel.
+    /// Fills a plane with random bytes: (`height`, `width`) pixels of `pixel` bytes, `gap` bytes between pixels and
+    /// after rows, and no byte after the last pixel.
     pub(crate) fn random(random: &mut ChaCha8Rng, (height, width): (usize, usize), pixel: usize, gap: usize) -> Self {
         let pixel_stride = pixel + gap;
         let row_stride = width * pixel_stride + gap;
@@ -91,7 +91,7 @@ impl Noise {
     }
 }
 
-/// A scene: a bright square at 1 m before a wall that runs from 2 m to 3 m.
+/// A scene with a bright square at 1 m in front of a wall from 2 m to 3 m.
 pub(crate) struct Scene {
     pub(crate) width: usize,
     pub(crate) height: usize,
@@ -100,7 +100,7 @@ pub(crate) struct Scene {
 }
 
 impl Scene {
-    /// The square starts `at` pixels from the left.
+    /// Creates the scene with the square starting `at` pixels from the left.
     pub(crate) fn new(height: usize, width: usize, at: usize) -> Self {
         let square = |x: usize, y: usize| (at..at + width / 4).contains(&x) && (height / 4..height / 2).contains(&y);
         let pixels = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
@@ -127,7 +127,7 @@ impl Scene {
         ColourImage::new(ColourFormat::Rgba, self.width, self.height, &[plane]).expect("a whole image")
     }
 
-    /// The depth's bytes in `format`.
+    /// Returns the bytes of the depth in `format`.
     pub(crate) fn depth_bytes(&self, format: DepthFormat) -> Vec<u8> {
         let half = |v: f32| half::f16::from_f32(v).to_le_bytes().to_vec();
         let whole = |v: f32| (v as u16).to_le_bytes().to_vec();
@@ -138,26 +138,26 @@ impl Scene {
             DepthFormat::DisparityF16 => half(1.0 / m),
             DepthFormat::NormalizedU8 => vec![((m - 1.0) / 2.0 * 255.0) as u8],
             DepthFormat::NormalizedU16 => whole((m - 1.0) / 2.0 * 65535.0),
-            // The confidence bits of full confidence are 0, so both millimetres are alike.
+            // Full confidence has the bits 0, so both formats in millimetres are the same.
             _ => whole(m * 1000.0),
         };
         self.metres.iter().flat_map(bytes).collect()
     }
 }
 
-/// A depth image over `bytes`, tightly packed.
+/// Returns a depth image over `bytes`, tightly packed.
 pub(crate) fn depth(bytes: &[u8], format: DepthFormat, width: usize, height: usize) -> DepthImage<'_> {
     let pixel = format.pixel_bytes();
     DepthImage::new(format, width, height, Plane::new(bytes, width * pixel, pixel)).expect("a whole image")
 }
 
-/// A frame of `scene` with depth in metres over `metres`, its bytes.
+/// Returns a frame of `scene`, whose depth is in metres in the bytes `metres`.
 pub(crate) fn frame<'a>(timestamp_ns: u64, scene: &'a Scene, metres: &'a [u8]) -> CameraFrame<'a> {
     let depth = depth(metres, DepthFormat::MetresF32, scene.width, scene.height);
     CameraFrame::new(timestamp_ns, scene.colour(), depth)
 }
 
-/// `depth` with a confidence map of another size or the same.
+/// Returns `depth` with a confidence map of the same or another size.
 pub(crate) fn with_confidence<'a>(
     depth: DepthImage<'a>,
     map: &'a [u8],
@@ -167,7 +167,7 @@ pub(crate) fn with_confidence<'a>(
     depth.with_confidence(ConfidenceFormat::U8, width, height, Plane::new(map, width, 1))
 }
 
-/// A small display and the shipped network.
+/// Returns options for a small display and the bundled network.
 pub(crate) fn options(width: usize, height: usize) -> SessionOptions {
     let network = Network::from_onnx(include_bytes!("../../../models/rgbd-8-int8.onnx"));
     let method = Method::Network(Arc::new(network.expect("a hologram network")));

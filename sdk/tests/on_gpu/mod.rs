@@ -1,4 +1,4 @@
-//! Sessions on any GPU that there is, Mesa's driver in software too.
+//! Helpers for sessions on any available GPU, including Mesa's software driver.
 
 #[path = "../../../tests/driver.rs"]
 mod driver;
@@ -7,7 +7,7 @@ use phasefront::SessionOptions;
 use phasefront::session::Backend;
 use phasefront_gpu::{Device, DeviceOptions};
 
-/// The options of the tests on the GPU.
+/// Returns `options` for the tests on the GPU.
 pub(crate) fn on_gpu(options: SessionOptions) -> SessionOptions {
     let open = |name| {
         let device = DeviceOptions { name, programs: None };

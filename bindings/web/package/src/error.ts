@@ -1,12 +1,12 @@
-/** What apps can act on. */
+/** The kind of an error, which an app can act on. */
 export type ErrorKind = "display" | "frame" | "timestamp" | "setting" | "network" | "session" | "internal";
 
-/** Why Phasefront refused to go on. The message is one line that names what is wrong and what would be right. */
+/** An error of Phasefront. The message is one line that names the fault and the correct value. */
 export class PhasefrontError extends Error {
   override readonly name = "PhasefrontError";
 
   constructor(
-    /** What kind of fault it is. `internal` is one of Phasefront; please report it. */
+    /** The kind of the error. `internal` is a fault of Phasefront; please report it. */
     readonly kind: ErrorKind,
     message: string,
   ) {
@@ -16,12 +16,15 @@ export class PhasefrontError extends Error {
 
 let state: "not loaded" | "ready" | PhasefrontError = "not loaded";
 
-/** Says that the module is there. */
+/** Records that the module is loaded. */
 export function ready(): void {
   state = "ready";
 }
 
-/** What `call` gives of the module. Memory of a module that panicked may be half written, so it is not called again. */
+/**
+ * Returns the result of a `call` of the module. A module that panicked is not called again, because its memory may be
+ * half written.
+ */
 export function guard<T>(call: () => T): T {
   if (state === "not loaded") throw new PhasefrontError("session", "the module is not loaded; await load() first");
   if (state !== "ready") throw state;
@@ -43,18 +46,18 @@ export function guard<T>(call: () => T): T {
   }
 }
 
-/** Gives back what the module holds; of one that panicked nothing can be given back. */
+/** Frees an object of the module. After a panic nothing can be freed. */
 export function release(raw: { free(): void } | undefined): void {
   if (state === "ready") raw?.free();
 }
 
-/** `value`, which must be whole and fit the module's 32 bits. */
+/** Returns `value`, which must be an integer that fits the module's 32 bits. */
 export function whole(what: string, value: number, kind: ErrorKind = "setting"): number {
   if (Number.isInteger(value) && value >= 0 && value < 2 ** 32) return value;
   throw new PhasefrontError(kind, `${what} is ${value}; a whole number from 0 to ${2 ** 32 - 1} is right`);
 }
 
-/** Bytes of any array, where they lie. */
+/** Returns the bytes of any array without copying. */
 export function bytesOf(what: string, data: unknown, kind: ErrorKind): Uint8Array {
   if (ArrayBuffer.isView(data)) return new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
   if (data instanceof ArrayBuffer) return new Uint8Array(data);

@@ -1,12 +1,13 @@
 import { PhasefrontError, bytesOf, guard, release, whole } from "./error.js";
 import { RawFrame } from "./raw/phasefront_web.js";
 
-/** How a colour image lies in memory. `nv12` has two planes, `yuv420` three, the others one. */
+/** The memory layout of a colour image. `nv12` has two planes, `yuv420` three, the others one. */
 export type ColourFormat = "rgba" | "bgra" | "rgb" | "nv12" | "yuv420";
 
 /**
- * What a depth image's numbers are: metres, inverse metres, millimetres; Android's DEPTH16; or normalized, 0 nearest,
- * the largest number farthest. But for the normalized ones, 0, negative numbers and what is not finite are no reading.
+ * The meaning of a depth image's numbers: metres, inverse metres, millimetres, Android's DEPTH16, or normalized, where
+ * 0 is nearest and the largest number farthest. Except in normalized formats, 0, negative and non-finite numbers mean
+ * that there is no reading.
  */
 export type DepthFormat =
   | "metres-f32"
@@ -18,63 +19,63 @@ export type DepthFormat =
   | "normalized-u8"
   | "normalized-u16";
 
-/** What a confidence map's bytes are: 0 low, 1 medium, 2 high; or 0 none to 255 full. */
+/** The meaning of a confidence map's bytes: 0 low, 1 medium, 2 high; or 0 none to 255 full. */
 export type ConfidenceFormat = "low-medium-high" | "u8";
 
-/** Bytes of one plane, and where its pixels lie in them. */
+/** The bytes of one plane and the layout of its pixels. */
 export interface Plane {
-  /** Any typed array. */
+  /** The bytes: any typed array. */
   readonly data: ArrayBufferView;
-  /** Bytes from one row to the next; rows without gaps unless it is said. */
+  /** Bytes from one row to the next. By default rows have no gaps. */
   readonly rowStride?: number;
-  /** Bytes from one pixel to the next in a row; pixels without gaps unless it is said. */
+  /** Bytes from one pixel to the next in a row. By default pixels have no gaps. */
   readonly pixelStride?: number;
 }
 
-/** A colour image of one plane. An `ImageData` of a canvas is one. */
+/** A colour image with one plane, for example a canvas's `ImageData`. */
 export interface PackedColour extends Plane {
   readonly width: number;
   readonly height: number;
-  /** `rgba` unless it is said. */
+  /** The layout; `rgba` by default. */
   readonly format?: "rgba" | "bgra" | "rgb";
 }
 
-/** A colour image of luma and chroma, as a `VideoFrame` gives it. */
+/** A colour image of luma and chroma, as in a `VideoFrame`. */
 export interface PlanarColour {
   readonly width: number;
   readonly height: number;
   readonly format: "nv12" | "yuv420";
-  /** In the format's order. */
+  /** The planes in the order of the format. */
   readonly planes: readonly Plane[];
-  /** Between luma, chroma and colour; `bt601` unless it is said. */
+  /** The matrix that converts luma and chroma to colour; `bt601` by default. */
   readonly matrix?: "bt601" | "bt709";
-  /** Whether luma runs over 16 to 235, not 0 to 255. */
+  /** Whether luma ranges from 16 to 235 instead of 0 to 255. */
   readonly videoRange?: boolean;
 }
 
-/** A depth image. A grey picture in an `ImageData` is one with `pixelStride: 4`. */
+/** A depth image. A grey picture in an `ImageData` is a depth image with `pixelStride: 4`. */
 export interface DepthImage extends Plane {
   readonly width: number;
   readonly height: number;
-  /** Metres of a `Float32Array`, millimetres of a `Uint16Array`, normalized of bytes, unless it is said. */
+  /** The format. By default a `Float32Array` has metres, a `Uint16Array` millimetres, and bytes are normalized. */
   readonly format?: DepthFormat;
 }
 
-/** How sure the depth is: an image of the depth's size. */
+/** The confidence of the depth, an image of the same size. */
 export interface ConfidenceImage extends Plane {
   readonly width: number;
   readonly height: number;
-  /** `u8` unless it is said. */
+  /** The format; `u8` by default. */
   readonly format?: ConfidenceFormat;
 }
 
-/** How a sensor's picture becomes the one that is shown: turned clockwise, then mirrored. */
+/** The orientation of the displayed picture relative to the sensor's: rotated clockwise, then mirrored. */
 export interface Orientation {
   readonly degrees: 0 | 90 | 180 | 270;
   readonly mirrored?: boolean;
 }
 
-/** The pinhole model of a camera, in pixels of its image before it is turned upright. */
+/** The pinhole model of a camera, in pixels of its image before rotation. */
 export interface Intrinsics {
   readonly fx: number;
   readonly fy: number;
@@ -82,22 +83,25 @@ export interface Intrinsics {
   readonly cy: number;
 }
 
-/** How the depth camera and the colour camera stand to each other. */
+/** The relation of the depth camera and the colour camera. */
 export interface Cameras {
   readonly colour: Intrinsics;
   readonly depth: Intrinsics;
-  /** A point p of the depth camera is at R·p + t of the colour camera: R's 9 numbers row by row, and t in metres. */
+  /**
+   * The pose: a point p in depth camera coordinates is R·p + t in colour camera coordinates. R has 9 numbers, row by
+   * row; t is in metres.
+   */
   readonly pose?: { readonly rotation: readonly number[]; readonly translationM: readonly number[] };
 }
 
-/** What else is known of a frame. */
+/** The optional properties of a frame. */
 export interface FrameOptions {
-  /** When it was taken, in nanoseconds of any clock that runs forward. Image sessions do not look at it. */
+  /** The capture time in nanoseconds of any monotonic clock. Image sessions ignore it. */
   readonly timestampNs?: bigint;
   readonly confidence?: ConfidenceImage;
-  /** Upright unless it is said. */
+  /** The orientation; upright by default. */
   readonly orientation?: Orientation;
-  /** Where colour and depth do not show the same field of view. */
+  /** The cameras, if colour and depth have different fields of view. */
   readonly cameras?: Cameras;
 }
 
@@ -119,7 +123,7 @@ function depthFormat(depth: DepthImage): DepthFormat {
   );
 }
 
-/** Bytes and strides of a plane of `width` pixels of `pixel` bytes. */
+/** Returns the bytes and strides of a plane of `width` pixels of `pixel` bytes. */
 function strides(what: string, plane: Plane, width: number, pixel: number): [Uint8Array, number, number] {
   const pixelStride = whole(`frame: the pixel stride of ${what}`, plane.pixelStride ?? pixel, "frame");
   const rowStride = whole(`frame: the row stride of ${what}`, plane.rowStride ?? width * pixelStride, "frame");
@@ -133,7 +137,7 @@ function size(what: string, image: { readonly width: number; readonly height: nu
   ];
 }
 
-/** Colour and depth of one moment. Arrays are read when a session processes the frame. */
+/** The colour and depth of one moment. Arrays are read when a session processes the frame. */
 export class Frame {
   constructor(
     readonly colour: PackedColour | PlanarColour,
@@ -141,7 +145,7 @@ export class Frame {
     readonly options: FrameOptions = {},
   ) {}
 
-  /** @internal In the module's memory; freed by who asks. */
+  /** @internal Copies the frame into the module's memory. The caller frees it. */
   toRaw(): RawFrame {
     const { colour, depth, options } = this;
     const format: ColourFormat = colour.format ?? "rgba";

@@ -1,51 +1,51 @@
 import { PhasefrontError, guard, release, whole } from "./error.js";
 import type { RawHologram } from "./raw/phasefront_web.js";
 
-/** How long each stage of a frame took. */
+/** The time of each stage of a frame. */
 export interface FrameTimes {
   readonly colourMs: number;
   readonly depthMs: number;
-  /** From the frame to the midpoint hologram. */
+  /** The time from the frame to the midpoint hologram. */
   readonly methodMs: number;
-  /** From the midpoint to the modulator. */
+  /** The time from the midpoint to the modulator. */
   readonly propagateMs: number;
-  /** From the field to levels. */
+  /** The time from the field to levels. */
   readonly encodeMs: number;
   readonly totalMs: number;
 }
 
-/** What is known of a hologram. */
+/** The metadata of a hologram. */
 export interface HologramInfo {
-  /** The frame's. */
+  /** The timestamp of the frame. */
   readonly timestampNs: bigint;
   readonly width: number;
   readonly height: number;
-  /** How many colours its levels have, C: 3, or 1 of one laser. */
+  /** The number of colours of the levels, C: 3, or 1 with one laser. */
   readonly colours: number;
-  /** The amplitude that full light stands for. */
+  /** The amplitude that full light represents. */
   readonly scale: number;
-  /** Metres at the near and the far end of the volume; null for normalized depth. */
+  /** The distances of the near and the far end of the volume in metres; null for normalized depth. */
   readonly rangeM: readonly [near: number, far: number] | null;
   /** The share of the depth image's pixels that had a usable reading. */
   readonly validDepth: number;
-  /** The quality level that it was made at, 0 the best. */
+  /** The quality level; 0 is the best. */
   readonly qualityLevel: number;
   readonly times: FrameTimes;
 }
 
-/** How a hologram is put on its modulator. */
+/** The placement of a hologram on its modulator. */
 export interface Placement {
-  /** How colours lie in images; `grey` is an image for each, a byte a pixel. `rgb` unless it is said. */
+  /** The layout of colours in images; `grey` has one image per colour with one byte per pixel. `rgb` by default. */
   readonly layout?: "rgb" | "rgba" | "bgra" | "grey";
   readonly flipX?: boolean;
   readonly flipY?: boolean;
-  /** Pixels to the right of the middle, before flips. */
+  /** The offset to the right of the centre in pixels, before flips. */
   readonly shiftX?: number;
-  /** Pixels below the middle, before flips. */
+  /** The offset below the centre in pixels, before flips. */
   readonly shiftY?: number;
 }
 
-/** An image that the modulator's driver takes, of the modulator's resolution. */
+/** An image for the modulator's driver, at the modulator's resolution. */
 export interface OutputImage {
   readonly width: number;
   readonly height: number;
@@ -53,9 +53,9 @@ export interface OutputImage {
   readonly data: Uint8Array;
 }
 
-/** The hologram of one frame. Its memory is the module's until it is closed, or collected as garbage. */
+/** The hologram of one frame. It uses the module's memory until it is closed or garbage-collected. */
 export class Hologram {
-  /** What is known of it. */
+  /** The metadata. */
   readonly info: HologramInfo;
   #raw: RawHologram | undefined;
 
@@ -69,20 +69,24 @@ export class Hologram {
     return new Hologram(raw);
   }
 
-  /** The modulator levels, (C, H, W): red, green, blue, or those of the one laser. A copy, made at each call. */
+  /** Returns a copy of the modulator levels, (C, H, W): red, green and blue, or those of the only laser. */
   get levels(): Uint8Array {
     return this.#call((raw) => raw.levels());
   }
 
-  /** z of what is seen at (x, y) of the picture, each 0 to 1 from its upper left corner, in mm: where to focus. */
+  /**
+   * Returns the z in mm of the scene point at (x, y) of the picture, for example to focus on it. Coordinates run from 0
+   * to 1 from the upper left corner.
+   */
   zAt(x: number, y: number): number {
     return this.#call((raw) => raw.zAt(x, y));
   }
 
   /**
-   * What an eye focused at `zMm` sees: rows of red, green, blue, alpha, as `new ImageData(pixels, width)` takes them.
+   * Returns the view of an eye focused at `zMm`: rows of red, green, blue and alpha, as `new ImageData(pixels, width)`
+   * takes them.
    *
-   * @throws PhasefrontError `setting`: an image that is empty or too large, or a z too far away.
+   * @throws PhasefrontError `setting`: the image is empty or too large, or z is too far away.
    */
   preview(zMm: number, width: number, height: number): Uint8ClampedArray<ArrayBuffer> {
     const [w, h] = [whole("the width of a preview", width), whole("the height of a preview", height)];
@@ -90,28 +94,28 @@ export class Hologram {
   }
 
   /**
-   * What an eye focused at `zMm` sees of the whole hologram: amplitudes, of which 1 is white, (C, H, W).
+   * Returns the view of an eye focused at `zMm` at full resolution: amplitudes where 1 is white, (C, H, W).
    *
-   * @throws PhasefrontError `setting`: a z too far away.
+   * @throws PhasefrontError `setting`: z is too far away.
    */
   refocus(zMm: number): Float32Array {
     return this.#call((raw) => raw.refocus(zMm));
   }
 
   /**
-   * The complex field that the levels make behind the aperture at `zMm`, 0 the midpoint, without the carrier: real and
-   * imaginary part of each pixel, (C, H, W, 2).
+   * Returns the complex field that the levels produce behind the aperture at `zMm`, without the carrier; z = 0 is the
+   * midpoint. The result has the real and imaginary part of each pixel, (C, H, W, 2).
    *
-   * @throws PhasefrontError `setting`: a z too far away.
+   * @throws PhasefrontError `setting`: z is too far away.
    */
   field(zMm = 0): Float32Array {
     return this.#call((raw) => raw.field(zMm));
   }
 
   /**
-   * Image `image` of those that the modulator's driver takes. All layouts but `grey` have one.
+   * Returns the image with index `image` for the modulator's driver. All layouts except `grey` have one image.
    *
-   * @throws PhasefrontError `setting`: a layout that is not known, or an image that it has not.
+   * @throws PhasefrontError `setting`: the layout is unknown or does not have the image.
    */
   output(placement: Placement = {}, image = 0): OutputImage {
     const { layout = "rgb", flipX = false, flipY = false, shiftX = 0, shiftY = 0 } = placement;
@@ -120,7 +124,7 @@ export class Hologram {
     return this.#call((raw) => raw.output(layout, flips, Int32Array.of(shiftX, shiftY), index)) as OutputImage;
   }
 
-  /** Gives its memory back now. Closing twice does nothing. */
+  /** Frees the memory now. Closing twice does nothing. */
   close(): void {
     release(this.#raw);
     this.#raw = undefined;

@@ -1,21 +1,21 @@
 import { bytesOf, guard } from "./error.js";
 import { RawNetwork } from "./raw/phasefront_web.js";
 
-/** What a network is. */
+/** The properties of a network. */
 export interface NetworkInfo {
-  /** Layers of its chain. */
+  /** The number of layers. */
   readonly layers: number;
-  /** Filters of its hidden layers. */
+  /** The number of filters in each hidden layer. */
   readonly filters: number;
-  /** Numbers that it computes in. */
+  /** The number format that the network computes in. */
   readonly precision: string;
-  /** The pixel pitch that it was trained for, µm. */
+  /** The pixel pitch that the network was trained for, in µm. */
   readonly pitchUm: number;
-  /** The volume's depth that it was trained for, mm. */
+  /** The depth of the volume that the network was trained for, in mm. */
   readonly volumeDepthMm: number;
 }
 
-/** A trained network. Immutable; sessions share it. */
+/** A trained network. It is immutable and can be shared by sessions. */
 export class Network {
   /** @internal */
   readonly raw: RawNetwork;
@@ -25,9 +25,9 @@ export class Network {
   }
 
   /**
-   * A network from the bytes of an `.onnx` file.
+   * Loads a network from the bytes of an `.onnx` file.
    *
-   * @throws PhasefrontError `network`: what is no hologram network, or one that the kernels do not take.
+   * @throws PhasefrontError `network`: the file is not a hologram network, or the kernels do not support it.
    */
   static fromBytes(onnx: ArrayBuffer | ArrayBufferView): Network {
     const bytes = bytesOf("the network", onnx, "network");
@@ -35,25 +35,26 @@ export class Network {
   }
 
   /**
-   * The int8 network of this name that is in the module: `rgbd-8` or `rgbd-15`.
+   * Returns the built-in int8 network called `name`: `rgbd-8` or `rgbd-15`.
    *
-   * @throws PhasefrontError `network`: another name.
+   * @throws PhasefrontError `network`: the name is unknown.
    */
   static builtIn(name = "rgbd-8"): Network {
     return new Network(guard(() => RawNetwork.builtIn(name)));
   }
 
   /**
-   * The hologram network and the pre-filter that was trained with it, for a modulator at `offsetMm`: 0, 6 or 12.
+   * Returns the hologram network and the pre-filter that was trained with it, for a modulator at `offsetMm`: 0, 6 or
+   * 12.
    *
-   * @throws PhasefrontError `network`: an offset that no pair was trained for.
+   * @throws PhasefrontError `network`: no pair was trained for the offset.
    */
   static builtInPair(offsetMm: number): DeepPair {
     const [hologram, prefilter] = guard(() => RawNetwork.builtInPair(offsetMm)).map((raw) => new Network(raw));
     return { hologram: hologram!, prefilter: prefilter! };
   }
 
-  /** What it is. */
+  /** The properties of the network. */
   get info(): NetworkInfo {
     return guard(() => this.raw.info()) as NetworkInfo;
   }
@@ -61,8 +62,8 @@ export class Network {
 
 /** The two networks of deep double phase. */
 export interface DeepPair {
-  /** Makes the hologram. */
+  /** The network that computes the hologram. */
   readonly hologram: Network;
-  /** Prepares it for its encoding: `{ kind: "deep", prefilter }`. */
+  /** The network that pre-filters it for the encoding `{ kind: "deep", prefilter }`. */
   readonly prefilter: Network;
 }

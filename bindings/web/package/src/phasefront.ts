@@ -1,5 +1,5 @@
 /**
- * RGB-D frames to phase-only 3D holograms, in a browser.
+ * Converts RGB-D frames to phase-only 3D holograms in a browser.
  *
  * ```ts
  * import { Frame, Session, load } from "phasefront";
@@ -11,8 +11,8 @@
  * console.log(hologram.levels.length, hologram.info.times.totalMs);
  * ```
  *
- * Lengths are in the unit of their name; planes row by row, (H, W), stacks (C, H, W). Every error is a
- * {@link PhasefrontError}, whose message is one line that names what is wrong and what would be right.
+ * Names give the unit of lengths. Planes are row-major, (H, W), stacks (C, H, W). Errors are of the class {@link
+ * PhasefrontError}, whose message is one line that names the fault and the correct value.
  */
 
 import { PhasefrontError, guard, ready } from "./error.js";
@@ -49,15 +49,17 @@ export {
 } from "./session.js";
 export { Target, displayFromToml, type Display } from "./target.js";
 
-/** Where the module comes from: an address, a response, its bytes, or compiled as a page hands it to its workers. */
+/**
+ * The source of the module: an address, a response, its bytes, or a compiled module that a page passes to its workers.
+ */
 export type ModuleSource = string | URL | Request | Response | BufferSource | WebAssembly.Module;
 
 let loading: Promise<void> | undefined;
 
 /**
- * Loads the module: from beside this file, or from `source`. Called again it waits for the first.
+ * Loads the module from the folder of this file, or from `source`. Later calls wait for the first.
  *
- * @throws PhasefrontError `session`: a module that cannot be loaded, or a browser without WebAssembly SIMD.
+ * @throws PhasefrontError `session`: the module cannot be loaded, or the browser has no WebAssembly SIMD.
  */
 export function load(source?: ModuleSource | Promise<ModuleSource>): Promise<void> {
   loading ??= init(source === undefined ? undefined : { module_or_path: source }).then(ready, (error: unknown) => {
@@ -68,7 +70,7 @@ export function load(source?: ModuleSource | Promise<ModuleSource>): Promise<voi
   return loading;
 }
 
-/** The version of the library. */
+/** Returns the version of the library. */
 export function version(): string {
   return guard(rawVersion);
 }

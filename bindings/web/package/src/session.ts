@@ -6,73 +6,82 @@ import { RawMethod, RawOptions, RawSession } from "./raw/phasefront_web.js";
 import { Target, type Display } from "./target.js";
 
 /**
- * How a session runs. `image` answers each frame by itself; `video` smooths depth and brightness over time,
- * and timestamps must rise. A live stream needs a thread of its own, which there is not here.
+ * The running mode of a session. `image` processes each frame independently; `video` smooths depth and brightness over
+ * time and requires increasing timestamps. There is no live mode, because it needs its own thread.
  */
 export type RunningMode = "image" | "video";
 
-/** What makes holograms: a trained network; the plane sweep, for any display; or what suits each frame's depth. */
+/**
+ * The method that computes holograms: a trained network; the plane sweep, for any display; or an automatic choice by
+ * each frame's depth.
+ */
 export type Method =
   | { readonly kind: "trained"; readonly network: Network }
   | { readonly kind: "sweep" }
   | { readonly kind: "auto"; readonly network: Network };
 
-/** How the field becomes phases; what is not said of an encoding is as published. */
+/** The encoding of the field as phases. Omitted values are those of the publication. */
 export type Encoding =
   | { readonly kind: "double-phase" }
   | { readonly kind: "anti-alias"; readonly sigma?: number; readonly width?: number }
   | { readonly kind: "band-limit"; readonly k?: number }
   | { readonly kind: "deep"; readonly prefilter: Network };
 
-/** Which amplitude full light stands for: near the frame's largest, moving smoothly; the largest; or this one. */
+/**
+ * The amplitude that full light represents: near the frame's largest and smoothed over time; the frame's largest; or a
+ * fixed value.
+ */
 export type Brightness =
   { readonly kind: "smoothed" } | { readonly kind: "frame-max" } | { readonly kind: "fixed"; readonly scale: number };
 
-/** Whether the session changes its quality level by itself, or stays at one, 0 the best. */
+/** Whether the session changes its quality level by itself or keeps a fixed one; 0 is the best. */
 export type Quality = { readonly kind: "adaptive" } | { readonly kind: "fixed"; readonly qualityLevel: number };
 
-/** One quality. A hologram smaller than the modulator is shown in its middle. */
+/** A quality level. A hologram smaller than the modulator is displayed in its centre. */
 export interface QualityLevel {
   readonly method: Method;
   readonly width: number;
   readonly height: number;
-  /** The session's unless it is said. */
+  /** The session's value by default. */
   readonly localSteps?: number;
-  /** The session's unless it is said. */
+  /** The session's value by default. */
   readonly midpointSteps?: number;
 }
 
-/** What a session makes, and how; what is left out has its default. */
+/** The options of a session. Omitted options have their defaults. */
 export interface SessionOptions {
-  /** What holograms are for: the paper's display unless it is said. */
+  /** The target of the holograms; the paper's display by default. */
   readonly target?: Target | Display;
-  /** The built-in network where it was trained for the display, else the plane sweep, unless it is said. */
+  /** The method; by default the built-in network if it was trained for the display, otherwise the plane sweep. */
   readonly method?: Method;
-  /** Qualities, the best first; `method` at the modulator's resolution unless it is said. */
+  /** The quality levels, best first; by default only `method` at the modulator's resolution. */
   readonly qualityLevels?: readonly QualityLevel[];
-  /** `adaptive` unless it is said. */
+  /** The choice of the quality level; `adaptive` by default. */
   readonly quality?: Quality;
-  /** Frames a second that are aimed at; without it the session takes every frame and never steps. */
+  /**
+   * The target rate in frames per second. Without it the session takes every frame and does not adapt its quality
+   * level.
+   */
   readonly targetRateHz?: number;
-  /** `anti-alias` unless it is said. */
+  /** The encoding; `anti-alias` by default. */
   readonly encoding?: Encoding;
-  /** `smoothed` unless it is said. */
+  /** The brightness; `smoothed` by default. */
   readonly brightness?: Brightness;
-  /** The share of full light below which phases are drawn to 0; what suits the encoding unless it is said. */
+  /** The share of full light below which phases are pulled to 0; by default that of the encoding. */
   readonly darkThreshold?: number;
-  /** Steps of correction, 0 to 8; what suits the encoding unless it is said. */
+  /** The number of local correction steps, 0 to 8; by default that of the encoding. */
   readonly localSteps?: number;
-  /** Steps of correction at the midpoint, 0 to 100, each of four transforms a colour; 0 unless it is said. */
+  /** The number of correction steps at the midpoint, 0 to 100, each of four transforms per colour; 0 by default. */
   readonly midpointSteps?: number;
-  /** Metres at the ends of the volume; the readings' 1st and 99th percentile unless it is said. */
+  /** The depths in metres at the ends of the volume; by default the 1st and 99th percentile of the readings. */
   readonly depthRange?: { readonly nearM: number; readonly farM: number };
-  /** Readings less sure than this, 0 to 1, are none. */
+  /** The confidence, 0 to 1, below which readings are ignored. */
   readonly leastConfidence?: number;
-  /** Most pixels of a quality level and of the modulator. */
+  /** The maximum number of pixels of a quality level and of the modulator. */
   readonly mostPixels?: number;
 }
 
-/** What a session has done so far. Rates and times are means of the last 30 holograms. */
+/** The statistics of a session. Rates and times are means over the last 30 holograms. */
 export interface Statistics {
   readonly submitted: number;
   readonly processed: number;
@@ -80,7 +89,7 @@ export interface Statistics {
   readonly refused: number;
   readonly rateHz: number;
   readonly times: FrameTimes;
-  /** What runs the frames. */
+  /** The backend that computes the frames. */
   readonly backend: string;
   readonly backendWhy: string;
   readonly qualityLevel: number;
@@ -101,7 +110,7 @@ function rawMethod(method: Method): RawMethod {
   }
 }
 
-/** Sets `encoding` before all that corrects it. */
+/** Sets the `encoding` before its corrections. */
 function setEncoder(raw: RawOptions, options: SessionOptions): void {
   const { encoding, brightness } = options;
   if (encoding?.kind === "deep") raw.deep(encoding.prefilter.raw);
@@ -140,14 +149,14 @@ function rawOptions(options: SessionOptions): RawOptions {
 }
 
 /**
- * Frames in, holograms out. A call computes on the thread that makes it, so that a page stays live where its session
- * lives in a worker.
+ * Makes holograms of frames. Calls compute on the calling thread; run the session in a worker to keep the page
+ * responsive.
  */
 export class Session {
   #raw: RawSession | undefined;
 
   /**
-   * @throws PhasefrontError for options that cannot be meant or planned for.
+   * @throws PhasefrontError if the options are invalid or cannot be planned for.
    */
   constructor(options: SessionOptions = {}, mode: RunningMode = "image") {
     const raw = rawOptions(options);
@@ -159,10 +168,10 @@ export class Session {
   }
 
   /**
-   * The hologram of a frame.
+   * Returns the hologram of a frame.
    *
-   * @throws PhasefrontError `frame`: one that is not usable. `timestamp`: a late one in a video session. `session`: a
-   * closed session. None of them harms the frames that follow.
+   * @throws PhasefrontError `frame`: the frame is not usable. `timestamp`: the frame is late in a video session.
+   * `session`: the session is closed. The frames that follow are not affected.
    */
   process(frame: Frame): Hologram {
     const session = this.#open();
@@ -174,13 +183,15 @@ export class Session {
     }
   }
 
-  /** Runs an empty frame through the stages, so that the first real one is as fast as the others. */
+  /** Runs an empty frame through the stages, so that the first real frame is as fast as the others. */
   warmUp(): void {
     const session = this.#open();
     guard(() => session.warmUp());
   }
 
-  /** Forgets all frames so far, one in the making too; the next, of any timestamp, is the first again. */
+  /**
+   * Forgets all previous frames, including one being computed; the next frame, with any timestamp, counts as the first.
+   */
   reset(): void {
     const session = this.#open();
     guard(() => session.reset());
@@ -189,20 +200,20 @@ export class Session {
   /**
    * Allows or forbids changes of the quality level.
    *
-   * @throws PhasefrontError `setting`: a quality level that the session does not have.
+   * @throws PhasefrontError `setting`: the session does not have the quality level.
    */
   setQuality(quality: Quality): void {
     const session = this.#open();
     guard(() => session.setQuality(qualityLevel(quality)));
   }
 
-  /** What the session has done so far. */
+  /** The statistics so far. */
   get statistics(): Statistics {
     const session = this.#open();
     return guard(() => session.statistics()) as Statistics;
   }
 
-  /** Takes no more frames and gives the memory back. Holograms stay as they are. Closing twice does nothing. */
+  /** Stops taking frames and frees the memory. Holograms stay valid. Closing twice does nothing. */
   close(): void {
     release(this.#raw);
     this.#raw = undefined;

@@ -1,27 +1,27 @@
 import { bytesOf, guard } from "./error.js";
 import { RawTarget } from "./raw/phasefront_web.js";
 
-/** A display. What is not said is the paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm at the modulator. */
+/** A display. The defaults are the paper's: 1920×1080, 8 µm, 638/520/450 nm, a volume of 6 mm at the modulator. */
 export interface Display {
-  /** Pixels of the modulator along x. */
+  /** The width of the modulator in pixels. */
   width?: number;
-  /** Pixels along y. */
+  /** The height of the modulator in pixels. */
   height?: number;
-  /** From pixel to pixel, µm. */
+  /** The pixel pitch in µm. */
   pitchUm?: number;
-  /** Of the lasers red, green and blue, or of the one laser, nm. */
+  /** The wavelengths of the red, green and blue lasers, or of the only laser, in nm. */
   wavelengthsNm?: number[];
-  /** From the near to the far end of the volume, mm. */
+  /** The distance from the near to the far end of the volume in mm. */
   volumeDepthMm?: number;
-  /** From the middle of the volume to the modulator, mm; positive toward the viewer. */
+  /** The distance from the centre of the volume to the modulator in mm, positive toward the viewer. */
   offsetMm?: number;
-  /** Bits of a level, 1 to 16. */
+  /** The number of bits of a level, 1 to 16. */
   bits?: number;
-  /** Of the circular aperture in the Fourier plane, in shares of half the sampling frequency. */
+  /** The radius of the circular aperture in the Fourier plane, relative to half the sampling frequency. */
   apertureRadius?: number;
 }
 
-/** A display in its TOML form; keys and ranges are the core's to check. */
+/** Converts a display to TOML. The core checks keys and ranges. */
 function toml(display: Display): string {
   const number = (value: unknown): string =>
     Array.isArray(value) ? `[${value.map(number).join(", ")}]` : String(value).toLowerCase().replace("infinity", "inf");
@@ -32,15 +32,15 @@ function toml(display: Display): string {
 }
 
 /**
- * A display from its TOML form, as the command `phasefront` takes it.
+ * Parses a display from TOML, in the format of the command `phasefront`.
  *
- * @throws PhasefrontError `display`: a text that is none, or a display that cannot be.
+ * @throws PhasefrontError `display`: the text is not a display, or the display is invalid.
  */
 export function displayFromToml(text: string): Required<Display> {
   return Target.fromToml(text).display;
 }
 
-/** What holograms are made for: a display, its modulator's response, its lasers' light, what corrects its optics. */
+/** The target of a hologram: a display with its modulator response, laser light and correction of the optics. */
 export class Target {
   /** @internal */
   readonly raw: RawTarget;
@@ -50,27 +50,27 @@ export class Target {
   }
 
   /**
-   * A display in its TOML form, with levels in equal steps of phase.
+   * Creates a target from a display in TOML, with levels in equal phase steps.
    *
-   * @throws PhasefrontError `display`: a text that is none, or a display that cannot be.
+   * @throws PhasefrontError `display`: the text is not a display, or the display is invalid.
    */
   static fromToml(text: string): Target {
     return new Target(guard(() => RawTarget.fromToml(text)));
   }
 
   /**
-   * A display with levels in equal steps of phase, as many as its bits have.
+   * Creates a target from a display, with levels in equal phase steps and as many levels as its bits allow.
    *
-   * @throws PhasefrontError `display`: one that cannot be.
+   * @throws PhasefrontError `display`: the display is invalid.
    */
   static ofDisplay(display: Display = {}): Target {
     return Target.fromToml(toml(display));
   }
 
   /**
-   * A display whose modulator was calibrated as a whole: of 256 levels the one at i shows the phase 2πi/256.
+   * Creates a target with a global calibration of the modulator: the i-th of 256 levels gives the phase 2πi/256.
    *
-   * @throws PhasefrontError `display`: one that cannot be. `setting`: another number of levels.
+   * @throws PhasefrontError `display`: the display is invalid. `setting`: the number of levels is not 256.
    */
   static withLookUpTable(display: Display, levels: ArrayBufferView | ArrayBuffer): Target {
     const bytes = bytesOf("the look-up table", levels, "setting");
@@ -78,16 +78,16 @@ export class Target {
   }
 
   /**
-   * A calibration's file, as `phasefront calibrate` packs it.
+   * Reads a calibration file of `phasefront calibrate`.
    *
-   * @throws PhasefrontError `display`: bytes that are none, or a display that cannot be.
+   * @throws PhasefrontError `display`: the bytes are not a calibration, or the display is invalid.
    */
   static fromBytes(file: ArrayBufferView | ArrayBuffer): Target {
     const bytes = bytesOf("the calibration", file, "setting");
     return new Target(guard(() => RawTarget.fromBytes(bytes)));
   }
 
-  /** Its display. */
+  /** The display of the target. */
   get display(): Required<Display> {
     return guard(() => this.raw.display()) as Required<Display>;
   }

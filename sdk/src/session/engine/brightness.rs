@@ -1,12 +1,12 @@
-//! Which amplitude full light stands for, from frame to frame.
+//! Tracks the amplitude that full light represents, from frame to frame.
 //!
-//! The brightness of a hologram goes with 1/scale. Were the scale each frame's largest amplitude, a single pixel of
-//! noise would make the whole picture flicker.
+//! The brightness of a hologram varies with 1/scale. If the scale were the largest amplitude of each frame, a single
+//! noisy pixel would make the whole picture flicker.
 
 use phasefront_core::encode::brightness::Past;
 use std::time::Duration;
 
-/// Time in which the scale goes 63 % of the way to where it should be.
+/// The time in which the scale covers 63 % of the distance to its target.
 const TIME_CONSTANT: Duration = Duration::from_secs(1);
 
 /// The scale of a sequence of frames.
@@ -16,14 +16,14 @@ pub(in crate::session) struct BrightnessTracker {
 }
 
 impl BrightnessTracker {
-    /// Where the scale of a frame comes from that follows the last one after `elapsed`.
+    /// Returns the past for the scale of a frame that follows the last one after `elapsed`.
     pub(in crate::session) fn past(&self, elapsed: Option<Duration>) -> Option<Past> {
         let (scale, elapsed) = self.current.zip(elapsed)?;
         let share = 1.0 - (-elapsed.as_secs_f32() / TIME_CONSTANT.as_secs_f32()).exp();
         Some(Past { scale, share })
     }
 
-    /// Hears which scale a frame got.
+    /// Records the scale of a frame.
     pub(in crate::session) fn set_scale(&mut self, scale: f32) {
         self.current = Some(scale);
     }

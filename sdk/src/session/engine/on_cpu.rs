@@ -1,4 +1,4 @@
-//! A quality level on the CPU: from amplitudes and depth to levels.
+//! Computes a quality level on the CPU, from amplitudes and depth to levels.
 
 use crate::session::SessionOptions;
 use crate::session::engine::frame_io::{Encoded, LevelsOut};
@@ -11,13 +11,13 @@ use phasefront_core::pipeline::{Pipeline, PipelineScratch};
 use phasefront_core::runtime::cancel::Cancel;
 use phasefront_core::runtime::error::Result;
 
-/// Plan and memory.
+/// The plan and memory of a quality level on the CPU.
 pub(in crate::session) struct OnCpu {
     pipeline: Pipeline,
     scratch: PipelineScratch,
     field: Vec<Complex32>,
     bits: u32,
-    /// Where the display has over 8 bits.
+    /// The phases for a display with more than 8 bits; otherwise empty.
     phases: Vec<f32>,
 }
 
@@ -45,10 +45,10 @@ impl OnCpu {
         })
     }
 
-    /// Whether `quality_level` can be planned.
+    /// Checks whether `quality_level` can be planned, using less memory than [`Self::new`].
     ///
     /// # Errors
-    /// As [`Self::new`], for less memory.
+    /// Returns an error in the same cases as [`Self::new`].
     pub(in crate::session) fn check(options: &SessionOptions, quality_level: &QualityLevel) -> Result<()> {
         Self::plan(options, quality_level).map(|_| ())
     }
@@ -69,7 +69,7 @@ impl OnCpu {
         })
     }
 
-    /// Makes the levels of `frame`, which follows another where there is a `past`.
+    /// Computes the levels of `frame`, which follows another frame if there is a `past`.
     pub(in crate::session) fn process(
         &mut self,
         frame: &RgbdFrame,

@@ -1,4 +1,4 @@
-//! A quality level on the GPU: from a camera's colour and refined depth to levels.
+//! Computes a quality level on the GPU, from the camera's colour and refined depth to levels.
 
 use crate::session::SessionOptions;
 use crate::session::engine::brightness::BrightnessTracker;
@@ -12,22 +12,22 @@ use phasefront_gpu::{
 };
 use std::sync::Arc;
 
-/// Which GPU a session computes on, and how.
+/// The options of a session for its GPU.
 #[derive(Debug, Clone, Default)]
 pub struct GpuOptions {
-    /// Which one, and what was compiled for it on an earlier run.
+    /// The choice of the device, and programs that an earlier run compiled for it.
     pub device: DeviceOptions,
-    /// How networks are computed. By default f32 networks run in 16 bits where the GPU has them.
+    /// The options for networks. By default f32 networks run in 16 bits if the GPU supports it.
     #[doc(hidden)]
     pub chain: ChainOptions,
 }
 
-/// A frame that came to nothing.
+/// The reason why a frame produced no result.
 #[derive(Debug)]
 pub(in crate::session) enum Failure {
-    /// It is lost or wrong; the next one goes on.
+    /// The frame is lost or invalid; the session continues with the next one.
     Frame(Error),
-    /// The GPU is of no use for this quality level.
+    /// The GPU cannot be used for this quality level.
     Gpu(GpuError),
 }
 
@@ -40,11 +40,11 @@ impl From<GpuError> for Failure {
     }
 }
 
-/// Plans and memory.
+/// The plans and memory of a quality level on the GPU.
 pub(in crate::session) struct OnGpu(Renderer);
 
 impl OnGpu {
-    /// Plans `quality_level` on `device`, or on one that is opened and tried out.
+    /// Plans `quality_level` on `device`; without one, opens a device and tests it.
     pub(in crate::session) fn new(
         options: &SessionOptions,
         quality_level: &QualityLevel,
@@ -86,17 +86,17 @@ impl OnGpu {
         }
     }
 
-    /// How often a device was opened.
+    /// Returns how often a device was opened.
     pub(in crate::session) fn openings(&self) -> usize {
         self.0.openings()
     }
 
-    /// Gives the GPU's memory back.
+    /// Frees the GPU's memory.
     pub(in crate::session) fn release(&mut self) {
         self.0.release();
     }
 
-    /// Makes the levels of a frame, whose colour is the camera's where it comes from one.
+    /// Computes the levels of a frame. If the frame comes from a camera, reads the camera's colour directly.
     pub(in crate::session) fn process(
         &mut self,
         input: &FrameInput<'_>,
@@ -147,7 +147,7 @@ impl OnGpu {
         let times = report.times.unwrap_or_default();
         Ok(Encoded {
             scale: report.scale,
-            // With the ways to the GPU and back, and all of it where there are no time stamps.
+            // Includes the transfers to and from the GPU, and all stages if there are no time stamps.
             method: stage.end().saturating_sub(times.propagate + times.encode),
             propagate: times.propagate,
             encode: times.encode,
@@ -171,7 +171,7 @@ mod tests {
     use phasefront_core::method::network::Network;
     use std::time::Duration;
 
-    /// A device that goes while a frame is on it takes this frame along and no other.
+    /// A device that is lost loses only the frame in flight.
     #[test]
     fn a_frame_in_flight_is_lost_with_its_device_and_the_next_goes_on() {
         let network = Network::from_onnx(include_bytes!("../../../../models/rgbd-8-int8.onnx"));
@@ -204,7 +204,7 @@ mod tests {
         );
         assert_eq!(gpu.report().name, "no GPU at this moment");
         let made = gpu.process(&input, &mut brightness, &mut levels);
-        // The same scene: its scale stays, and so do its levels.
+        // The scene is the same, so its scale and levels are too.
         assert!((made.unwrap().scale - scale).abs() < 1e-6);
         assert_eq!(levels, first);
         assert_eq!(gpu.openings(), before + 1);
